@@ -1,0 +1,61 @@
+# What a person types at this project. Needs Python 3.11 or later, make and git; gcc for the C side.
+# Tests that want more (clang, cross compilers) are skipped with the name of the Debian package to install.
+
+PYTHON ?= python3
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --editable
+# Scripts are checked like the package; a folder without any would be an error to mypy.
+TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py generated/python/*/*.py)))
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint generate bench clean
+
+help:  ## Show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+
+setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' tools
+
+# What a user has: enough for the demo, and quicker to get than the tools.
+.venv/.user: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "qlinkgen needs Python 3.11 or later; say which: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
+	  || { echo "$(PYTHON) cannot make virtual environments; on Debian: apt-get install python3-venv"; exit 1; }
+	@echo "== setting up .venv"
+	@$(PYTHON) -m venv .venv
+	@$(PIP) .
+	@touch $@
+
+.venv/.dev: .venv/.user
+	@echo "== adding linters, type checkers and test tools (a minute, once)"
+	@$(PIP) '.[dev]'
+	@touch $@
+
+demo: .venv/.user  ## Encode and decode a message of each protocol in construct, Python and C, side by side
+	@$(BIN)/python examples/demo.py
+
+test: lint  ## Lint, types, layers, drift of the generated files, then every test
+	@echo "== pytest"
+	@$(BIN)/python -m pytest -n auto
+
+lint: setup  ## Everything of `test` that runs no test
+	@echo "== ruff"
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/ruff format --check --quiet
+	@echo "== mypy"
+	@$(BIN)/mypy $(TYPED)
+	@echo "== import-linter"
+	@$(BIN)/lint-imports --no-logo
+	@echo "== qlinkgen generate --check"
+	@$(BIN)/qlinkgen generate --check
+
+generate: .venv/.user  ## Rewrite generated/ from schemas/
+	@$(BIN)/qlinkgen generate
+
+bench: .venv/.user  ## Measure the generated code beside its peers
+	@$(PIP) '.[bench]'
+	@$(BIN)/python benchmarks/run.py
+
+clean:  ## Remove everything that make and the tools made
+	rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

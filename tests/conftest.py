@@ -1,0 +1,100 @@
+"""What every test may use: tools with an honest skip, and Hypothesis profiles.
+
+A test asks for a program by `require_tool("clang", package="clang")`. Without it the test is skipped, and the
+summary names the Debian package. With QLINKGEN_NO_SKIPS=1 nothing may be skipped: any skip is a failure.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Callable, Generator
+from typing import NoReturn
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+NO_SKIPS = os.environ.get("QLINKGEN_NO_SKIPS", "") not in {"", "0"}
+
+# The notice travels as text: under xdist a report is all that reaches the process that prints the summary.
+NOTICE = "needs {what} (Debian package {package})"
+NOTICE_PATTERN = re.compile(r"needs (?P<what>.+) \(Debian package (?P<package>[^\s)]+)\)")
+
+# Generated code is compiled and imported inside examples, so no deadline is meaningful on a shared machine.
+settings.register_profile("dev", deadline=None)
+settings.register_profile(
+    "ci", deadline=None, derandomize=True, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "dev"))
+
+
+def _missing(what: str, *, package: str) -> NoReturn:
+    notice = NOTICE.format(what=what, package=package)
+    if NO_SKIPS:
+        pytest.fail(f"{notice}, and QLINKGEN_NO_SKIPS allows no skip", pytrace=False)
+    pytest.skip(notice)
+
+
+def _require(tool: str, *, package: str) -> str:
+    return shutil.which(tool) or _missing(tool, package=package)
+
+
+@pytest.fixture(scope="session")
+def require_tool() -> Callable[..., str]:
+    """Return a function that gives the path of a program, or skips and names its Debian package."""
+    return _require
+
+
+@pytest.fixture(scope="session")
+def missing_tool() -> Callable[..., NoReturn]:
+    """Return a function to skip with when a program is there but a part of it is not (a runtime, a libc)."""
+    return _missing
+
+
+def _reason(report: pytest.TestReport | pytest.CollectReport) -> str:
+    # A skip is reported as (file, line, reason).
+    return report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+
+
+def _forbid_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
+    # An expected failure is also reported as "skipped"; that one says something and may stay.
+    if NO_SKIPS and report.skipped and not hasattr(report, "wasxfail"):
+        report.outcome = "failed"
+        report.longrepr = f"QLINKGEN_NO_SKIPS allows no skip: {_reason(report)}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Turn a skipped test into a failed one where nothing may be skipped."""
+    report = yield
+    _forbid_skip(report)
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Do the same for a module that skips itself while it is imported."""
+    report = yield
+    _forbid_skip(report)
+    return report
+
+
+def _skips_by_package(terminalreporter: pytest.TerminalReporter) -> dict[str, tuple[str, int]]:
+    skips: dict[str, tuple[str, int]] = {}
+    for report in terminalreporter.stats.get("skipped", []):
+        if found := NOTICE_PATTERN.search(_reason(report)):
+            what, package = found["what"], found["package"]
+            skips[package] = (what, skips.get(package, ("", 0))[1] + 1)
+    return skips
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """List the tools that were missing, what that cost, and the one command that brings them."""
+    skips = _skips_by_package(terminalreporter)
+    if not skips:
+        return
+    terminalreporter.section("skipped for missing tools")
+    for package, (what, count) in sorted(skips.items()):
+        terminalreporter.line(f"{count:5} test{'s' if count > 1 else ' '} without {what}: package {package}")
+    terminalreporter.line(f"To run them: apt-get install {' '.join(sorted(skips))}")
