@@ -1,0 +1,292 @@
+"""Checksums by name: the catalogue of CRC algorithms, 3 to 64 bits wide, and plain sums.
+
+The parameters of a CRC are those of the RevEng catalogue: `init` and `poly` describe a register that shifts
+towards its high bit, whatever `refin` says. Real code keeps a reflected CRC's register reflected, so that
+nothing has to be turned round for each byte. That second form is called the *register form* here: `start`,
+`feedback`, `residue` and all that `register` and `before` take and return are in it, ready for print in any
+language.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from qlinkgen.errors import QlinkgenError
+
+__all__ = ["SUMS", "Algorithm", "Checksum", "Sum", "UnknownAlgorithm", "catalogue", "find"]
+
+
+class UnknownAlgorithm(QlinkgenError, LookupError):
+    """No algorithm has this name, or several have.
+
+    Attributes:
+        name: the name asked for.
+        suggestions: names that exist and may have been meant, the likeliest first.
+    """
+
+    def __init__(self, name: str, suggestions: tuple[str, ...] = ()) -> None:
+        """Word the message with the suggestions."""
+        self.name = name
+        self.suggestions = suggestions
+        hint = f"; did you mean {' or '.join(suggestions)}?" if suggestions else ""
+        super().__init__(f"no checksum algorithm is called {name!r}{hint}")
+
+    def __reduce__(self) -> tuple[type[UnknownAlgorithm], tuple[str, tuple[str, ...]]]:
+        """Pickle by the arguments, not by the message."""
+        return type(self), (self.name, self.suggestions)
+
+
+@dataclass(frozen=True, slots=True)
+class Algorithm:
+    """A CRC algorithm.
+
+    Attributes:
+        name: name in the catalogue, in lower case.
+        width: bits of the CRC.
+        poly: polynomial without its highest term.
+        init: what the register starts with, not reflected.
+        refin: bytes are taken in with their low bit first.
+        refout: the register is reflected before it is given out.
+        xorout: what the result is combined with at last.
+        check: CRC of the nine characters 123456789.
+        aliases: other names in use.
+    """
+
+    kind: ClassVar[Literal["crc"]] = "crc"
+
+    name: str
+    width: int
+    poly: int
+    init: int
+    refin: bool
+    refout: bool
+    xorout: int
+    check: int
+    aliases: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse parameters that are no CRC."""
+        if not 3 <= self.width <= 64:
+            raise ValueError(f"{self.name}: width is {self.width}; CRCs of 3 to 64 bits are known here")
+        for parameter in ("poly", "init", "xorout", "check"):
+            if not 0 <= getattr(self, parameter) <= self.mask:
+                raise ValueError(f"{self.name}: {parameter} does not fit into {self.width} bits")
+        # Without the constant term a step forgets a bit: some errors go unseen, and `before` has no answer.
+        if not self.poly & 1:
+            raise ValueError(f"{self.name}: poly must be odd")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name and the aliases."""
+        return (self.name, *self.aliases)
+
+    @property
+    def mask(self) -> int:
+        """All bits of the register set."""
+        return (1 << self.width) - 1
+
+    @property
+    def start(self) -> int:
+        """What the register starts with, in register form."""
+        return _reflect(self.init, self.width) if self.refin else self.init
+
+    @property
+    def feedback(self) -> int:
+        """The polynomial as a bit-by-bit loop applies it, in register form."""
+        return _reflect(self.poly, self.width) if self.refin else self.poly
+
+    @property
+    def residue(self) -> int:
+        """What the register holds after any data followed by its own CRC, in register form.
+
+        The CRC must follow in its natural order: low byte first if `refout` is set, else high byte first. A
+        receiver can then run over the whole frame and compare once.
+        """
+        register = _reflect(self.xorout, self.width) if self.refin != self.refout else self.xorout
+        for _ in range(self.width):
+            register = self._clock(register, 0)
+        return register
+
+    def compute(self, data: Iterable[int]) -> int:
+        """Return the CRC of the bytes."""
+        return self.finish(self.register(data, self.start))
+
+    def finish(self, register: int) -> int:
+        """Return the CRC that a register stands for once all bytes have gone through it."""
+        return (_reflect(register, self.width) if self.refin != self.refout else register) ^ self.xorout
+
+    def register(self, data: Iterable[int], start: int) -> int:
+        """Return what the register holds after the bytes, beginning with `start`."""
+        table, register, shift, mask = self.table(), start, self.width - 8, self.mask
+        if self.refin:
+            for byte in data:
+                register = (register >> 8) ^ table[(register ^ byte) & 0xFF]
+        elif shift >= 0:
+            for byte in data:
+                register = (register << 8) & mask ^ table[(register >> shift) ^ byte]
+        else:
+            for byte in data:
+                register = table[(register << -shift) ^ byte]
+        return register
+
+    def before(self, prefix: bytes, value: int) -> int:
+        """Return the register from which `prefix` leads to `value`: `register` run backwards.
+
+        A checksum that leaves out a constant preamble can so be taken over the whole frame in one go: from
+        `before(preamble, start)` the preamble itself brings the register to `start`.
+        """
+        order = range(8) if not self.refin else range(7, -1, -1)
+        for byte in reversed(prefix):
+            for bit in order:
+                value = self._unclock(value, byte >> bit & 1)
+        return value
+
+    def table(self, bits: int = 8) -> tuple[int, ...]:
+        """Return what `bits` bits of input at once (8, or 4 for a small table) change in the register.
+
+        Reflected, a step is `register >> bits ^ table[(register ^ input) & (1 << bits) - 1]`, low bits of a
+        byte first; else `register << bits & mask ^ table[register >> width - bits ^ input]`, high bits first.
+        """
+        return _table(self, bits)
+
+    def _clock(self, register: int, bit: int) -> int:
+        if self.refin:
+            return register >> 1 ^ (self.feedback if (register ^ bit) & 1 else 0)
+        return register << 1 & self.mask ^ (self.feedback if register >> self.width - 1 ^ bit else 0)
+
+    def _unclock(self, register: int, bit: int) -> int:
+        # The polynomial is odd, so the bit that the step shifted in tells whether the polynomial was applied.
+        if self.refin:
+            out = register >> self.width - 1
+            return (register ^ (self.feedback if out else 0)) << 1 | out ^ bit
+        out = register & 1
+        return (register ^ (self.feedback if out else 0)) >> 1 | (out ^ bit) << self.width - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """A sum of units modulo a power of two; whether a unit is a byte or a word is up to the caller.
+
+    Attributes:
+        name: name in schema files.
+        width: bits of the sum.
+        complement: every bit of the result is inverted.
+    """
+
+    kind: ClassVar[Literal["sum"]] = "sum"
+
+    name: str
+    width: int
+    complement: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name: sums have no aliases."""
+        return (self.name,)
+
+    @property
+    def mask(self) -> int:
+        """All bits of the sum set."""
+        return (1 << self.width) - 1
+
+    def compute(self, units: Iterable[int]) -> int:
+        """Return the sum of the units; bytes are units too."""
+        return (~sum(units) if self.complement else sum(units)) & self.mask
+
+
+Checksum = Algorithm | Sum
+
+#: Every plain sum that `find` knows.
+SUMS = (Sum("sum8", 8), Sum("sum8-inverted", 8, complement=True), Sum("sum16", 16))
+
+
+def catalogue(width: int | None = None) -> tuple[Algorithm, ...]:
+    """Return the CRC algorithms, of one width or all, ordered by width and name."""
+    return tuple(algorithm for algorithm in _catalogue() if width in (None, algorithm.width))
+
+
+def find(name: str) -> Checksum:
+    """Return the algorithm of that name or alias.
+
+    Case and punctuation do not matter, and what is before the slash may be left out where the rest is enough:
+    `crc-16/ibm-3740`, `CRC16_CCITT_FALSE` and `ccitt-false` are one algorithm.
+
+    Raises:
+        UnknownAlgorithm: nothing has that name, or only a part of several names.
+    """
+    key = _key(name)
+    if found := _by_name().get(key):
+        return found
+    candidates = _by_short_name().get(key, ())
+    if len(candidates) == 1:
+        return candidates[0]
+    raise UnknownAlgorithm(name, tuple(each.name for each in candidates) or _similar(key))
+
+
+def _similar(key: str) -> tuple[str, ...]:
+    known = {_key(name): name for each in _by_name().values() for name in each.names}
+    return tuple(known[match] for match in difflib.get_close_matches(key, known, n=3))
+
+
+def _key(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _reflect(value: int, width: int) -> int:
+    return int(f"{value:0{width}b}"[::-1], 2)
+
+
+@functools.cache
+def _table(algorithm: Algorithm, bits: int) -> tuple[int, ...]:
+    table = [0] * (1 << bits)
+    order = range(bits) if algorithm.refin else range(bits - 1, -1, -1)
+    for index in range(1, len(table)):
+        if low := index & (index - 1):
+            # The step is linear: two inputs combined change what they change apart, combined.
+            table[index] = table[low] ^ table[index ^ low]
+            continue
+        for bit in order:
+            table[index] = algorithm._clock(table[index], index >> bit & 1)  # noqa: SLF001 - part of the class
+    return tuple(table)
+
+
+@functools.cache
+def _catalogue() -> tuple[Algorithm, ...]:
+    lines = Path(__file__).with_name("crc_catalogue.csv").read_text("ascii").splitlines()
+    return tuple(_algorithm(*line.split(",")) for line in lines[1:])
+
+
+def _algorithm(name: str, width: str, *parameters: str) -> Algorithm:
+    poly, init, refin, refout, xorout, check, aliases = parameters
+    return Algorithm(
+        name=name,
+        width=int(width),
+        poly=int(poly, 16),
+        init=int(init, 16),
+        refin=refin == "true",
+        refout=refout == "true",
+        xorout=int(xorout, 16),
+        check=int(check, 16),
+        aliases=tuple(aliases.split()),
+    )
+
+
+@functools.cache
+def _by_name() -> dict[str, Checksum]:
+    everything: tuple[Checksum, ...] = (*SUMS, *_catalogue())
+    return {_key(name): each for each in everything for name in each.names}
+
+
+@functools.cache
+def _by_short_name() -> dict[str, tuple[Algorithm, ...]]:
+    found: dict[str, tuple[Algorithm, ...]] = {}
+    for algorithm in _catalogue():
+        for short in {_key(name.split("/")[1]) for name in algorithm.names if "/" in name}:
+            found[short] = (*found.get(short, ()), algorithm)
+    return found

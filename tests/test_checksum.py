@@ -1,0 +1,231 @@
+"""The catalogue against two independent libraries, and the algebra that generated code relies on."""
+
+from __future__ import annotations
+
+import binascii
+import pickle
+import subprocess
+import sys
+import zlib
+
+import anycrc
+import pytest
+from crccheck import crc as crccheck
+from hypothesis import given
+from hypothesis import strategies as st
+
+from qlinkgen.errors import QlinkgenError
+from qlinkgen.model import checksum
+from qlinkgen.model.checksum import Algorithm, Sum, UnknownAlgorithm, catalogue, find
+
+CHECK_DATA = b"123456789"
+ALL = catalogue()
+every_algorithm = pytest.mark.parametrize("algorithm", ALL, ids=lambda each: each.name)
+
+CRCCHECK = {each._names[0].lower(): each for each in crccheck.ALLCRCCLASSES}
+PARAMETERS = {
+    "width": "_width",
+    "poly": "_poly",
+    "init": "_initvalue",
+    "refin": "_reflect_input",
+    "refout": "_reflect_output",
+    "xorout": "_xor_output",
+    "check": "_check_result",
+}
+ANYCRC = {each.name: each.name.upper().replace("CRC-", "CRC").replace("/", "-") for each in ALL}
+SAMPLES = [b"", b"\x00", b"\xa5" * 5, bytes(range(256)), CHECK_DATA]
+
+
+def crc(name: str) -> Algorithm:
+    found = find(name)
+    assert isinstance(found, Algorithm)
+    return found
+
+
+def bitwise(algorithm: Algorithm, data: bytes) -> int:
+    """The definition taken literally: one unreflected register, one bit at a time."""
+    register = algorithm.init
+    for byte in data:
+        bits = f"{byte:08b}"
+        for bit in reversed(bits) if algorithm.refin else bits:
+            high = register >> (algorithm.width - 1)
+            register = register << 1 & algorithm.mask
+            register ^= algorithm.poly if high ^ int(bit) else 0
+    if algorithm.refout:
+        register = int(f"{register:0{algorithm.width}b}"[::-1], 2)
+    return register ^ algorithm.xorout
+
+
+def test_the_catalogue_is_complete() -> None:
+    # crccheck has one more, 82 bits wide, which anycrc and 64-bit registers leave out.
+    assert {each.name for each in ALL} == set(CRCCHECK) - {"crc-82/darc"}
+    assert set(ANYCRC.values()) == set(anycrc.models)
+    assert [len(catalogue(width)) for width in (8, 16, 32, 64)] == [20, 31, 12, 7]
+    assert catalogue(9) == ()
+    assert sorted(ALL, key=lambda each: (each.width, each.name)) == list(ALL)
+
+
+@every_algorithm
+def test_parameters_agree_with_crccheck_and_anycrc(algorithm: Algorithm) -> None:
+    peer = CRCCHECK[algorithm.name]
+    ours = {name: getattr(algorithm, name) for name in PARAMETERS}
+    assert ours == anycrc.models[ANYCRC[algorithm.name]]._asdict()
+    assert ours == {name: getattr(peer, theirs) for name, theirs in PARAMETERS.items()}
+
+
+@every_algorithm
+def test_values_agree_with_crccheck_and_anycrc(algorithm: Algorithm) -> None:
+    assert algorithm.compute(CHECK_DATA) == algorithm.check
+    for data in SAMPLES:
+        assert algorithm.compute(data) == CRCCHECK[algorithm.name].calc(data) == bitwise(algorithm, data)
+        if data:  # for no data at all anycrc returns the unreflected init
+            assert algorithm.compute(data) == anycrc.Model(ANYCRC[algorithm.name]).calc(data)
+
+
+@given(st.sampled_from(ALL), st.binary())
+def test_values_agree_for_any_data(algorithm: Algorithm, data: bytes) -> None:
+    assert algorithm.compute(data) == bitwise(algorithm, data)
+
+
+@given(st.binary())
+def test_values_agree_with_the_standard_library(data: bytes) -> None:
+    assert crc("crc-16/ibm-3740").compute(data) == binascii.crc_hqx(data, 0xFFFF)
+    assert crc("crc-32").compute(data) == zlib.crc32(data)
+
+
+@given(st.sampled_from(ALL), st.binary(max_size=20), st.data())
+def test_before_undoes_register(algorithm: Algorithm, prefix: bytes, data: st.DataObject) -> None:
+    value = data.draw(st.integers(0, algorithm.mask))
+    assert algorithm.register(prefix, algorithm.before(prefix, value)) == value
+    assert algorithm.before(prefix, algorithm.register(prefix, value)) == value
+
+
+@every_algorithm
+def test_a_constant_preamble_folds_into_the_start_value(algorithm: Algorithm) -> None:
+    folded = algorithm.before(b"\xa5\xa5", algorithm.start)
+    register = algorithm.register(b"\xa5\xa5" + CHECK_DATA, folded)
+    assert algorithm.finish(register) == algorithm.check
+
+
+@every_algorithm
+def test_residue_agrees_with_crccheck(algorithm: Algorithm) -> None:
+    assert algorithm.residue == CRCCHECK[algorithm.name]._residue
+
+
+@given(st.sampled_from([each for each in ALL if each.width % 8 == 0]), st.binary())
+def test_data_with_its_own_crc_leaves_the_residue(algorithm: Algorithm, data: bytes) -> None:
+    own = algorithm.compute(data).to_bytes(algorithm.width // 8, "little" if algorithm.refout else "big")
+    assert algorithm.register(data + own, algorithm.start) == algorithm.residue
+
+
+# The index of an unreflected table needs as many register bits as it takes input.
+@pytest.mark.parametrize("algorithm", [each for each in ALL if each.width >= 4], ids=lambda each: each.name)
+def test_a_table_of_16_entries_gives_the_same_values(algorithm: Algorithm) -> None:
+    small, register = algorithm.table(4), algorithm.start
+    assert len(small) == 16
+    for byte in CHECK_DATA:
+        if algorithm.refin:
+            register = register >> 4 ^ small[(register ^ byte) & 15]
+            register = register >> 4 ^ small[(register ^ byte >> 4) & 15]
+        else:
+            shift = algorithm.width - 4
+            register = register << 4 & algorithm.mask ^ small[register >> shift ^ byte >> 4]
+            register = register << 4 & algorithm.mask ^ small[register >> shift ^ byte & 15]
+    assert algorithm.finish(register) == algorithm.check
+
+
+def test_tables_as_printed_elsewhere() -> None:
+    assert crc("crc-16/ibm-3740").table()[:4] == (0x0000, 0x1021, 0x2042, 0x3063)
+    assert crc("crc-32").table()[1:3] == (0x77073096, 0xEE0E612C)
+    assert len(crc("crc-32").table()) == 256
+
+
+@pytest.mark.parametrize(
+    ("name", "canonical"),
+    [
+        ("crc-16/ibm-3740", "crc-16/ibm-3740"),
+        ("CRC-16/CCITT-FALSE", "crc-16/ibm-3740"),
+        ("crc16_ccitt_false", "crc-16/ibm-3740"),
+        ("ccitt-false", "crc-16/ibm-3740"),
+        ("crc-16/autosar", "crc-16/ibm-3740"),
+        ("modbus", "crc-16/modbus"),
+        ("x-25", "crc-16/ibm-sdlc"),
+        ("x25", "crc-16/ibm-sdlc"),
+        ("crc-16", "crc-16/arc"),
+        ("crc-32", "crc-32/iso-hdlc"),
+        ("crc-32c", "crc-32/iscsi"),
+        ("sum16", "sum16"),
+    ],
+)
+def test_names_and_aliases(name: str, canonical: str) -> None:
+    assert find(name).name == canonical
+
+
+def test_every_name_finds_its_own_algorithm() -> None:
+    everything: tuple[checksum.Checksum, ...] = (*checksum.SUMS, *ALL)
+    names = [(name, each) for each in everything for name in each.names]
+    assert all(find(name) is each for name, each in names)
+    assert len({checksum._key(name) for name, _ in names}) == len(names)
+    assert all(name == name.lower().strip() for name, _ in names)
+
+
+@pytest.mark.parametrize(
+    ("name", "suggestion"),
+    [
+        ("crc-16/ibm-3470", "crc-16/ibm-3740"),
+        ("modbuss", "modbus"),
+        ("sum-61", "sum16"),
+        ("autosar", "crc-8/autosar"),  # a part of three names
+        ("autosar", "crc-32/autosar"),
+    ],
+)
+def test_an_unknown_name_comes_with_suggestions(name: str, suggestion: str) -> None:
+    with pytest.raises(UnknownAlgorithm, match=r"no checksum algorithm is called .*; did you mean") as caught:
+        find(name)
+    assert suggestion in caught.value.suggestions
+    assert isinstance(caught.value, LookupError)
+    assert isinstance(caught.value, QlinkgenError)
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_a_hopeless_name_has_no_suggestions() -> None:
+    with pytest.raises(UnknownAlgorithm) as caught:
+        find("§")
+    assert caught.value.suggestions == ()
+
+
+@given(st.binary())
+def test_sums(data: bytes) -> None:
+    assert find("sum8").compute(data) == sum(data) % 256
+    assert find("sum16").compute(data) == sum(data) % 65536
+    assert find("sum8-inverted").compute(data) == 255 - sum(data) % 256
+
+
+def test_a_sum_adds_whatever_units_it_is_given() -> None:
+    # The example of the MC1231A manual: command 11 hex with data FEDC BA98.
+    assert find("sum16").compute([0x11, 0xFEDC, 0xBA98]) == 0xB985
+    # A Dynamixel 1.0 ping of servo 1: id, length, instruction.
+    assert find("sum8-inverted").compute(b"\x01\x02\x01") == 0xFB
+    assert isinstance(find("sum8"), Sum)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"width": 2}, "width is 2"),
+        ({"width": 65}, "width is 65"),
+        ({"poly": 0x1020}, "poly must be odd"),
+        ({"poly": 0x11021}, "poly does not fit"),
+        ({"init": -1}, "init does not fit"),
+        ({"xorout": 0x10000}, "xorout does not fit"),
+    ],
+)
+def test_impossible_parameters_are_refused(changes: dict[str, int], message: str) -> None:
+    parameters = {"width": 16, "poly": 0x1021, "init": 0, "xorout": 0, "check": 0} | changes
+    with pytest.raises(ValueError, match=message):
+        Algorithm("mine", refin=False, refout=False, aliases=(), **parameters)
+
+
+def test_importing_the_module_reads_no_catalogue() -> None:
+    code = "import qlinkgen.model.checksum as c; assert c._catalogue.cache_info().currsize == 0"
+    subprocess.run([sys.executable, "-c", code], check=True)
