@@ -1,0 +1,124 @@
+"""A message: its fields in wire order, and what can be known about its payload before any byte is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from qlinkgen.model.types import Array, BitField, Bits, Blob, FieldType, Scalar
+
+#: "request": master to slave; "response": slave to master; "message": sent by anybody, answered by nobody.
+Direction = Literal["request", "response", "message"]
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A run of payload bytes. ``Bits`` hold several named values, every other type one."""
+
+    name: str
+    type: FieldType
+    doc: str = ""
+    section: str = ""
+    confirmed: bool = True
+
+    @property
+    def min_size(self) -> int:
+        """Fewest bytes on the wire."""
+        if isinstance(self.type, Blob | Array):
+            return self.type.length.minimum * self.type.item_size
+        return self.type.size
+
+    @property
+    def max_size(self) -> int:
+        """Most bytes on the wire."""
+        if isinstance(self.type, Blob | Array):
+            return self.type.length.maximum * self.type.item_size
+        return self.type.size
+
+    @property
+    def fixed(self) -> bool:
+        """The size is always the same."""
+        return not isinstance(self.type, Blob | Array) or self.type.length.fixed
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """Something that a caller sets and reads: an attribute of the message object, a C struct member."""
+
+    name: str
+    type: Scalar | Blob | Array
+    doc: str
+    #: The field that carries it, and its place inside where that is an integer of several values.
+    field: Field
+    bits: BitField | None = None
+
+
+@dataclass(frozen=True)
+class Message:
+    """One message in one direction.
+
+    ``addresses`` are the (first, last) ranges of the address field that this message may carry, () where the
+    frame has no address.
+    """
+
+    name: str
+    command: str
+    direction: Direction
+    id: int
+    fields: tuple[Field, ...]
+    doc: str = ""
+    section: str = ""
+    confirmed: bool = True
+    #: A payload of no bytes at all is taken as the message with every field at its default.
+    empty_is_default: bool = False
+    #: The frame's checksum is sent with this message.
+    checksum: bool = True
+    addresses: tuple[tuple[int, int], ...] = ()
+    default_address: int = 0
+
+    @cached_property
+    def min_size(self) -> int:
+        """Fewest payload bytes (``empty_is_default`` not considered)."""
+        return sum(field.min_size for field in self.fields)
+
+    @cached_property
+    def max_size(self) -> int:
+        """Most payload bytes."""
+        return sum(field.max_size for field in self.fields)
+
+    @property
+    def fixed(self) -> bool:
+        """The payload has always the same size."""
+        return all(field.fixed for field in self.fields)
+
+    @cached_property
+    def variable(self) -> tuple[Field, ...]:
+        """Fields of variable size, in wire order."""
+        return tuple(field for field in self.fields if not field.fixed)
+
+    @cached_property
+    def values(self) -> tuple[Value, ...]:
+        """What a caller sets and reads, in wire order, without constants, reserved bytes and counts."""
+        return tuple(self._values())
+
+    def _values(self) -> Iterator[Value]:
+        for field in self.fields:
+            if isinstance(field.type, Bits):
+                for member in field.type.members:
+                    if member.type.settable:
+                        yield Value(member.name, member.type, member.doc, field, member)
+            elif not isinstance(field.type, Scalar) or field.type.settable:
+                yield Value(field.name, field.type, field.doc, field)
+
+    def offset(self, name: str) -> int | None:
+        """Bytes of payload before a field, None where a field of variable size stands before it."""
+        position = 0
+        for field in self.fields:
+            if field.name == name:
+                return position
+            if not field.fixed:
+                return None
+            position += field.max_size
+        raise KeyError(name)

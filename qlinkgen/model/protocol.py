@@ -1,0 +1,70 @@
+"""The root of the model: everything that a back-end or a runtime may know of a protocol."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
+from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.transaction import Bus, Command
+from qlinkgen.model.types import ByteOrder, Enum, Flags
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """One protocol as its schema describes it, checked and with every computed number.
+
+    ``commands`` are the transactions, ``messages`` every message of every direction in schema order.
+    """
+
+    name: str
+    title: str
+    revision: str
+    source: str
+    doc: str
+    byteorder: ByteOrder
+    enums: tuple[Enum, ...]
+    flags: tuple[Flags, ...]
+    frame: Frame
+    bus: Bus
+    commands: tuple[Command, ...]
+    messages: tuple[Message, ...]
+    #: SHA-256 of the schema's text (line ends made uniform), 12 hex digits; stands in every generated banner.
+    schema_hash: str
+    #: File name of the schema, without its folder.
+    schema_file: str
+
+    @cached_property
+    def by_name(self) -> dict[str, Message]:
+        """Messages by full name ("motion.request", "keypad_mode")."""
+        return {message.name: message for message in self.messages}
+
+    def message(self, name: str) -> Message:
+        """Message of a full name; a command's name alone is its request. Raises KeyError."""
+        return self.by_name.get(f"{name}.request") or self.by_name[name]
+
+    def received(self, direction: Direction) -> tuple[Message, ...]:
+        """Messages that a decoder for a direction accepts: its own, and those that anybody may send."""
+        return tuple(m for m in self.messages if m.direction in (direction, "message"))
+
+    @property
+    def directions(self) -> tuple[Direction, ...]:
+        """Directions in use: ("request", "response") or ("message",)."""
+        used = {message.direction for message in self.messages}
+        return ("message",) if used == {"message"} else ("request", "response")
+
+    @property
+    def address_name(self) -> str | None:
+        """Name of the frame's address ("node", "address"), None where it has none."""
+        if isinstance(self.frame, MarkedFrame):
+            return self.frame.address_name
+        if isinstance(self.frame, DelimitedFrame) and (part := self.frame.part("address")):
+            return part.name
+        return None
+
+    def command_of(self, message: Message) -> Command | None:
+        """The transaction that a message belongs to."""
+        return next(
+            (command for command in self.commands if message in (command.request, command.response)), None
+        )

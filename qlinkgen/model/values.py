@@ -1,0 +1,167 @@
+"""The values of a message outside of any language: as native Python objects, as raw integers, and in JSON.
+
+A native value is what generated Python and construct hold: int, bool, float or Decimal in the field's unit,
+an int for enums and flags, bytes, str, a list of ints. In JSON, bytes are hex strings, enums their name (a
+number when unknown), flags an integer, scaled values numbers in the unit with all their digits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+from qlinkgen.model.message import Value
+from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
+
+Native = int | bool | float | Decimal | bytes | str | list[int]
+
+
+class BadValue(ValueError):
+    """A value that a field cannot have; the text names the field, what was seen and what would do."""
+
+
+def default_of(value: Value) -> Native:
+    """The default of a field, native."""
+    kind = value.type
+    if isinstance(kind, Scalar):
+        return native_from_raw(kind, kind.default)
+    if isinstance(kind, Array):
+        return list(kind.default)
+    return kind.default.decode("ascii") if kind.text else kind.default
+
+
+def native_from_raw(scalar: Scalar, raw: int) -> Native:
+    """An integer on the wire as the native value."""
+    return bool(raw) if scalar.meaning == "bool" else scalar.physical(raw)
+
+
+def raw_from_native(value: Value, native: Native) -> int:
+    """A native number as the integer on the wire: the nearest step, in range. Raises BadValue."""
+    scalar = value.type
+    assert isinstance(scalar, Scalar)
+    if isinstance(native, bytes | str | list) or (isinstance(native, float) and not math.isfinite(native)):
+        raise BadValue(f"{value.name}: {native!r} is not a number")
+    if isinstance(native, Decimal) and not native.is_finite():
+        raise BadValue(f"{value.name}: {native} is not a number")
+    exact = Fraction(native)
+    if scalar.scaling is None and exact.denominator != 1:
+        raise BadValue(f"{value.name}: {native} is not a whole number")
+    raw = scalar.scaling.raw(exact) if scalar.scaling else int(exact)
+    if not scalar.minimum <= raw <= scalar.maximum:
+        low, high = sorted((scalar.physical(scalar.minimum), scalar.physical(scalar.maximum)))
+        unit = f" {scalar.unit}" if scalar.unit else ""
+        raise BadValue(f"{value.name}: {native} is out of range; {low}..{high}{unit} can be sent")
+    return raw
+
+
+def to_json(value: Value, native: Native) -> Any:
+    """A native value for JSON; a Decimal stays one, so that the writer can print all its digits."""
+    kind = value.type
+    if isinstance(kind, Blob):
+        assert isinstance(native, bytes | str)
+        return native.hex() if isinstance(native, bytes) else native
+    if isinstance(kind, Array):
+        assert isinstance(native, Sequence)
+        return [int(item) for item in native]
+    if isinstance(kind.meaning, Enum):
+        assert isinstance(native, int)
+        return kind.meaning.name_of(native) or int(native)
+    return int(native) if isinstance(kind.meaning, Flags) else native  # type: ignore[arg-type]
+
+
+def from_json(value: Value, given: Any) -> Native:
+    """A JSON value (or text of a command line) as the native one.
+
+    Accepts what :func:`to_json` gives, and enum numbers, flag names as a list, numbers in text (0x too).
+    Raises BadValue; ranges are left to the encoder.
+    """
+    kind = value.type
+    if isinstance(kind, Blob):
+        return _blob(value.name, kind, given)
+    if isinstance(kind, Array):
+        return [_whole(value.name, item) for item in _listed(value.name, given)]
+    if isinstance(kind.meaning, Enum) and isinstance(given, str):
+        names = {member.name: member.value for member in kind.meaning.members}
+        return names[given] if given in names else _named_or_number(value.name, given, names)
+    if isinstance(kind.meaning, Flags) and not isinstance(given, int):
+        return _flags(value.name, kind.meaning, given)
+    if kind.meaning == "bool":
+        return _bool(value.name, given)
+    return (
+        _whole(value.name, given)
+        if kind.number == "int"
+        else _number(value.name, given, exact=kind.number == "decimal")
+    )
+
+
+def _blob(name: str, kind: Blob, given: Any) -> bytes | str:
+    if not isinstance(given, str):
+        raise BadValue(
+            f"{name}: {given!r} is not text; write {'the characters' if kind.text else 'hex digits'}"
+        )
+    if kind.text:
+        return given
+    try:
+        return bytes.fromhex(given)
+    except ValueError:
+        raise BadValue(f"{name}: '{given}' is not a byte string; write pairs of hex digits") from None
+
+
+def _listed(name: str, given: Any) -> Sequence[Any]:
+    if isinstance(given, str):
+        return [item for item in given.replace(",", " ").strip("[]").split() if item]
+    if isinstance(given, Sequence):
+        return given
+    raise BadValue(f"{name}: {given!r} is not a list; write numbers with commas between them")
+
+
+def _whole(name: str, given: Any) -> int:
+    if isinstance(given, str):
+        try:
+            return int(given, 0)
+        except ValueError:
+            raise BadValue(f"{name}: '{given}' is not a whole number") from None
+    if isinstance(given, bool) or not isinstance(given, int):
+        raise BadValue(f"{name}: {given!r} is not a whole number")
+    return given
+
+
+def _number(name: str, given: Any, *, exact: bool) -> int | float | Decimal:
+    try:
+        if isinstance(given, str):
+            number = Decimal(int(given, 0)) if given.lower().startswith(("0x", "-0x")) else Decimal(given)
+            return number if exact else float(number)
+    except ArithmeticError:
+        raise BadValue(f"{name}: '{given}' is not a number") from None
+    if isinstance(given, bool) or not isinstance(given, int | float | Decimal):
+        raise BadValue(f"{name}: {given!r} is not a number")
+    return float(given) if isinstance(given, Decimal) and not exact else given
+
+
+def _bool(name: str, given: Any) -> bool:
+    known: Mapping[Any, bool] = {"true": True, "false": False, "1": True, "0": False, 1: True, 0: False}
+    key = given.lower() if isinstance(given, str) else given
+    if isinstance(key, str | int) and key in known:
+        return known[key]
+    raise BadValue(f"{name}: {given!r} is neither true nor false")
+
+
+def _named_or_number(name: str, given: str, names: Mapping[str, int]) -> int:
+    try:
+        return int(given, 0)
+    except ValueError:
+        raise BadValue(f"{name}: '{given}' is unknown; one of {', '.join(names)}, or a number") from None
+
+
+def _flags(name: str, flags: Flags, given: Any) -> int:
+    bits = {member.name: 1 << member.value for member in flags.members}
+    total = 0
+    for item in _listed(name, given.replace("|", " ") if isinstance(given, str) else given):
+        if isinstance(item, str) and item in bits:
+            total |= bits[item]
+        else:
+            total |= _named_or_number(name, str(item), bits)
+    return total
