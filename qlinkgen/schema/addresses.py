@@ -1,0 +1,58 @@
+"""Second pass, addresses: what the bus says of its nodes, against the frame's place for their number."""
+
+from __future__ import annotations
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
+from qlinkgen.model.transaction import Bus
+from qlinkgen.schema.report import Reporter
+
+_NEEDS = (("bus",), ("frame",))
+
+
+def check_addresses(frame: Frame | None, bus: Bus, report: Reporter) -> None:
+    """Check nodes and broadcast address against the frame and each other."""
+    if frame is None:
+        return
+    highest = _highest(frame)
+    if highest is None:
+        _check_unused(bus, report)
+        return
+    if bus.nodes is None:
+        what = "the frame has an address, and the bus no nodes"
+        report.error("bad-addressing", ("bus",), what, "add nodes: 1..16", of_key=True, needs=_NEEDS)
+        return
+    if bus.nodes[1] > highest:
+        what = f"node {bus.nodes[1]} does not fit the frame's address"
+        report.error("address-does-not-fit", ("bus", "nodes"), what, f"use 0..{highest}", needs=_NEEDS)
+    if isinstance(frame, MarkedFrame) and bus.nodes[0] == 0:
+        what = "address 0 is nobody's where a header carries it"
+        report.error("bad-addressing", ("bus", "nodes"), what, "let the nodes begin at 1", needs=_NEEDS)
+    _check_broadcast(bus, bus.nodes, highest, report)
+
+
+def _highest(frame: Frame) -> int | None:
+    """Greatest address, None where the frame has none."""
+    if isinstance(frame, MarkedFrame):
+        return frame.address_bits.mask
+    part = frame.part("address") if isinstance(frame, DelimitedFrame) else None
+    return part.scalar.maximum if part and part.scalar else None
+
+
+def _check_unused(bus: Bus, report: Reporter) -> None:
+    for key, value in (("nodes", bus.nodes), ("broadcast", bus.broadcast)):
+        if value is not None:
+            what = f"'{key}' has no effect: the frame has no address"
+            hint = "remove it, or add a part with role: address"
+            report.error("bad-addressing", ("bus", key), what, hint, of_key=True, needs=_NEEDS)
+
+
+def _check_broadcast(bus: Bus, nodes: tuple[int, int], highest: int, report: Reporter) -> None:
+    if bus.broadcast is None:
+        return
+    if bus.broadcast > highest:
+        what = f"broadcast address {bus.broadcast} does not fit the frame's address"
+        report.error("address-does-not-fit", ("bus", "broadcast"), what, f"use 0..{highest}", needs=_NEEDS)
+    if nodes[0] <= bus.broadcast <= nodes[1]:
+        what = f"broadcast address {bus.broadcast} is a node's too"
+        hint = f"use one outside {nodes[0]}..{nodes[1]}"
+        report.error("bad-addressing", ("bus", "broadcast"), what, hint, needs=_NEEDS)

@@ -1,0 +1,251 @@
+"""Second pass, commands: the transactions that join requests and responses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
+from qlinkgen.model.message import Message
+from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Repeat
+from qlinkgen.model.types import Scalar
+from qlinkgen.schema.file_model import CommandSpec, Fields, NoResponse, RepeatSpec, SchemaFile
+from qlinkgen.schema.kinds import Label
+from qlinkgen.schema.messages import MessageBuilder
+from qlinkgen.schema.notation import Duration, shown
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+
+def build_bus(file: SchemaFile) -> Bus:
+    """The bus as the file describes it."""
+    spec = file.bus
+    return Bus(
+        kind=spec.kind,
+        nodes=spec.nodes,
+        broadcast=spec.broadcast,
+        baud=spec.baud,
+        bits_per_byte=spec.bits_per_byte,
+        response_within=_allowance(spec.response_within),
+        section=spec.section,
+    )
+
+
+def _allowance(time: Duration) -> Allowance:
+    return Allowance(time.byte_times, time.seconds)
+
+
+class CommandBuilder:
+    """Builds the messages and commands of one file."""
+
+    def __init__(
+        self, file: SchemaFile, report: Reporter, messages: MessageBuilder, frame: Frame | None, bus: Bus
+    ) -> None:
+        """``frame`` is None where it could not be built: what depends on it is not checked then."""
+        self._file = file
+        self._report = report
+        self._build = messages
+        self._frame = frame
+        self._bus = bus
+        self.messages: list[Message] = []
+        self.commands: list[Command] = []
+
+    def build(self) -> None:
+        """Fill :attr:`messages` and :attr:`commands`."""
+        for name, spec in self._file.commands.items():
+            self._command(name, spec, ("commands", name))
+        for name, message in self._file.messages.items():
+            self.messages.append(self._build.single(name, message))
+        if not self._file.commands and not self._file.messages:
+            what = "the protocol has no commands and no messages"
+            needs = (("commands",), ("messages",))
+            self._report.error("empty-protocol", (), what, "add commands: or messages:", needs=needs)
+        self._check_ids()
+        self._check_only()
+
+    def _command(self, name: str, spec: CommandSpec, path: Path) -> None:
+        defaults = self._file.defaults
+        addressing = self._addressing(spec.addressing or defaults.addressing, path)
+        request, response = self._directions(name, spec, addressing, path)
+        self.commands.append(
+            Command(
+                name=name,
+                id=spec.id,
+                request=request,
+                response=response,
+                addressing=addressing,
+                response_within=_allowance(spec.response_within or self._file.bus.response_within),
+                repeat=self._repeat(spec.repeat or defaults.repeat, request, path),
+                in_flight=spec.in_flight or defaults.in_flight or 1,
+                doc=spec.doc,
+                section=self._section(spec),
+                confirmed=spec.confirmed,
+                attributes=self._attributes(spec.attributes, path),
+            ),
+        )
+
+    def _section(self, spec: CommandSpec) -> str:
+        return spec.section if spec.section is not None else self._file.defaults.section or ""
+
+    def _directions(
+        self, name: str, spec: CommandSpec, addressing: Addressing, path: Path
+    ) -> tuple[Message, Message | None]:
+        request = self._file.defaults.request if spec.request is None else spec.request
+        response = self._file.defaults.response if spec.response is None else spec.response
+        if request is None:
+            self._missing(
+                "bad-response",
+                "request",
+                path,
+                f"{name} has no request",
+                "write request: {} for one without data",
+            )
+        if response is None:
+            hint = "write response: {} for an empty answer, response: none for no answer"
+            self._missing("bad-response", "response", path, f"{name} has no response", hint)
+        self._check_answered(addressing, response, path)
+        section, build = self._section(spec), self._build.directed
+        asked = build(name, spec, "request", request or {}, addressing=addressing, section=section)
+        self.messages.append(asked)
+        if response is None or response == "none":
+            return asked, None
+        answered = build(name, spec, "response", response, addressing=addressing, section=section)
+        self.messages.append(answered)
+        return asked, answered
+
+    def _missing(self, rule: str, key: str, path: Path, what: str, hint: str) -> None:
+        """Report a key that neither a command nor the defaults have."""
+        lost = self._report.touched((*path, key)) or self._report.incomplete(("defaults",))
+        if not lost:
+            self._report.error(rule, path, what, hint, of_key=True, absent=True)
+
+    def _addressing(self, given: Addressing | None, path: Path) -> Addressing:
+        place = (*path, "addressing")
+        needs = (("bus",), ("frame",), place, ("defaults", "addressing"))
+        if not self._build.addressed:
+            if given not in (None, "none"):
+                what, hint = (
+                    f"'{given}' needs an address in the frame",
+                    "remove it, or add a part with role: address",
+                )
+                self._report.error("bad-addressing", place, what, hint, needs=needs)
+            return "none"
+        if given is None or given == "none":
+            hint = "add addressing: node, broadcast, either or answered_broadcast"
+            if not self._report.touched(("frame",)):
+                self._missing(
+                    "bad-addressing", "addressing", path, f"{path[-1]} does not say who is addressed", hint
+                )
+            return "node"
+        if given != "node" and self._bus.broadcast is None:
+            what = f"'{given}' needs a broadcast address"
+            self._report.error("bad-addressing", place, what, "add broadcast: 0 to the bus", needs=needs)
+        return given
+
+    def _check_answered(
+        self, addressing: Addressing, response: Fields | NoResponse | None, path: Path
+    ) -> None:
+        place, needs = (*path, "response"), ((*path, "response"), (*path, "addressing"))
+        if response == "none" and addressing == "answered_broadcast":
+            what = f"{path[-1]} has an answered broadcast and no response"
+            self._report.error(
+                "bad-response", place, what, "use addressing: either", of_key=True, needs=needs
+            )
+        if response not in ("none", None) and addressing == "broadcast":
+            what = f"{path[-1]} is only broadcast and has a response"
+            hint = "use response: none, or addressing: answered_broadcast"
+            self._report.error("bad-response", place, what, hint, of_key=True, needs=needs)
+
+    def _repeat(self, spec: RepeatSpec | None, request: Message, path: Path) -> Repeat:
+        if spec is None:
+            hint = "write repeat: safe, unsafe or {counter: FIELD}"
+            self._missing(
+                "bad-repeat", "repeat", path, f"{path[-1]} does not say whether it may be repeated", hint
+            )
+            return Repeat(safe=False)
+        if spec.counter is not None:
+            self._check_counter(spec.counter, request, path)
+        return Repeat(spec.safe, spec.counter or "")
+
+    def _check_counter(self, counter: str, request: Message, path: Path) -> None:
+        place, needs = (*path, "repeat", "counter"), ((*path, "request"), (*path, "repeat"))
+        known = {value.name: value.type for value in request.values}
+        if counter not in known:
+            hint = did_you_mean(counter, known, f"its fields are {listed(known)}")
+            what = f"the request has no field {shown(counter)}"
+            self._report.error("unknown-message", place, what, hint, needs=needs)
+            return
+        kind = known[counter]
+        if (
+            not isinstance(kind, Scalar)
+            or kind.meaning is not None
+            or kind.scaling is not None
+            or kind.signed
+        ):
+            what = f"{counter} cannot count repeats"
+            self._report.error("bad-repeat", place, what, "use a plain unsigned integer", needs=needs)
+
+    def _attributes(self, given: Mapping[str, Label], path: Path) -> Mapping[str, Label]:
+        """The attributes of a command, those of the defaults included."""
+        merged: dict[str, Label] = {**self._file.defaults.attributes, **given}
+        for key, value in merged.items():
+            place = (*(path if key in given else ("defaults",)), "attributes", key)
+            self._check_attribute(key, value, place)
+        return MappingProxyType(merged)
+
+    def _check_attribute(self, key: str, value: Label, place: Path) -> None:
+        declared = self._file.attributes.get(key)
+        needs = (place, ("attributes", key))
+        if declared is None:
+            hint = did_you_mean(key, self._file.attributes, "declare it under attributes")
+            what = f"attribute {shown(key)} is not declared"
+            self._report.error("unknown-attribute", place, what, hint, of_key=True, needs=needs)
+        elif not any(value == allowed and type(value) is type(allowed) for allowed in declared.values):
+            words = [shown(allowed).strip("'") for allowed in declared.values]
+            hint = did_you_mean(str(value), words, f"use {listed(words, 'or')}")
+            self._report.error(
+                "unknown-attribute", place, f"{key} is never {shown(value)}", hint, needs=needs
+            )
+
+    # What messages mean together
+
+    def _check_ids(self) -> None:
+        seen: dict[tuple[str, int], Path] = {}
+        for message in self.messages:
+            group = "commands" if message.name != message.command else "messages"
+            path = (group, message.command, "id")
+            self._check_id_fits(message, path)
+            directions = ("request", "response") if message.direction == "message" else (message.direction,)
+            for direction in directions:
+                other = seen.setdefault((direction, message.id), path)
+                if other != path:
+                    what = f"{message.command} has the id of {other[1]}, {message.id:#04x}"
+                    needs = (path, other)
+                    self._report.error("overlapping-id", path, what, "give it an id of its own", needs=needs)
+
+    def _check_id_fits(self, message: Message, path: Path) -> None:
+        most = 0xFF
+        if isinstance(self._frame, DelimitedFrame):
+            part = self._frame.part("message")
+            most = part.scalar.maximum if part and part.scalar else most
+        elif isinstance(self._frame, MarkedFrame):
+            most = self._frame.id_bits.mask
+            if message.id == self._frame.end_id:
+                what = f"{message.id} marks the end of a message"
+                needs = (path, ("frame",))
+                self._report.error("overlapping-id", path, what, "use another id", needs=needs)
+        if message.id > most:
+            what = f"id {message.id:#x} does not fit the frame"
+            self._report.error("id-does-not-fit", path, what, f"use 0..{most:#x}", needs=(path, ("frame",)))
+
+    def _check_only(self) -> None:
+        marked = self._file.frame.marked
+        known = [*self._file.messages, *self._file.commands]
+        for index, name in enumerate((marked.checksum.only if marked and marked.checksum else None) or ()):
+            if name not in known:
+                path = ("frame", "marked", "checksum", "only", index)
+                hint = did_you_mean(name, known, f"there are {listed(known)}")
+                needs = (path, ("messages", name), ("commands", name))
+                self._report.error(
+                    "unknown-message", path, f"there is no message {shown(name)}", hint, needs=needs
+                )

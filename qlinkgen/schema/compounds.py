@@ -1,0 +1,184 @@
+"""Second pass, types of several values or of any size: byte strings, text, arrays, bit fields."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
+from qlinkgen.schema.constants import integer_range
+from qlinkgen.schema.file_model import BitSpec, FieldSpec
+from qlinkgen.schema.kinds import MAX_PAYLOAD
+from qlinkgen.schema.notation import TypeText, shown, whole_range
+from qlinkgen.schema.numbers import defaulted, quantified
+from qlinkgen.schema.scalars import Meaning, Plain, ScalarBuilder
+from qlinkgen.schema.site import Site
+
+_NUMBER_KEYS = ("byteorder", "groups", "parts", "scale", "offset", "range", "raw_range", "counts", "bits")
+_ITEM_KEYS = ("scale", "offset", "range", "raw_range", "const", "reserved", "counts", "bits")
+_CONTAINER_KEYS = ("scale", "offset", "range", "raw_range", "default", "const", "reserved", "counts", "unit")
+
+
+def build_length(text: TypeText, item_size: int, payload_max: int, site: Site) -> Length | None:
+    """How many items the brackets of a type allow; without a number, as many as the payload can hold."""
+    if text.count is None or not text.count.strip():
+        return Length(0, payload_max // item_size)
+    try:
+        first, last = whole_range(text.count)
+    except ValueError:
+        hint = "write a number or a range, like [4] or [0..12]"
+        site.fault("unknown-type", "type", f"{shown(text.count)} is not a count", hint)
+        return None
+    if last == 0:
+        site.fault(
+            "bad-array",
+            "type",
+            f"{text.base}[{text.count}] holds nothing",
+            "remove the field, or raise the count",
+        )
+        return None
+    if last * item_size > MAX_PAYLOAD:
+        what = f"{text.base}[{text.count}] has up to {last * item_size} bytes"
+        site.fault("payload-too-long", "type", what, f"no payload has more than {MAX_PAYLOAD}")
+        return None
+    return Length(first, last)
+
+
+def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, site: Site) -> Blob | None:
+    """A byte string or text."""
+    site.reject(spec, (*_NUMBER_KEYS, "unit", "reserved"), text.base)
+    if spec.const is not None:
+        site.key_fault(
+            "not-applicable", "const", f"'const' has no effect on {text.base}", "use integers with const"
+        )
+    length = build_length(text, 1, payload_max, site)
+    if length is None:
+        return None
+    default = _blob_default(spec, text, length, site)
+    fill = b" " if text.base == "text" else b"\0"
+    return Blob(text.base == "text", length, default.ljust(length.minimum, fill))
+
+
+def _blob_default(spec: FieldSpec, text: TypeText, length: Length, site: Site) -> bytes:
+    if spec.default is None:
+        return b""
+    is_text = text.base == "text"
+    try:
+        default = str(spec.default).encode("ascii") if is_text else bytes.fromhex(str(spec.default))
+    except ValueError:
+        hint = "write characters of 7 bits" if is_text else "write pairs of hex digits in quotes"
+        site.fault("bad-value", "default", f"{shown(spec.default)} is no {text.base}", hint)
+        return b""
+    if not length.minimum <= len(default) <= length.maximum:
+        what = f"the default has {len(default)} bytes"
+        site.fault(
+            "value-does-not-fit", "default", what, f"{text.base}[{text.count or ''}] is what it has to fit"
+        )
+        return b""
+    return default
+
+
+def build_array(item: Scalar, spec: FieldSpec, text: TypeText, payload_max: int, site: Site) -> Array | None:
+    """Integers in a row."""
+    length = build_length(text, item.size, payload_max, site)
+    if length is None:
+        return None
+    default = _array_default(spec, item, length, site)
+    return Array(item, length, default + (0,) * (length.minimum - len(default)))
+
+
+def _array_default(spec: FieldSpec, item: Scalar, length: Length, site: Site) -> tuple[int, ...]:
+    if spec.default is None:
+        return ()
+    if not isinstance(spec.default, list):
+        site.fault("wrong-type", "default", f"{shown(spec.default)} is no list", "write a list, like [1, 2]")
+        return ()
+    if len(spec.default) > length.maximum:
+        what = f"the default has {len(spec.default)} items"
+        site.fault("value-does-not-fit", "default", what, f"write at most {length.maximum}")
+        return ()
+    for value in spec.default:
+        if not item.minimum <= value <= item.maximum:
+            hint = f"write numbers from {item.minimum} to {item.maximum}"
+            site.fault("value-does-not-fit", "default", f"{value} does not fit an item", hint)
+            return ()
+    return tuple(spec.default)
+
+
+def is_plain_item(spec: FieldSpec, plain: Plain, base: str, site: Site) -> bool:
+    """An array can hold it; keys that would have no effect on the items are reported."""
+    if plain.meaning is not None or plain.scaling is not None:
+        hint = "use u8 to i64, or a field for each"
+        site.fault("bad-array", "type", f"an array holds plain integers, not '{base}'", hint)
+        return False
+    for key in _ITEM_KEYS:
+        if getattr(spec, key) in (None, False):
+            continue
+        if key in site.written:
+            site.reject(spec, (key,), "an array")
+        else:
+            what = f"an array holds plain integers, and '{key}' belongs to its items' type"
+            site.fault("bad-array", "type", what, "use u8 to i64, or a field for each")
+    return True
+
+
+def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, site: Site) -> Bits:
+    """An integer divided into bit fields."""
+    site.reject(
+        spec, _CONTAINER_KEYS, "an integer with bits", "put it on one of the bit fields, or remove it"
+    )
+    if container.meaning is not None or container.scaling is not None:
+        site.fault("not-applicable", "type", "bits divide a plain integer", "use u8, u16 and so on")
+    members: list[BitField] = []
+    for name, bit in (spec.bits or {}).items():
+        place = site.inner("bits", name, written=bit.model_fields_set)
+        first, last = bit.at
+        if last >= container.bits:
+            place.fault(
+                "bits-do-not-fit", "", f"{name} reaches to bit {last}", f"bits are 0..{container.bits - 1}"
+            )
+            continue
+        mask = (1 << (last + 1)) - (1 << first)
+        if other := next((member.name for member in members if member.mask & mask), None):
+            place.fault("bits-overlap", "", f"{name} overlaps {other}", "give each bits of its own")
+        scalar = _bit_scalar(bit, last + 1 - first, scalars, place)
+        if scalar is not None:
+            members.append(BitField(name, first, scalar, bit.doc))
+    if not members:
+        site.report.taint(site.path)
+    return Bits(container, tuple(members))
+
+
+def _bit_scalar(spec: BitSpec, width: int, scalars: ScalarBuilder, site: Site) -> Scalar | None:
+    meaning = _bit_meaning(spec, width, scalars, site)
+    if isinstance(meaning, str) and meaning != "bool":
+        return None
+    if meaning is not None and spec.signed:
+        site.reject(spec, ("signed",), "a named value")
+    low, high = integer_range(width, signed=spec.signed)
+    scalar = Scalar(
+        bits=width, signed=spec.signed, chunks=(), minimum=low, maximum=high, meaning=meaning, unit=spec.unit
+    )
+    scalar = quantified(scalar, spec, "a named value", site)
+    return defaulted(scalar, spec.default, "default", site)
+
+
+def _bit_meaning(
+    spec: BitSpec, width: int, scalars: ScalarBuilder, site: Site
+) -> Meaning | Literal["unknown"]:
+    if spec.type is None:
+        numeric = spec.scale is not None or spec.offset is not None or spec.signed
+        return "bool" if width == 1 and not numeric else None
+    plain = scalars.named(spec.type, site)
+    if plain is None:
+        return "unknown"
+    if plain.meaning is None:
+        hint = "leave type out, and write signed: true for a signed number"
+        site.fault("not-applicable", "type", f"'{spec.type}' is not the type of a bit field", hint)
+        return "unknown"
+    if plain.meaning == "bool":
+        if width > 1:
+            site.fault("bits-do-not-fit", "", f"bool is one bit, not {width}", "use at: with one bit")
+        return "bool"
+    if not plain.fits(width):
+        site.fault("bits-do-not-fit", "", f"{spec.type} does not fit {width} bits", "widen the bit field")
+    return plain.meaning

@@ -1,0 +1,76 @@
+"""Second pass, named constants: enums and flags."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from qlinkgen.model.types import Constant, Enum, Flags
+from qlinkgen.schema.file_model import EnumSpec, FlagsSpec
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+#: Widest integer that can be described.
+MAX_BITS = 64
+INTEGER = re.compile(r"(?P<sign>[ui])(?P<bits>[1-9][0-9]?)\Z", re.ASCII)
+
+
+def integer_range(bits: int, *, signed: bool) -> tuple[int, int]:
+    """Least and greatest value of an integer type."""
+    return (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) if signed else (0, (1 << bits) - 1)
+
+
+def carrier(text: str) -> tuple[int, bool] | None:
+    """Bits and sign of an integer type, None for anything else."""
+    match = INTEGER.match(text)
+    if not match or int(match["bits"]) > MAX_BITS:
+        return None
+    return int(match["bits"]), match["sign"] == "i"
+
+
+def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:
+    """An enum as the file describes it."""
+    path: Path = ("enums", name)
+    bits, signed = _carrier(spec.type, path, report, signed=True)
+    members = {key: value.value for key, value in spec.values.items()}
+    limits = integer_range(bits, signed=signed)
+    _check_members(members, limits, f"does not fit {spec.type}", path, report)
+    constants = tuple(Constant(key, value.value, value.doc) for key, value in spec.values.items())
+    return Enum(name, bits, constants, spec.doc, spec.section)
+
+
+def build_flags(name: str, spec: FlagsSpec, report: Reporter) -> Flags:
+    """A set of flags as the file describes it."""
+    path: Path = ("flags", name)
+    bits, _ = _carrier(spec.type, path, report, signed=False)
+    members = {key: value.bit for key, value in spec.values.items()}
+    _check_members(members, (0, bits - 1), f"is no bit of {spec.type}", path, report)
+    constants = tuple(Constant(key, value.bit, value.doc) for key, value in spec.values.items())
+    return Flags(name, bits, constants, spec.reserved == "zero", spec.doc, spec.section)
+
+
+def _carrier(text: str, path: Path, report: Reporter, *, signed: bool) -> tuple[int, bool]:
+    found = carrier(text)
+    if found is None or (found[1] and not signed):
+        kind = "an integer" if signed else "an unsigned integer"
+        hint = "use u8, u16, i32 and so on" if signed else "use u8, u16, u24 and so on"
+        report.error("unknown-type", (*path, "type"), f"'{text}' is not {kind} type", hint, needs=(path,))
+        report.taint(path)
+        return MAX_BITS, False
+    return found
+
+
+def _check_members(
+    members: Mapping[str, int], limits: tuple[int, int], complaint: str, path: Path, report: Reporter
+) -> None:
+    seen: dict[int, str] = {}
+    for key, value in members.items():
+        place = (*path, "values", key)
+        intact = ((*path, "type"), place)
+        if not limits[0] <= value <= limits[1]:
+            hint = f"use {limits[0]}..{limits[1]}, or a wider type"
+            report.error("value-does-not-fit", place, f"{key} = {value} {complaint}", hint, needs=intact)
+        if value in seen:
+            what = f"{key} and {seen[value]} are both {value}"
+            report.error("duplicate-value", place, what, "give each a number of its own", needs=intact)
+        seen.setdefault(value, key)

@@ -1,0 +1,133 @@
+"""Second pass, fields: the fields of one message, and the counts that tie some of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from qlinkgen.model.message import Field
+from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.schema.file_model import Fields, FieldSpec, SchemaFile
+from qlinkgen.schema.notation import shown, type_text
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+from qlinkgen.schema.types import TypeBuilder
+
+
+class FieldBuilder:
+    """Builds the fields of messages."""
+
+    def __init__(self, file: SchemaFile, report: Reporter, types: TypeBuilder, payload_max: int) -> None:
+        """``payload_max`` is what a field without a bound may fill."""
+        self._file = file
+        self._report = report
+        self._types = types
+        self._payload_max = payload_max
+
+    def build(self, specs: Fields, path: Path) -> tuple[Field, ...]:
+        """The fields of one message, without those that cannot be built."""
+        fields = []
+        for name, spec in specs.items():
+            kind = self._types.build(spec, (*path, name))
+            if kind is not None:
+                doc, confirmed = self._inherited(spec)
+                fields.append(Field(name, kind, doc, spec.section, confirmed))
+        fields = self._counted(fields, path)
+        self._check_open_ends(fields, path)
+        return tuple(self._bounded(fields, path))
+
+    def _inherited(self, spec: FieldSpec) -> tuple[str, bool]:
+        """What a field and the named types below it say: the first text, and whether all of them are sure."""
+        doc, confirmed, seen = spec.doc, spec.confirmed, set[str]()
+        while (name := type_text(spec.type).base) not in seen:
+            seen.add(name)
+            named = self._file.types.get(name)
+            last = named or self._file.enums.get(name) or self._file.flags.get(name)
+            if last is not None:
+                doc, confirmed = doc or last.doc, confirmed and last.confirmed
+            if named is None:
+                break
+            spec = named
+        return doc, confirmed
+
+    # Counts
+
+    def _counted(self, fields: Sequence[Field], path: Path) -> list[Field]:
+        """The fields, where those that have a count know it."""
+        counters: dict[str, str] = {}
+        for index, field in enumerate(fields):
+            if isinstance(field.type, Scalar) and field.type.counts:
+                later = {other.name: other for other in fields[index + 1 :]}
+                if self._check_count(field, field.type, later, (*path, field.name, "counts")):
+                    counters.setdefault(field.type.counts, field.name)
+        return [_with_counter(field, counters.get(field.name)) for field in fields]
+
+    def _check_count(self, field: Field, count: Scalar, later: Mapping[str, Field], path: Path) -> bool:
+        target = later.get(count.counts)
+        needs = (path[:-1], (*path[:-2], count.counts))
+        if target is None or not isinstance(target.type, Blob | Array) or target.type.length.fixed:
+            known = [name for name, other in later.items() if not other.fixed]
+            hint = did_you_mean(count.counts, known, f"such fields here: {listed(known)}")
+            what = f"{shown(count.counts)} is no field of variable size behind {field.name}"
+            self._report.error("bad-count", path, what, hint, needs=needs)
+            self._report.taint(path)
+            return False
+        if isinstance(target.type, Blob) and count.counts_unit == "items":
+            # An item of a byte string is a byte: say so once, here.
+            count = replace(count, counts_unit="bytes")
+        most = target.type.length.maximum * (target.type.item_size if count.counts_unit == "bytes" else 1)
+        if most > count.maximum and (*path[:-2], target.name) not in self._types.unbounded:
+            unit = count.counts_unit
+            what = f"{field.name} counts up to {count.maximum}, {target.name} has up to {most} {unit}"
+            self._report.error(
+                "bad-count", path, what, f"shorten {target.name}, or use a wider count", needs=needs
+            )
+        return True
+
+    def _check_open_ends(self, fields: Sequence[Field], path: Path) -> None:
+        open_ends = [field.name for field in fields if is_open(field)]
+        for name in open_ends[1:]:
+            what = f"{name} and {open_ends[0]} both take the rest of the payload"
+            needs = ((*path, name), (*path, open_ends[0]))
+            # A count that is broken may have been the count of one of them.
+            counts = [(*path, field.name, "counts") for field in fields]
+            hint = "give one of them a count, or a fixed size"
+            self._report.error(
+                "two-open-ends", (*path, name), what, hint, of_key=True, needs=(*needs, *counts)
+            )
+            self._report.taint((*path, name))
+
+    def _bounded(self, fields: Sequence[Field], path: Path) -> list[Field]:
+        """The fields, where one without a bound may fill what the others leave of the payload."""
+        unbounded = {field.name for field in fields if (*path, field.name) in self._types.unbounded}
+        room = self._payload_max - sum(field.max_size for field in fields if field.name not in unbounded)
+        counters = {field.name: field.type for field in fields if isinstance(field.type, Scalar)}
+        return [
+            self._filled(field, room, counters, path) if field.name in unbounded else field
+            for field in fields
+        ]
+
+    def _filled(self, field: Field, room: int, counters: Mapping[str, Scalar], path: Path) -> Field:
+        kind, place = field.type, (*path, field.name)
+        assert isinstance(kind, Blob | Array)
+        most = max(0, room) // kind.item_size
+        if counter := counters.get(kind.length.counted_by):
+            most = min(most, counter.maximum // (kind.item_size if counter.counts_unit == "bytes" else 1))
+        if most == 0:
+            what = f"no room is left for {field.name}"
+            hint = f"the frame holds {self._payload_max} bytes; shorten the other fields"
+            self._report.error("payload-too-long", place, what, hint, of_key=True, needs=(path, ("frame",)))
+            self._report.taint(place)
+        return replace(field, type=replace(kind, length=replace(kind.length, maximum=max(1, most))))
+
+
+def _with_counter(field: Field, counter: str | None) -> Field:
+    kind = field.type
+    if counter is None or not isinstance(kind, Blob | Array):
+        return field
+    return replace(field, type=replace(kind, length=replace(kind.length, counted_by=counter)))
+
+
+def is_open(field: Field) -> bool:
+    """The field takes the rest of the payload."""
+    return isinstance(field.type, Blob | Array) and not field.fixed and not field.type.length.counted_by

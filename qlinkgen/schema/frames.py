@@ -1,0 +1,223 @@
+"""Second pass, frames: from the written parts to one of the model's three kinds of frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from qlinkgen.model import checksum as catalogue
+from qlinkgen.model.frame import Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.types import Chunk
+from qlinkgen.schema.file_model import MarkedSpec, PartSpec, SchemaFile
+from qlinkgen.schema.kinds import MAX_PAYLOAD
+from qlinkgen.schema.parts import PartBuilder
+from qlinkgen.schema.report import Reporter, listed
+from qlinkgen.schema.source import Path
+from qlinkgen.schema.stuffing import build_stuffing, check_unique
+
+_KINDS = ("parts", "marked", "packet")
+_PACKET_ROLES = ("message", "payload", "checksum")
+
+
+def payload_bounds(file: SchemaFile) -> tuple[int, int]:
+    """Fewest and most payload bytes of the frame; the widest bounds where it does not say."""
+    if file.frame.marked is not None:
+        return file.frame.marked.payload
+    parts = {**(file.frame.parts or {}), **(file.frame.packet or {})}
+    return next(
+        (part.size for part in parts.values() if part.role == "payload" and part.size), (0, MAX_PAYLOAD)
+    )
+
+
+class FrameBuilder:
+    """Builds the frame of one file."""
+
+    def __init__(self, file: SchemaFile, report: Reporter, crc: str | None = None) -> None:
+        """``crc`` replaces the algorithm that the file names."""
+        self._file = file
+        self._report = report
+        self._parts = PartBuilder(file, report, crc)
+
+    def build(self) -> Frame | None:
+        """The frame; None where a fault that was reported leaves nothing to go on with."""
+        frame = self._build()
+        if frame is None:
+            self._report.taint(("frame",))
+        return frame
+
+    def _build(self) -> Frame | None:
+        spec = self._file.frame
+        given = [key for key in _KINDS if getattr(spec, key) is not None]
+        if len(given) != 1:
+            what = (
+                f"the frame has {listed(given)}"
+                if given
+                else "the frame has neither parts nor marked nor packet"
+            )
+            hint = "a frame is described by exactly one of parts, marked and packet"
+            if not any(self._report.touched(("frame", key)) for key in _KINDS):
+                self._report.error("bad-frame", ("frame",), what, hint, of_key=True, absent=True)
+            return None
+        if spec.stuffing is not None and spec.parts is None:
+            what = "'stuffing' has an effect only on frames of parts"
+            self._parts.fault("not-applicable", ("frame", "stuffing"), what, "remove it")
+        if spec.parts is not None:
+            return self._delimited(spec.parts)
+        return self._marked(spec.marked) if spec.marked is not None else self._packet(spec.packet or {})
+
+    # Parts in wire order
+
+    def _delimited(self, specs: Mapping[str, PartSpec]) -> DelimitedFrame | None:
+        path: Path = ("frame", "parts")
+        if not self._parts.roles_fit(specs, ("message", "payload"), path):
+            return None
+        parts = tuple(self._parts.build(name, spec, specs, (*path, name)) for name, spec in specs.items())
+        spec = self._file.frame
+        stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
+        frame = DelimitedFrame(parts, stuffing, spec.doc, spec.section)
+        self._check_order(frame, path)
+        self._check_length(frame, path)
+        check_unique(frame, self._report)
+        return frame
+
+    def _check_order(self, frame: DelimitedFrame, path: Path) -> None:
+        """A receiver finds the end by what stands in front of the payload, and checks it behind."""
+        names = [part.name for part in frame.parts]
+        payload = names.index(frame.payload.name)
+        for index, part in enumerate(frame.parts):
+            if part.role in ("length", "message", "address") and index > payload:
+                what, hint = f"{part.name} stands behind the payload", "put it in front"
+                self._parts.fault("bad-frame", (*path, part.name), what, hint)
+            elif part.role == "checksum" and index < payload:
+                what, hint = f"{part.name} stands in front of the payload", "put it behind"
+                self._parts.fault("bad-frame", (*path, part.name), what, hint)
+
+    def _check_length(self, frame: DelimitedFrame, path: Path) -> None:
+        length = frame.part("length")
+        if length is None or length.scalar is None or not length.counts:
+            return
+        if frame.payload.name not in length.counts:
+            what = f"{length.name} does not count the payload"
+            place, hint = (*path, length.name, "counts"), f"add {frame.payload.name}"
+            needs = (place, (*path, frame.payload.name))
+            self._report.error("bad-frame", place, what, hint, of_key=True, needs=needs)
+            return
+        longest = frame.length_bias + frame.payload.max_size
+        if frame.stuffing and frame.stuffing.before_checksum:
+            longest += frame.payload.max_size // len(frame.stuffing.after)
+        if longest > length.scalar.maximum:
+            what = f"{length.name} would be {longest} for the longest payload"
+            most = f"{length.scalar.bits} bits hold {length.scalar.maximum}"
+            hint = f"{most}; use a wider type or a shorter payload"
+            self._report.error(
+                "length-does-not-fit", (*path, length.name), what, hint, of_key=True, needs=(path,)
+            )
+
+    # Header and end marked by a bit
+
+    def _marked(self, spec: MarkedSpec) -> MarkedFrame | None:
+        path: Path = ("frame", "marked")
+        address, message = (
+            Chunk(first, last + 1 - first) for first, last in (spec.header.address, spec.header.message)
+        )
+        if not self._check_header(spec, path):
+            return None
+        if spec.end > message.mask:
+            what = f"end {spec.end} does not fit the message bits"
+            self._report.error("value-does-not-fit", (*path, "end"), what, f"use 0..{message.mask}")
+        if spec.payload[1] > MAX_PAYLOAD:
+            what = f"a payload of {spec.payload[1]} bytes is too long for any frame"
+            self._report.error("bad-frame", (*path, "payload"), what, f"use at most {MAX_PAYLOAD}")
+        frame = self._file.frame
+        return MarkedFrame(
+            marker=spec.marker, address_name="address", address_bits=address, id_name="type", id_bits=message,
+            end_id=spec.end, payload_max=spec.payload[1], checksum=self._marked_checksum(spec, path),
+            doc=frame.doc, section=frame.section,
+        )  # fmt: skip
+
+    def _marked_checksum(self, spec: MarkedSpec, path: Path) -> Checksum | None:
+        if spec.checksum is None:
+            return None
+        place = (*path, "checksum")
+        if spec.checksum.role != "checksum":
+            what = f"a {spec.checksum.role} stands in the place of the checksum"
+            self._report.error("bad-frame", (*place, "role"), what, "use role: checksum")
+            return None
+        self._parts.reject(spec.checksum, ("value", "counts", "size", "words", "rejected"), "checksum", place)
+        checksum = self._parts.checksum(spec.checksum, ("payload",), place)
+        if checksum and any(chunk.mask & spec.marker for chunk in checksum.chunks):
+            what = f"a byte of the checksum can carry the marker bit {spec.marker:#04x}"
+            self._parts.fault(
+                "marker-in-payload", place, what, "say with sent how it is divided: [0..6, 7..13]"
+            )
+        return checksum
+
+    def _check_header(self, spec: MarkedSpec, path: Path) -> bool:
+        masks = [
+            (1 << last + 1) - (1 << first)
+            for first, last in (spec.header.address, spec.header.message)
+            if last < 8
+        ]
+        fields = [spec.marker, *masks]
+        if (
+            spec.marker.bit_count() != 1
+            or len(fields) < 3
+            or sum(fields) != fields[0] | fields[1] | fields[2]
+        ):
+            what = "marker, address and message do not share one byte"
+            self._parts.fault(
+                "bad-frame", path, what, "let marker be one bit, and use each of eight bits once"
+            )
+            return False
+        return True
+
+    # No frame at all
+
+    def _packet(self, specs: Mapping[str, PartSpec]) -> PacketFrame | None:
+        path: Path = ("frame", "packet")
+        if not self._parts.roles_fit(specs, ("message", "payload"), path) or not self._packet_roles_fit(
+            specs, path
+        ):
+            return None
+        places = {spec.role: (spec, (*path, name)) for name, spec in specs.items()}
+        id_spec, id_place = places["message"]
+        self._parts.reject(id_spec, ("value", "counts", "size", "algorithm", "over"), "message", id_place)
+        if self._parts.integer(id_spec, id_place).size != 1:
+            what = "the message id of a packet is one byte"
+            self._report.error("bad-packet", (*id_place, "type"), what, "use u8", needs=(id_place,))
+        high = self._parts.payload_size(*places["payload"])[1]
+        frame, id_name = self._file.frame, str(id_place[-1])
+        if "checksum" not in places:
+            return PacketFrame(id_name, high, doc=frame.doc, section=frame.section)
+        check, check_place = places["checksum"]
+        checksum = self._packet_checksum(check, specs, check_place)
+        if checksum is None:
+            return None
+        name = str(check_place[-1])
+        return PacketFrame(
+            id_name, high, name, checksum, check.words, check.rejected, frame.doc, frame.section
+        )
+
+    def _packet_roles_fit(self, specs: Mapping[str, PartSpec], path: Path) -> bool:
+        wrong = [name for name, spec in specs.items() if spec.role not in _PACKET_ROLES]
+        for name in wrong:
+            what = f"a packet has no {specs[name].role}"
+            self._parts.fault(
+                "bad-packet", (*path, name), what, f"use {listed(_PACKET_ROLES)}, or a frame of parts"
+            )
+        return not wrong
+
+    def _packet_checksum(self, spec: PartSpec, specs: Mapping[str, PartSpec], place: Path) -> Checksum | None:
+        self._parts.reject(
+            spec, ("value", "counts", "size", "sent", "only", "over"), "packet's checksum", place
+        )
+        over = [name for name, part in specs.items() if part.role != "checksum"]
+        checksum = self._parts.checksum(spec.model_copy(update={"over": over}), specs, place)
+        if checksum is not None and not isinstance(checksum.algorithm, catalogue.Sum):
+            what = f"{checksum.algorithm.name} is no sum, and the check value of a packet is one"
+            self._report.error("bad-packet", (*place, "algorithm"), what, "use sum16 or sum8")
+            return None
+        if checksum is not None and spec.rejected is not None and spec.rejected > checksum.algorithm.mask:
+            what = f"{spec.rejected} does not fit {checksum.algorithm.width} bits"
+            hint = f"use 0..{checksum.algorithm.mask}"
+            self._report.error("value-does-not-fit", (*place, "rejected"), what, hint)
+        return checksum

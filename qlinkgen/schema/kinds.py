@@ -1,0 +1,120 @@
+"""The kinds of values that stand in a schema file: each with its check, and its JSON Schema for editors."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    Field,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    StrictInt,
+    WithJsonSchema,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from qlinkgen.schema import notation
+from qlinkgen.schema.notation import shown
+
+NAME_PATTERN = r"^[a-z][a-z0-9_]*$"
+#: Most bytes of a payload; more would be no message on a serial line, and receivers reserve room for it.
+MAX_PAYLOAD = 65535
+
+
+def _text(value: object) -> object:
+    return str(value) if isinstance(value, int | Decimal) and not isinstance(value, bool) else value
+
+
+def _scalar(value: object) -> object:
+    if isinstance(value, list) and all(
+        isinstance(item, int) and not isinstance(item, bool) for item in value
+    ):
+        return value
+    if value is None or isinstance(value, dict | list):
+        raise ValueError(
+            f"{shown(value)} is no value; write a number, true, false, text or a list of whole numbers"
+        )
+    return value
+
+
+def _label(value: object) -> object:
+    if not isinstance(value, int | str):
+        raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
+            f"{shown(value)} is no label; write a word, a whole number, true or false"
+        )
+    return value
+
+
+class ShortForm:
+    """A plain value stands for a mapping with one key; editors are told of both forms."""
+
+    def __init__(self, key: str, *kinds: str) -> None:
+        """``kinds`` are the JSON types of the short form."""
+        self.key = key
+        self.kinds = kinds
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """Expand the short form before the mapping is checked."""
+        from_short = BeforeValidator(self._expand)
+        schema: CoreSchema = from_short.__get_pydantic_core_schema__(source, handler)
+        return schema
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Allow either form."""
+        return {
+            "anyOf": [{"type": list(self.kinds) if len(self.kinds) > 1 else self.kinds[0]}, handler(core)]
+        }
+
+    def _expand(self, value: object) -> object:
+        return value if isinstance(value, dict | BaseModel) else {self.key: value}
+
+
+def _json(description: str, *kinds: str, **more: Any) -> WithJsonSchema:
+    return WithJsonSchema(
+        {"type": list(kinds) if len(kinds) > 1 else kinds[0], "description": description, **more}
+    )
+
+
+Text = Annotated[str, BeforeValidator(_text), WithJsonSchema({"type": ["string", "number"]})]
+Rational = Annotated[
+    Fraction,
+    PlainValidator(notation.rational),
+    _json("A number, exactly: 10, 0.1, 1/10, 1/2^16", "string", "number"),
+]
+AnyRange = Annotated[
+    notation.Range,
+    PlainValidator(notation.range_of),
+    _json("first..last, both included", "string", "number"),
+]
+WholeRange = Annotated[
+    tuple[int, int],
+    PlainValidator(notation.whole_range),
+    _json("first..last of whole numbers, or one number", "string", "integer"),
+]
+ByteText = Annotated[
+    bytes,
+    PlainValidator(notation.byte_string),
+    _json("One byte (0xA5) or hex pairs (A5 A5)", "string", "integer"),
+]
+Time = Annotated[
+    notation.Duration, PlainValidator(notation.duration), _json("3 bytes, 260 us, 10 ms or 1 s", "string")
+]
+ScalarValue = Annotated[
+    int | bool | Decimal | str | list[int],
+    PlainValidator(_scalar),
+    _json(
+        "A number, true or false, text, or a list of whole numbers", "number", "boolean", "string", "array"
+    ),
+]
+Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "string", "integer", "boolean")]
+Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
+Count = Annotated[StrictInt, Field(ge=1)]
+Id = Annotated[StrictInt, Field(ge=0)]
+Order = Literal["big", "little"]

@@ -1,0 +1,131 @@
+"""From a schema file to the model, or to every fault in it."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path as FilePath
+
+from qlinkgen._resources import schemas_dir
+from qlinkgen.errors import Fault, SchemaError
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.schema.addresses import check_addresses
+from qlinkgen.schema.commands import CommandBuilder, build_bus
+from qlinkgen.schema.fields import FieldBuilder
+from qlinkgen.schema.frames import FrameBuilder, payload_bounds
+from qlinkgen.schema.messages import MessageBuilder
+from qlinkgen.schema.names import check_names
+from qlinkgen.schema.report import Reporter, did_you_mean
+from qlinkgen.schema.source import Position, parse
+from qlinkgen.schema.structure import check_structure
+from qlinkgen.schema.types import TypeBuilder
+from qlinkgen.schema.unconfirmed import report_unconfirmed
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the schemas that come with the package."""
+    return tuple(sorted(path.stem for path in schemas_dir().glob("*.yaml")))
+
+
+def find(protocol: str) -> FilePath:
+    """The file of a shipped schema's name, or of a path. Raises SchemaError where there is none."""
+    path = FilePath(protocol)
+    if "/" not in protocol and not path.suffix:
+        path = schemas_dir() / f"{protocol}.yaml"
+        if not path.is_file():
+            names = shipped()
+            hint = did_you_mean(
+                protocol, names, f"shipped are {', '.join(names)}; or give the path of a .yaml file"
+            )
+            raise SchemaError(
+                [Fault(protocol, 1, 1, "file-unreadable", "there is no schema of this name", hint)]
+            )
+    return path
+
+
+def lint(path: FilePath | str) -> list[Fault]:
+    """Every fault and warning of a schema file, in order of the text."""
+    return sorted(_load(FilePath(path), None)[1])
+
+
+def load(path: FilePath | str, *, crc: str | None = None) -> Protocol:
+    """Read a schema file.
+
+    Args:
+        path: The file.
+        crc: Algorithm that replaces the one which the file names.
+
+    Raises:
+        SchemaError: with every fault of the file.
+    """
+    protocol, faults = _load(FilePath(path), crc)
+    errors = [fault for fault in faults if fault.severity == "error"]
+    if protocol is None or errors:
+        raise SchemaError(errors)
+    return protocol
+
+
+def loads(text: str, file: str, *, crc: str | None = None) -> tuple[Protocol | None, list[Fault]]:
+    """The protocol that a text describes (None if it cannot be built), and its faults."""
+    source = parse(text)
+    report = Reporter(file, source)
+    for fault in source.faults:
+        report.at(fault.rule, fault.position, fault.message, fault.hint)
+    if any(fault.rule == "yaml-syntax" for fault in source.faults):
+        return None, report.faults
+    protocol = _build(source.data, report, text, FilePath(file).name, crc)
+    return protocol if not report.failed else None, report.faults
+
+
+def _load(path: FilePath, crc: str | None) -> tuple[Protocol | None, list[Fault]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        place = Position(1, 1)
+        fault = Fault(
+            str(path),
+            place.line,
+            place.column,
+            "file-unreadable",
+            f"cannot read it: {reason}",
+            "check the path",
+        )
+        return None, [fault]
+    return loads(text, str(path), crc=crc)
+
+
+def _build(data: object, report: Reporter, text: str, file_name: str, crc: str | None) -> Protocol | None:
+    file = check_structure(data, report)
+    if file is None:
+        return None
+    frame = FrameBuilder(file, report, crc).build()
+    bus = build_bus(file)
+    check_addresses(frame, bus, report)
+    payload_max = payload_bounds(file)[1]
+    types = TypeBuilder(file, report, payload_max)
+    fields = FieldBuilder(file, report, types, payload_max)
+    messages = MessageBuilder(file, report, fields, frame, bus)
+    commands = CommandBuilder(file, report, messages, frame, bus)
+    commands.build()
+    types.report_unused()
+    check_names(file, commands.messages, report)
+    report_unconfirmed(file, report)
+    if frame is None or report.failed:
+        return None
+    spec = file.protocol
+    return Protocol(
+        name=spec.name,
+        title=spec.title or spec.name,
+        revision=spec.revision,
+        source=spec.source,
+        doc=spec.doc,
+        byteorder=file.byteorder,
+        enums=tuple(types.enums.values()),
+        flags=tuple(types.flags.values()),
+        frame=frame,
+        bus=bus,
+        commands=tuple(commands.commands),
+        messages=tuple(commands.messages),
+        schema_hash=hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()[:12],
+        schema_file=file_name,
+    )

@@ -1,0 +1,201 @@
+"""Second pass, messages: one message in one direction, and whether its frame can carry it."""
+
+from __future__ import annotations
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.message import Direction, Field, Message
+from qlinkgen.model.transaction import Addressing, Bus
+from qlinkgen.model.types import Array, Bits, Blob, Chunk
+from qlinkgen.schema.fields import FieldBuilder, is_open
+from qlinkgen.schema.file_model import CommandSpec, Fields, MessageSpec, SchemaFile
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+_FRAME: Path = ("frame",)
+
+
+class MessageBuilder:
+    """Builds messages, and checks each against the frame."""
+
+    def __init__(
+        self, file: SchemaFile, report: Reporter, fields: FieldBuilder, frame: Frame | None, bus: Bus
+    ) -> None:
+        """``frame`` is None where it could not be built: what depends on it is not checked then."""
+        self._file = file
+        self._report = report
+        self._fields = fields
+        self._frame = frame
+        self._bus = bus
+
+    @property
+    def addressed(self) -> bool:
+        """The frame has an address."""
+        if isinstance(self._frame, DelimitedFrame):
+            return self._frame.part("address") is not None
+        return isinstance(self._frame, MarkedFrame)
+
+    def directed(
+        self,
+        name: str,
+        spec: CommandSpec,
+        direction: Direction,
+        fields: Fields,
+        *,
+        addressing: Addressing,
+        section: str,
+    ) -> Message:
+        """Request or response of a command."""
+        path: Path = ("commands", name, direction)
+        if getattr(spec, direction) is None:
+            path = ("defaults", direction)
+        ranges, default = self._addresses(addressing, direction)
+        message = Message(
+            name=f"{name}.{direction}",
+            command=name,
+            direction=direction,
+            id=spec.id,
+            fields=self._fields.build(fields, path),
+            doc=spec.doc,
+            section=section,
+            confirmed=spec.confirmed,
+            empty_is_default=direction == "request" and spec.empty_request == "defaults",
+            checksum=self._has_checksum(name),
+            addresses=ranges,
+            default_address=default,
+        )
+        self._check(message, path)
+        return message
+
+    def single(self, name: str, spec: MessageSpec) -> Message:
+        """A message that nobody answers."""
+        path: Path = ("messages", name, "fields")
+        nodes = self._bus.nodes if self.addressed else None
+        message = Message(
+            name=name,
+            command=name,
+            direction=spec.direction or "message",
+            id=spec.id,
+            fields=self._fields.build(spec.fields, path),
+            doc=spec.doc,
+            section=spec.section,
+            confirmed=spec.confirmed,
+            checksum=self._has_checksum(name),
+            addresses=(nodes,) if nodes else (),
+            default_address=nodes[0] if nodes else 0,
+        )
+        self._check(message, path)
+        if isinstance(self._frame, PacketFrame) and spec.direction != "request":
+            what = f"{name} is no answer to a request"
+            hint = "say direction: request, or make it a command"
+            self._report.error("bad-packet", ("messages", name), what, hint, of_key=True, absent=True)
+        return message
+
+    def _addresses(
+        self, addressing: Addressing, direction: Direction
+    ) -> tuple[tuple[tuple[int, int], ...], int]:
+        """Ranges of addresses that a message may carry, and the one it has by default."""
+        nodes, broadcast = self._bus.nodes, self._bus.broadcast
+        if addressing == "none" or nodes is None:
+            return (), 0
+        everybody = (broadcast, broadcast) if broadcast is not None else nodes
+        if direction == "response" or addressing == "node":
+            return (nodes,), nodes[0]
+        if addressing == "broadcast":
+            return (everybody,), everybody[0]
+        return _joined((everybody, nodes)), nodes[0]
+
+    def _has_checksum(self, name: str) -> bool:
+        marked = self._file.frame.marked
+        only = marked.checksum.only if marked and marked.checksum else None
+        return only is None or name in only
+
+    # What the frame demands
+
+    def _check(self, message: Message, path: Path) -> None:
+        if self._frame is None:
+            return
+        self._check_size(message, path)
+        if isinstance(self._frame, MarkedFrame):
+            for field in message.fields:
+                self._check_marker(field, self._frame.marker, path)
+            return
+        self._check_end(message, path)
+        if isinstance(self._frame, PacketFrame):
+            self._check_words(message, self._frame.word_size, path)
+
+    def _error(self, rule: str, path: Path, what: str, hint: str) -> None:
+        self._report.error(rule, path, what, hint, of_key=True, needs=(path, _FRAME))
+
+    def _check_size(self, message: Message, path: Path) -> None:
+        assert self._frame is not None
+        if isinstance(self._frame, DelimitedFrame):
+            low, high = self._frame.payload.min_size, self._frame.payload.max_size
+        else:
+            low, high = 0, self._frame.payload_max
+            if self._file.frame.marked is not None:
+                low = self._file.frame.marked.payload[0]
+        if message.max_size > high:
+            excess = message.max_size - high
+            hint = f"the frame holds {high}; shorten a field by {excess}, or let the frame hold more"
+            self._error("payload-too-long", path, f"{message.name} has up to {message.max_size} bytes", hint)
+        least = 0 if message.empty_is_default else message.min_size
+        if least < low:
+            what = f"{message.name} can have as few as {least} bytes"
+            hint = f"the frame demands {low}; lengthen a field by {low - least}, or let the frame hold less"
+            self._error("payload-too-short", path, what, hint)
+
+    def _check_end(self, message: Message, path: Path) -> None:
+        """Without a length, the fields themselves must tell where the frame ends."""
+        if isinstance(self._frame, DelimitedFrame) and self._frame.part("length"):
+            return
+        for field in message.fields:
+            if is_open(field):
+                neither = f"neither the frame nor {message.name} has a length"
+                what = f"nothing tells where {field.name} ends: {neither}"
+                hint = "give it a count or a fixed size, or give the frame a length"
+                self._error("no-frame-end", (*path, field.name), what, hint)
+        if message.empty_is_default and message.max_size:
+            what = f"nothing tells an empty {message.name} from a full one: the frame has no length"
+            self._error("no-frame-end", (*path[:-1], "empty_request"), what, "remove empty_request")
+
+    def _check_words(self, message: Message, word: int, path: Path) -> None:
+        for field in message.fields:
+            variable = isinstance(field.type, Blob | Array) and not field.fixed
+            if variable and not is_open(field):
+                what = f"{field.name} has no fixed size"
+                hint = "a packet has no frame around it; give each field a fixed size"
+                self._error("bad-packet", (*path, field.name), what, hint)
+        if message.fixed and message.max_size % word:
+            what = f"{message.name} has {message.max_size} bytes, which are no whole words of {word}"
+            self._error("bad-packet", path, what, "add a reserved field, or change words of the checksum")
+
+    def _check_marker(self, field: Field, marker: int, path: Path) -> None:
+        """A payload byte with the marker bit set would be taken for a header."""
+        if isinstance(field.type, Blob):
+            marked = not field.type.text or marker < 0x80
+        else:
+            marked = any(chunk.mask & marker for chunk in _chunks(field))
+        if marked:
+            what = f"a byte of {field.name} can carry the marker bit {marker:#04x}"
+            hint = "send it in groups: {bits: 7, first: least}, or as text"
+            self._error("marker-in-payload", (*path, field.name), what, hint)
+
+
+def _chunks(field: Field) -> tuple[Chunk, ...]:
+    kind = field.type
+    if isinstance(kind, Bits):
+        return kind.container.chunks
+    if isinstance(kind, Array):
+        return kind.item.chunks
+    return () if isinstance(kind, Blob) else kind.chunks
+
+
+def _joined(ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+    """Neighbouring ranges as one."""
+    joined: list[tuple[int, int]] = []
+    for first, last in sorted(ranges):
+        if joined and first <= joined[-1][1] + 1:
+            joined[-1] = (joined[-1][0], max(last, joined[-1][1]))
+        else:
+            joined.append((first, last))
+    return tuple(joined)

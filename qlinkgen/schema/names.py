@@ -1,0 +1,197 @@
+"""Names: what a schema's names become in Python and C, and that they stay different there."""
+
+from __future__ import annotations
+
+import builtins
+import re
+from collections.abc import Iterable, Iterator, Sequence
+
+from qlinkgen.model.message import Message
+from qlinkgen.model.naming import (
+    C_RESERVED,
+    GENERATED_ATTRIBUTES,
+    GENERATED_NAMES,
+    PYTHON_RESERVED,
+    pascal,
+    upper,
+)
+from qlinkgen.model.types import Array, Blob
+from qlinkgen.schema.file_model import Fields, SchemaFile
+from qlinkgen.schema.kinds import NAME_PATTERN
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+_NAME = re.compile(NAME_PATTERN.removesuffix("$") + r"\Z")
+_BUILTIN = frozenset(dir(builtins))
+#: Macros that the C header defines for each message.
+_MESSAGE_MACROS = ("init", "id", "min_size", "max_size", "max_frame_size", "max_wire_size")
+_GLOBAL_MACROS = ("ok", "max_payload_size", "max_wire_size", "enable_float")
+
+
+def check_names(file: SchemaFile, messages: Sequence[Message], report: Reporter) -> None:
+    """Check every name of a file: spelling, reserved words, clashes after conversion."""
+    check = _Checker(report)
+    check.spelling(file.protocol.name, ("protocol", "name"))
+    check.member(file.protocol.name, ("protocol", "name"))
+    check.constants(file)
+    for name in file.attributes:
+        check.spelling(name, ("attributes", name))
+    address = check.parts(file)
+    for name in file.commands:
+        # Slave firmware has a function pointer of this name for each command.
+        if check.spelling(name, ("commands", name)):
+            check.member(name, ("commands", name))
+    for name in file.messages:
+        if check.spelling(name, ("messages", name)):
+            check.type_name(name, ("messages", name))
+    for fields, path in _field_groups(file):
+        check.fields(fields, path)
+    for message in messages:
+        check.clashes(_attributes(message, address))
+    check.clashes(_classes(file))
+    check.clashes(_macros(file))
+
+
+class _Checker:
+    """Reports names that do not do."""
+
+    def __init__(self, report: Reporter) -> None:
+        self._report = report
+
+    def _error(self, rule: str, path: Path, what: str, hint: str) -> None:
+        self._report.error(rule, path, what, hint, of_key=True, needs=())
+
+    def spelling(self, name: str, path: Path) -> bool:
+        if _NAME.match(name):
+            return True
+        hint = "use lower case letters, digits and underscores, beginning with a letter"
+        self._error("bad-name", path, f"{shown(name)} is not a name", hint)
+        return False
+
+    def member(self, name: str, path: Path) -> None:
+        """The name stands as it is in Python and C."""
+        if name in PYTHON_RESERVED or name in C_RESERVED:
+            language = "Python" if name in PYTHON_RESERVED else "C or C++"
+            self._error("reserved-word", path, f"'{name}' is a reserved word of {language}", f"use {name}_")
+
+    def type_name(self, name: str, path: Path) -> None:
+        """The name becomes one of a class and of a C type."""
+        if name in GENERATED_NAMES or pascal(name) in _BUILTIN or pascal(name) in PYTHON_RESERVED:
+            owner = "the generated code" if name in GENERATED_NAMES else "Python"
+            what = f"'{name}' becomes the name of something that {owner} has itself"
+            self._error("reserved-word", path, what, "use a name that says more")
+
+    def constants(self, file: SchemaFile) -> None:
+        for group in ("enums", "flags"):
+            for name, spec in getattr(file, group).items():
+                if self.spelling(name, (group, name)):
+                    self.type_name(name, (group, name))
+                for member in spec.values:
+                    self.spelling(member, (group, name, "values", member))
+        for name in file.types:
+            self.spelling(name, ("types", name))
+
+    def parts(self, file: SchemaFile) -> str | None:
+        """Check the names of a frame's parts; return that of the address, an attribute of messages."""
+        address = "address" if file.frame.marked is not None else None
+        for group in ("parts", "packet"):
+            for name, part in (getattr(file.frame, group) or {}).items():
+                self.spelling(name, ("frame", group, name))
+                if part.role == "address":
+                    address = name
+                    self.attribute(name, ("frame", group, name))
+        return address
+
+    def fields(self, fields: Fields, path: Path) -> None:
+        for name, spec in fields.items():
+            if self.spelling(name, (*path, name)):
+                self.attribute(name, (*path, name))
+            for member in spec.bits or {}:
+                place = (*path, name, "bits", member)
+                if self.spelling(member, place):
+                    self.attribute(member, place)
+
+    def attribute(self, name: str, path: Path) -> None:
+        self.member(name, path)
+        if name in GENERATED_ATTRIBUTES:
+            self._error("reserved-word", path, f"'{name}' is a method of every message", f"use {name}_")
+
+    def clashes(self, names: Iterable[tuple[str, str, Path]]) -> None:
+        """Report names that become the same: (what it becomes, what it is called in a message, its place)."""
+        seen: dict[str, str] = {}
+        for result, called, path in names:
+            other = seen.setdefault(result, called)
+            if other != called:
+                what = f"{called} and {other} both become {result}"
+                self._error("name-clash", path, what, "rename one of them")
+
+
+def _field_groups(file: SchemaFile) -> Iterator[tuple[Fields, Path]]:
+    groups: list[tuple[object, Path]] = [
+        (file.defaults.request, ("defaults", "request")),
+        (file.defaults.response, ("defaults", "response")),
+    ]
+    for name, command in file.commands.items():
+        groups += [
+            (command.request, ("commands", name, "request")),
+            (command.response, ("commands", name, "response")),
+        ]
+    groups += [(message.fields, ("messages", name, "fields")) for name, message in file.messages.items()]
+    yield from ((fields, path) for fields, path in groups if isinstance(fields, dict))
+
+
+def _attributes(message: Message, address: str | None) -> Iterator[tuple[str, str, Path]]:
+    """Attributes of a message object and members of its C struct."""
+    group, last = (
+        ("commands", message.direction) if message.name != message.command else ("messages", "fields")
+    )
+    path: Path = (group, message.command, last)
+    if address is not None:
+        yield address, f"the frame's '{address}'", path
+    for value in message.values:
+        inside = ("bits", value.name) if value.bits else ()
+        place = (*path, value.field.name, *inside)
+        called = f"'{value.name}' in {value.field.name}" if inside else f"'{value.name}'"
+        yield value.name, called, place
+        if isinstance(value.type, Array | Blob) and not value.field.fixed:
+            suffix = "count" if isinstance(value.type, Array) else "size"
+            yield f"{value.name}_{suffix}", f"the {suffix} of '{value.name}'", place
+
+
+def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
+    """Names that become classes: enums, flags and messages."""
+    for group in ("enums", "flags"):
+        for name in getattr(file, group):
+            yield pascal(name), f"'{name}'", (group, name)
+    for name in file.commands:
+        for direction in ("request", "response"):
+            yield pascal(f"{name}_{direction}"), f"the {direction} of '{name}'", ("commands", name)
+    for name in file.messages:
+        yield pascal(_class_base(file, name)), f"the message '{name}'", ("messages", name)
+
+
+def _class_base(file: SchemaFile, name: str) -> str:
+    """A message may have the name of an enum: its class and type get a suffix then."""
+    return f"{name}_message" if name in file.enums or name in file.flags else name
+
+
+def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
+    """Names that become constants of the C header."""
+    prefix = upper(file.protocol.name)
+    for name in _GLOBAL_MACROS:
+        yield f"{prefix}_{upper(name)}", "a constant of every header", ("protocol", "name")
+    for group in ("enums", "flags"):
+        for name, spec in getattr(file, group).items():
+            for member in spec.values:
+                result = f"{prefix}_{upper(name)}_{upper(member)}"
+                yield result, f"'{member}' of {name}", (group, name, "values", member)
+    for name in file.commands:
+        for direction in ("request", "response"):
+            for macro in _MESSAGE_MACROS:
+                result = f"{prefix}_{upper(name)}_{upper(direction)}_{upper(macro)}"
+                yield result, f"a constant of {name}.{direction}", ("commands", name)
+    for name in file.messages:
+        for macro in _MESSAGE_MACROS:
+            result = f"{prefix}_{upper(_class_base(file, name))}_{upper(macro)}"
+            yield result, f"a constant of the message '{name}'", ("messages", name)

@@ -1,0 +1,131 @@
+"""The small notations inside YAML values: ranges, rationals, byte strings, durations, types."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+
+_RANGE = re.compile(r"\s*(?P<first>[^.\s]\S*?)\s*\.\.\s*(?P<last>\S+)\s*\Z")
+_RATIONAL = re.compile(
+    r"""\s*(?P<sign>[-+]?)(?P<top>[0-9]{1,40}(?:\.[0-9]{1,40})?)\s*
+    (?:/\s*(?:(?P<base>[0-9]{1,10})\^(?P<power>[0-9]{1,4})|(?P<below>[0-9]{1,40})))?\s*\Z""",
+    re.ASCII | re.VERBOSE,
+)
+_HEX_NUMBER = re.compile(r"\s*[-+]?0x[0-9a-fA-F]{1,40}\s*\Z", re.ASCII)
+_HEX = re.compile(r"\s*(?:[0-9a-fA-F]{2}\s*)+\Z", re.ASCII)
+_DURATION = re.compile(
+    r"\s*(?P<number>[0-9]{1,12}(?:\.[0-9]{1,12})?)\s*(?P<unit>bytes?|us|ms|s)\s*\Z", re.ASCII
+)
+_TYPE = re.compile(r"\s*(?P<base>[A-Za-z_][\w.]*)\s*(?:\[(?P<count>[^\]]*)\])?\s*\Z", re.ASCII)
+_SECONDS = {"us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
+_MAX_POWER = 128
+_MAX_SHOWN = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """First and last value, both included."""
+
+    first: Fraction
+    last: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """Byte times or seconds, one of them zero."""
+
+    byte_times: Fraction = Fraction(0)
+    seconds: Fraction = Fraction(0)
+
+
+@dataclass(frozen=True, slots=True)
+class TypeText:
+    """``base[count]``; count is None without brackets, "" for empty ones."""
+
+    base: str
+    count: str | None
+
+
+def shown(value: object) -> str:
+    """A value of the file as a message shows it."""
+    if isinstance(value, dict | list):
+        return "a mapping" if isinstance(value, dict) else "a list"
+    if value is None:
+        return "nothing"
+    text = str(value).lower() if isinstance(value, bool) else str(value)
+    return f"'{text}'" if len(text) <= _MAX_SHOWN else f"'{text[: _MAX_SHOWN - 3]}...'"
+
+
+def rational(value: object) -> Fraction:
+    """``10``, ``0.1``, ``1/10`` or ``1/2^16``, exactly. Raises ValueError."""
+    if isinstance(value, bool) or not isinstance(value, int | Decimal | str):
+        raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
+            f"{shown(value)} is not a number; write 10, 0.1, 1/10 or 1/2^16"
+        )
+    if not isinstance(value, str):
+        return Fraction(value)
+    if not (match := _RATIONAL.match(value)):
+        if _HEX_NUMBER.match(value):
+            return Fraction(int(value, 16))
+        raise ValueError(f"{shown(value)} is not a number; write 10, 0.1, 1/10 or 1/2^16")
+    if match["power"] and int(match["power"]) > _MAX_POWER:
+        raise ValueError(f"{shown(value)} has a power above {_MAX_POWER}; no field is that fine")
+    below = int(match["base"]) ** int(match["power"]) if match["base"] else int(match["below"] or 1)
+    if below == 0:
+        raise ValueError(f"{shown(value)} divides by zero; write another number")
+    number = Fraction(match["top"]) / below
+    return -number if match["sign"] == "-" else number
+
+
+def range_of(value: object) -> Range:
+    """``1..16`` or a single number. Raises ValueError."""
+    if isinstance(value, str) and (match := _RANGE.match(value)):
+        found = Range(rational(match["first"]), rational(match["last"]))
+    else:
+        try:
+            found = Range(rational(value), rational(value))
+        except ValueError:
+            raise ValueError(f"{shown(value)} is not a range; write first..last, like 1..16") from None
+    if found.first > found.last:
+        raise ValueError(f"{shown(value)} ends before it begins; write the smaller number first")
+    return found
+
+
+def whole_range(value: object) -> tuple[int, int]:
+    """A range of whole numbers from 0 on. Raises ValueError."""
+    found = range_of(value)
+    if found.first.denominator != 1 or found.last.denominator != 1 or found.first < 0:
+        raise ValueError(f"{shown(value)} is not a range of whole numbers from 0 on; write one like 0..26")
+    return int(found.first), int(found.last)
+
+
+def byte_string(value: object) -> bytes:
+    """One number 0-255, or pairs of hex digits like ``A5 A5``. Raises ValueError."""
+    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= 0xFF:
+        return bytes([value])
+    if isinstance(value, str) and _HEX.match(value):
+        return bytes.fromhex(value)
+    raise ValueError(
+        f"{shown(value)} is not a byte string; write one number like 0xA5, or hex pairs like A5 A5"
+    )
+
+
+def duration(value: object) -> Duration:
+    """``3 bytes``, ``260 us``, ``10 ms`` or ``1 s``. Raises ValueError."""
+    if isinstance(value, str) and (match := _DURATION.match(value)):
+        number = Fraction(match["number"])
+        if match["unit"].startswith("byte"):
+            return Duration(byte_times=number)
+        return Duration(seconds=number * _SECONDS[match["unit"]])
+    raise ValueError(f"{shown(value)} is not a time; write 3 bytes, 260 us, 10 ms or 1 s")
+
+
+def type_text(text: str) -> TypeText:
+    """Split ``u16[0..12]`` into base and count. Raises ValueError."""
+    if match := _TYPE.match(text):
+        return TypeText(match["base"], match["count"])
+    raise ValueError(
+        f"{shown(text)} is not a type; write u16, i32, bytes[0..25], u16[4] or the name of a type"
+    )

@@ -1,0 +1,224 @@
+"""Second pass, parts of a frame: each by itself, and the names by which they refer to one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from qlinkgen.model import checksum as catalogue
+from qlinkgen.model.frame import Checksum, Part
+from qlinkgen.model.types import Chunk, Scalar, byte_chunks
+from qlinkgen.schema.file_model import PartSpec, SchemaFile
+from qlinkgen.schema.kinds import MAX_PAYLOAD
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+_INTEGERS = {"u8": 1, "u16": 2, "u24": 3, "u32": 4, "u64": 8}
+_SINGLE_ROLES = ("length", "message", "address", "payload", "checksum")
+_ROLE_KEYS = {
+    "constant": ("value",),
+    "length": ("type", "byteorder", "counts"),
+    "message": ("type", "byteorder"),
+    "address": ("type", "byteorder"),
+    "payload": ("size",),
+    "checksum": ("type", "byteorder", "algorithm", "over", "sent"),
+}
+_KEYS = (
+    "type",
+    "byteorder",
+    "value",
+    "counts",
+    "size",
+    "algorithm",
+    "over",
+    "sent",
+    "only",
+    "words",
+    "rejected",
+)
+
+
+class PartBuilder:
+    """Builds the parts of one frame."""
+
+    def __init__(self, file: SchemaFile, report: Reporter, crc: str | None) -> None:
+        """``crc`` replaces the algorithm that the file names."""
+        self._file = file
+        self._report = report
+        self._crc = crc
+
+    def roles_fit(self, specs: Mapping[str, PartSpec], needed: Sequence[str], path: Path) -> bool:
+        """The roles that a frame needs are there, and each once."""
+        roles = [spec.role for spec in specs.values()]
+        fit = True
+        for index, (name, spec) in enumerate(specs.items()):
+            if spec.role in _SINGLE_ROLES and spec.role in roles[:index]:
+                first = next(other for other, each in specs.items() if each.role == spec.role)
+                what, hint = (
+                    f"{name} and {first} are both the {spec.role}",
+                    "a frame has one of each role but constant",
+                )
+                self.fault("bad-frame", (*path, name), what, hint)
+                fit = False
+        for role in needed:
+            if role not in roles:
+                what, hint = f"the frame has no {role}", f"add a part with role: {role}"
+                self._report.error("bad-frame", path, what, hint, of_key=True, absent=True)
+                fit = False
+        return fit
+
+    def build(self, name: str, spec: PartSpec, names: Iterable[str], path: Path) -> Part:
+        """A part as the file describes it; what it lacks is reported, and made up."""
+        self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS[spec.role]], spec.role, path)
+        value, size, checksum, scalar = b"", (0, 0), None, None
+        if spec.role == "constant":
+            value = spec.value or b"\0"
+            if spec.value is None:
+                self._lacks("value", "add value: A5 A5", path)
+        elif spec.role == "payload":
+            size = self.payload_size(spec, path)
+        elif spec.role == "checksum":
+            checksum = self.checksum(spec, names, path)
+        else:
+            scalar = self.integer(spec, path)
+            if spec.role == "length" and not spec.counts:
+                self._lacks("counts", "add counts: [the parts that it counts]", path)
+            self.known(spec.counts or (), names, (*path, "counts"))
+        return Part(
+            name=name,
+            role=spec.role,
+            doc=spec.doc,
+            section=spec.section,
+            confirmed=spec.confirmed,
+            constant=value,
+            scalar=scalar,
+            checksum=checksum,
+            counts=tuple(spec.counts or ()),
+            min_size=size[0],
+            max_size=size[1],
+        )
+
+    def fault(self, rule: str, path: Path, what: str, hint: str) -> None:
+        """Report a part, or one of its keys."""
+        self._report.error(rule, path, what, hint, of_key=True)
+
+    def reject(self, spec: PartSpec, keys: Iterable[str], role: str, path: Path) -> None:
+        """Report keys that mean nothing in a part of this role."""
+        for key in keys:
+            if key in spec.model_fields_set:
+                self.fault(
+                    "not-applicable", (*path, key), f"'{key}' has no effect on a {role} here", "remove it"
+                )
+
+    def _lacks(self, key: str, hint: str, path: Path) -> None:
+        if not self._report.touched((*path, key)):
+            self._report.error("bad-frame", path, f"{path[-1]} has no {key}", hint, of_key=True, absent=True)
+
+    def payload_size(self, spec: PartSpec, path: Path) -> tuple[int, int]:
+        """Fewest and most bytes of a payload."""
+        if spec.size is None:
+            self._lacks("size", "add size: 0..26", path)
+            self._report.taint(path)
+        low, high = spec.size or (0, MAX_PAYLOAD)
+        if high > MAX_PAYLOAD:
+            what = f"a payload of {high} bytes is too long for any frame"
+            self._report.error("bad-frame", (*path, "size"), what, f"use at most {MAX_PAYLOAD}")
+        return low, high
+
+    def integer(self, spec: PartSpec, path: Path) -> Scalar:
+        """The integer of a length, message id, address or checksum."""
+        size = _INTEGERS.get(spec.type or "")
+        if size is None:
+            kinds = listed(_INTEGERS, "or")
+            if spec.type is None:
+                self._lacks("type", f"add type: {kinds}", path)
+            else:
+                what = f"{shown(spec.type)} is no type for a part of a frame"
+                self._report.error("unknown-type", (*path, "type"), what, f"use {kinds}")
+            self._report.taint((*path, "type"))
+            size = 1
+        chunks = byte_chunks(size, spec.byteorder or self._file.byteorder)
+        return Scalar(bits=8 * size, chunks=chunks, minimum=0, maximum=(1 << 8 * size) - 1)
+
+    def known(self, names: Iterable[str], parts: Iterable[str], path: Path) -> None:
+        """Every name is a part's, and stands once and in wire order."""
+        order = list(parts)
+        last = -1
+        if self._report.touched(path):
+            return
+        for index, name in enumerate(names):
+            place, needs = (*path, index), ((*self._parts_path(path), name),)
+            if name not in order:
+                hint = did_you_mean(name, order, f"the parts are {listed(order)}")
+                self._report.error(
+                    "unknown-part", place, f"there is no part {shown(name)}", hint, needs=needs
+                )
+                self._report.taint(place)
+            elif order.index(name) <= last:
+                what = f"{name} stands before {order[last]} on the wire"
+                if name == order[last]:
+                    what = f"{name} stands twice"
+                self._report.error(
+                    "part-order", place, what, "name each part once, in wire order", needs=needs
+                )
+            else:
+                last = order.index(name)
+
+    @staticmethod
+    def _parts_path(path: Path) -> Path:
+        return ("frame", "packet" if "packet" in path[:2] else "parts")
+
+    # Checksums
+
+    def checksum(self, spec: PartSpec, names: Iterable[str], path: Path) -> Checksum | None:
+        """The checksum of a frame; None where its algorithm is unknown."""
+        algorithm = self._algorithm(spec, path)
+        covered = [name for name in names if name != path[-1]]
+        if not spec.over:
+            self._lacks("over", "add over: [the parts that it covers]", path)
+        self.known(spec.over or (), covered, (*path, "over"))
+        scalar = self.integer(spec, path)
+        if algorithm is None:
+            self._report.taint(path)
+            return None
+        if scalar.bits != algorithm.width:
+            what = f"{algorithm.name} has {algorithm.width} bits, {path[-1]} {scalar.bits}"
+            hint = "use a type as wide as the algorithm"
+            self._report.error("checksum-does-not-fit", path, what, hint, of_key=True)
+        return Checksum(algorithm, self._sent(spec, scalar, path), tuple(spec.over or ()), spec.confirmed)
+
+    def _sent(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
+        if not spec.sent:
+            return scalar.chunks
+        taken = 0
+        for index, (first, last) in enumerate(spec.sent):
+            place = (*path, "sent", index)
+            if last >= scalar.bits or last - first >= 8:
+                what = f"{first}..{last} is no run of at most eight of {scalar.bits} bits"
+                self._report.error(
+                    "checksum-does-not-fit", place, what, "let each range fill one byte", needs=(path,)
+                )
+                self._report.taint(place)
+                return scalar.chunks
+            mask = (1 << last + 1) - (1 << first)
+            if taken & mask:
+                what = f"{first}..{last} repeats bits that are already sent"
+                self._report.error("checksum-does-not-fit", place, what, "name each bit once", needs=(path,))
+            taken |= mask
+        return tuple(Chunk(first, last + 1 - first) for first, last in spec.sent)
+
+    def _algorithm(self, spec: PartSpec, path: Path) -> catalogue.Algorithm | catalogue.Sum | None:
+        name = self._crc or spec.algorithm
+        if name is None:
+            self._lacks("algorithm", "add algorithm: crc-16/ibm-3740 or another", path)
+            return None
+        try:
+            return catalogue.find(name[:80])
+        except catalogue.UnknownAlgorithm as error:
+            hint = "see the catalogue of CRC algorithms, or use sum8 or sum16"
+            if error.suggestions:
+                hint = f"did you mean {listed(map(repr, error.suggestions), 'or')}?"
+            place = (*path, "algorithm")
+            what = f"no checksum algorithm is called {shown(name)}"
+            self._report.error("unknown-algorithm", place, what, hint, of_key=self._crc is not None)
+            return None

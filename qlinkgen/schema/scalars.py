@@ -1,0 +1,177 @@
+"""Second pass, scalars: integers and everything that is an integer with a meaning."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Literal
+
+from qlinkgen.model.types import Chunk, Enum, Flags, Scalar, Scaling, byte_chunks, group_chunks
+from qlinkgen.schema.constants import INTEGER, MAX_BITS, carrier, integer_range
+from qlinkgen.schema.file_model import FieldSpec, SchemaFile
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.numbers import defaulted, quantified
+from qlinkgen.schema.report import did_you_mean
+from qlinkgen.schema.site import Site
+
+FIXED = re.compile(r"(?P<sign>u?)fixed(?P<whole>[0-9]{1,2})\.(?P<fraction>[0-9]{1,2})\Z", re.ASCII)
+#: Built-in types that are no integers.
+KEYWORDS = ("bool", "bytes", "text")
+
+Meaning = Enum | Flags | Literal["bool"] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Plain:
+    """What a type's name alone says of an integer."""
+
+    bits: int
+    signed: bool
+    meaning: Meaning = None
+    scaling: Scaling | None = None
+
+    @property
+    def what(self) -> str:
+        """What it is, for messages."""
+        if self.meaning == "bool":
+            return "bool"
+        return (
+            "a number"
+            if self.meaning is None
+            else f"{type(self.meaning).__name__.lower()} {self.meaning.name}"
+        )
+
+    def fits(self, width: int) -> bool:
+        """Every named value fits so many bits."""
+        if not isinstance(self.meaning, Enum | Flags):
+            return self.bits <= width
+        limit = 1 << width if isinstance(self.meaning, Enum) else width
+        return all(0 <= member.value < limit for member in self.meaning.members)
+
+
+class ScalarBuilder:
+    """Builds the scalars of one file."""
+
+    def __init__(self, file: SchemaFile, enums: Mapping[str, Enum], flags: Mapping[str, Flags]) -> None:
+        """``enums`` and ``flags`` are the named constants by name."""
+        self._file = file
+        self._enums = enums
+        self._flags = flags
+        #: Names that some field has as its type.
+        self.used: set[str] = set()
+
+    def named(self, base: str, site: Site) -> Plain | None:
+        """A type by its name; one that is unknown is reported."""
+        self.used.add(base)
+        plain = self.plain(base)
+        if plain is None:
+            known = [
+                *self._file.types,
+                *self._enums,
+                *self._flags,
+                "u8",
+                "u16",
+                "u32",
+                "i8",
+                "i16",
+                "i32",
+                *KEYWORDS,
+            ]
+            hint = did_you_mean(base, known, "define it under types, enums or flags")
+            places = [(group, base) for group in ("types", "enums", "flags")]
+            what = f"unknown type {shown(base)}"
+            site.report.error("unknown-type", site.place("type"), what, hint, needs=(site.path, *places))
+        elif isinstance(plain.meaning, Enum | Flags):
+            group = "enums" if isinstance(plain.meaning, Enum) else "flags"
+            if site.report.touched((group, base)):
+                site.report.taint(site.path)
+        return plain
+
+    def plain(self, base: str) -> Plain | None:
+        """A type by its name; None where there is none."""
+        if base == "bool":
+            # Where a byte has room for seven bits only, a truth value still takes one byte.
+            return Plain(self._file.groups.bits if self._file.groups else 8, signed=False, meaning="bool")
+        if enum := self._enums.get(base):
+            found = carrier(self._file.enums[base].type)
+            return Plain(enum.bits, signed=found is not None and found[1], meaning=enum)
+        if flags := self._flags.get(base):
+            return Plain(flags.bits, signed=False, meaning=flags)
+        if match := FIXED.match(base):
+            scaling = Scaling(Fraction(1, 1 << int(match["fraction"])))
+            return Plain(
+                int(match["whole"]) + int(match["fraction"]), signed=not match["sign"], scaling=scaling
+            )
+        if match := INTEGER.match(base):
+            return Plain(int(match["bits"]), signed=match["sign"] == "i")
+        return None
+
+    def build(self, spec: FieldSpec, base: str, plain: Plain, site: Site) -> Scalar | None:
+        """The scalar of a field; None where its bytes cannot be told."""
+        chunks = self._chunks(spec, plain.bits, base, site)
+        if chunks is None:
+            return None
+        low, high = (0, 1) if plain.meaning == "bool" else integer_range(plain.bits, signed=plain.signed)
+        scalar = Scalar(
+            bits=plain.bits, signed=plain.signed, chunks=chunks, minimum=low, maximum=high,
+            scaling=plain.scaling, meaning=plain.meaning, unit=spec.unit or "",
+        )  # fmt: skip
+        _check_keys(spec, plain, site)
+        if spec.counts is not None:
+            return replace(scalar, counts=spec.counts, counts_unit=spec.counts_in)
+        scalar = quantified(scalar, spec, plain.what, site)
+        key = "const" if spec.const is not None else "default"
+        scalar = defaulted(scalar, getattr(spec, key), key, site)
+        return replace(scalar, constant=spec.const is not None and not spec.reserved, reserved=spec.reserved)
+
+    def _chunks(self, spec: FieldSpec, bits: int, base: str, site: Site) -> tuple[Chunk, ...] | None:
+        if not 1 <= bits <= MAX_BITS:
+            site.fault("bad-width", "type", f"{base} has {bits} bits", f"1 to {MAX_BITS} are possible")
+            return None
+        groups = spec.groups or self._file.groups
+        if groups is not None:
+            parts = tuple(spec.parts or [(0, bits - 1)])
+            if not _covered(parts, bits):
+                hint = f"name every bit from 0 to {bits - 1} once"
+                site.fault("bad-width", "parts", f"the parts do not cover the {bits} bits of {base}", hint)
+                return None
+            return group_chunks(parts, groups.bits, least_first=groups.first == "least")
+        if bits % 8:
+            hint = "use u8, u16, u24 ... u64, bits inside an integer, or groups"
+            site.fault("bad-width", "type", f"{base} has {bits} bits, which fill no whole bytes", hint)
+            return None
+        if spec.parts:
+            site.key_fault(
+                "not-applicable", "parts", "'parts' has no effect without groups", "add groups, or remove it"
+            )
+        return byte_chunks(bits // 8, spec.byteorder or self._file.byteorder)
+
+
+def _covered(parts: tuple[tuple[int, int], ...], bits: int) -> bool:
+    if any(last >= bits for _, last in parts):
+        return False
+    return sorted(bit for first, last in parts for bit in range(first, last + 1)) == list(range(bits))
+
+
+def _check_keys(spec: FieldSpec, plain: Plain, site: Site) -> None:
+    """Report keys that contradict one another."""
+    if spec.counts is not None:
+        site.reject(
+            spec, ("scale", "offset", "range", "raw_range", "default", "const", "reserved"), "a count"
+        )
+        if plain.meaning is not None or plain.scaling is not None:
+            site.fault("bad-count", "counts", f"{plain.what} cannot count", "use an unsigned integer")
+    elif "counts_in" in site.written:
+        site.key_fault("not-applicable", "counts_in", "'counts_in' has no effect without counts", "remove it")
+    if spec.const is not None:
+        site.reject(spec, ("default",), "a constant")
+    elif spec.reserved:
+        site.reject(spec, ("default",), "reserved bytes", "use const for what is sent")
+    if spec.range is not None and spec.raw_range is not None:
+        site.key_fault(
+            "not-applicable", "raw_range", "'raw_range' has no effect beside range", "keep one of them"
+        )
+    if plain.meaning == "bool" or isinstance(plain.meaning, Flags):
+        site.reject(spec, ("range", "raw_range"), plain.what)

@@ -1,0 +1,199 @@
+"""First pass: what each mapping of the file holds.
+
+A wrong part is reported and taken out, and the rest is checked again, so that one mistake does not hide the
+others. Where what was taken out cannot be done without, a stand-in takes its place; both are tainted in the
+report, so that nothing is concluded from them.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from qlinkgen.schema.file_model import BRANCH, SchemaFile
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+#: Required keys whose absence should not keep the rest of their mapping from being checked.
+_STAND_INS: dict[str, Any] = {
+    "qlinkgen": 1, "protocol": {}, "name": "unnamed", "revision": "", "source": "",
+    "frame": {}, "bus": {}, "kind": "host", "response_within": "0 bytes",
+    "type": "u8", "id": 0, "fields": {}, "at": 0,
+}  # fmt: skip
+#: More rounds than mappings can be nested in one another.
+_ROUNDS = 40
+_EXPECTED = {
+    "int_type": "write a whole number",
+    "bool_type": "write true or false",
+    "string_type": "write text",
+    "list_type": "write a list, like [a, b]",
+}
+
+
+def check_structure(data: Any, report: Reporter) -> SchemaFile | None:
+    """Validate plain data as a schema file, without what is wrong; None where nothing usable is left."""
+    if not isinstance(data, dict):
+        what = "the file is empty" if data is None else f"the file is {shown(data)}, not a mapping of keys"
+        report.error("wrong-type", (), what, "begin with qlinkgen: 1 and protocol:")
+        return None
+    remaining = data
+    for _ in range(_ROUNDS):
+        try:
+            return SchemaFile.model_validate(remaining)
+        except ValidationError as error:
+            details = error.errors(include_url=False)
+        if remaining is data:
+            remaining = copy.deepcopy(data)
+        _Round(details, remaining, report).run()
+    return None
+
+
+class _Round:
+    """What one validation found: reports it, and repairs the data for the next."""
+
+    def __init__(self, details: Sequence[ErrorDetails], data: Any, report: Reporter) -> None:
+        self._details = [(detail, _path_in(data, detail["loc"])) for detail in details]
+        self._data = data
+        self._report = report
+
+    def run(self) -> None:
+        """Report every fault first: repairs change the data that their texts come from."""
+        for detail, path in self._details:
+            if detail["type"] == "missing":
+                self._missing(path)
+            else:
+                self._wrong(detail, path)
+        for detail, path in sorted(self._details, key=lambda each: -len(each[1])):
+            self._repair(path, missing=detail["type"] == "missing")
+
+    def _missing(self, path: Path) -> None:
+        key = str(path[-1])
+        if self._report.touched(path) or key in self._meant(path[:-1]):
+            return
+        self._report.error(
+            "missing-key", path[:-1], f"key '{key}' is missing", _purpose(path), of_key=True, needs=()
+        )
+
+    def _meant(self, parent: Path) -> set[str]:
+        """Keys of a mapping that unknown ones were probably meant to be."""
+        unknown = [path for detail, path in self._details if detail["type"] == "extra_forbidden"]
+        known = _keys_at(parent)
+        hints = [did_you_mean(str(path[-1]), known) for path in unknown if path[:-1] == parent]
+        return {key for key in known if f"did you mean '{key}'?" in hints}
+
+    def _wrong(self, detail: ErrorDetails, path: Path) -> None:
+        kind, seen = detail["type"], detail["input"]
+        if kind == "extra_forbidden":
+            key, known = str(path[-1]), _keys_at(path[:-1])
+            hint = did_you_mean(key, known, f"known here: {listed(known)}")
+            self._report.error("unknown-key", path, f"unknown key {shown(key)}", hint, of_key=True, needs=())
+            return
+        rule, what, hint = _explained(kind, seen, detail)
+        self._report.error(rule, path, what, hint, needs=())
+
+    def _repair(self, path: Path, *, missing: bool) -> None:
+        parent, key = _at(self._data, path[:-1]), path[-1] if path else ""
+        # Taking one item out of a list would move the places of those behind it.
+        while isinstance(parent, list):
+            path = path[:-1]
+            parent, key = _at(self._data, path[:-1]), path[-1]
+        self._report.taint(path)
+        if not isinstance(parent, dict):
+            return
+        if missing and key in _STAND_INS:
+            parent[str(key)] = copy.deepcopy(_STAND_INS[str(key)])
+        elif missing:
+            self._repair(path[:-1], missing=False)
+        else:
+            parent.pop(str(key), None)
+
+
+def _explained(kind: str, seen: object, detail: ErrorDetails) -> tuple[str, str, str]:
+    """Rule, message and hint for a value that is not what its key needs."""
+    context = detail.get("ctx", {})
+    if kind == "literal_error":
+        allowed = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
+        hint = did_you_mean(str(seen), allowed, f"use {listed(allowed, 'or')}")
+        return "bad-value", f"{shown(seen)} is not allowed here", hint
+    if kind == "value_error":
+        what, _, hint = str(context["error"]).partition("; ")
+        return "bad-value", what, hint
+    if kind == "greater_than_equal":
+        return "bad-value", f"{shown(seen)} is too small", f"use {context['ge']} or more"
+    if kind == "less_than_equal":
+        return "bad-value", f"{shown(seen)} is too large", f"use {context['le']} or less"
+    if kind == "too_short":
+        return (
+            "bad-value",
+            f"the {'list' if isinstance(seen, list) else 'mapping'} is empty",
+            "write at least one entry, or remove the key",
+        )
+    return (
+        "wrong-type",
+        f"{shown(seen)} is of the wrong kind",
+        _EXPECTED.get(kind, "write a mapping (key: value)"),
+    )
+
+
+def _purpose(path: Path) -> str:
+    model, key = _model_at(path[:-1]), str(path[-1])
+    description = model.model_fields[key].description if model and key in model.model_fields else None
+    return f"add {key}: {description[0].lower()}{description[1:]}" if description else f"add {key}:"
+
+
+def _path_in(data: Any, location: tuple[int | str, ...]) -> Path:
+    """The place of a fault in the file, without branches of unions and keys that short forms imply."""
+    path: list[int | str] = []
+    for step in location:
+        if isinstance(step, str) and step.startswith(BRANCH):
+            continue
+        if not isinstance(data, dict | list):
+            break
+        path.append(step)
+        data = _item(data, step)
+    return tuple(path)
+
+
+def _item(data: Any, step: int | str) -> Any:
+    if isinstance(data, dict):
+        return data.get(step)
+    return data[step] if isinstance(data, list) and isinstance(step, int) and step < len(data) else None
+
+
+def _at(data: Any, path: Path) -> Any:
+    for step in path:
+        data = _item(data, step)
+    return data
+
+
+def _model_at(path: Path) -> type[BaseModel] | None:
+    """The class of the mapping at a path."""
+    here: Any = SchemaFile
+    for step in path:
+        if isinstance(here, type) and issubclass(here, BaseModel):
+            field = here.model_fields.get(str(step))
+            here = field.annotation if field else None
+        else:
+            here = next((part for part in reversed(get_args(here)) if part is not str), None)
+        here = _mapping_type(here)
+    return here if isinstance(here, type) and issubclass(here, BaseModel) else None
+
+
+def _mapping_type(annotation: Any) -> Any:
+    """The part of an annotation that says what a mapping or list holds."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if getattr(annotation, "__origin__", None) in (dict, list):
+        return annotation
+    found = (_mapping_type(part) for part in get_args(annotation))
+    return next((each for each in found if each is not None), None)
+
+
+def _keys_at(path: Path) -> list[str]:
+    model = _model_at(path)
+    return list(model.model_fields) if model else []

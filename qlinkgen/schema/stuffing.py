@@ -1,0 +1,73 @@
+"""Second pass, stuffing: what is inserted where, and whether that keeps the preamble unique."""
+
+from __future__ import annotations
+
+from qlinkgen.model.frame import DelimitedFrame, Part, Stuffing
+from qlinkgen.schema.file_model import StuffingSpec
+from qlinkgen.schema.parts import PartBuilder
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+_PATH: Path = ("frame", "stuffing")
+
+
+def build_stuffing(
+    spec: StuffingSpec, parts: tuple[Part, ...], builder: PartBuilder, report: Reporter
+) -> Stuffing:
+    """The stuffing as the file describes it."""
+    builder.known(spec.exempt, [part.name for part in parts], (*_PATH, "exempt"))
+    if len(spec.insert) != 1:
+        what = f"{len(spec.insert)} bytes are inserted"
+        report.error("bad-value", (*_PATH, "insert"), what, "write one byte, like 0x00")
+    exempt = tuple(spec.exempt)
+    after_stuffing = spec.checksum == "after"
+    if after_stuffing:
+        exempt = _all_but_payload(spec, parts, report)
+    payload = next(part for part in parts if part.role == "payload")
+    if payload.name in spec.exempt:
+        what = f"{payload.name} is exempt, which leaves nothing worth stuffing"
+        report.error(
+            "bad-frame",
+            (*_PATH, "exempt"),
+            what,
+            f"remove {payload.name}, or the stuffing",
+            needs=((*_PATH, "exempt"),),
+        )
+    return Stuffing(spec.after, spec.insert[0], exempt, after_stuffing, spec.section)
+
+
+def _all_but_payload(spec: StuffingSpec, parts: tuple[Part, ...], report: Reporter) -> tuple[str, ...]:
+    """Length and checksum count and cover stuffed bytes, so they cannot be stuffed themselves."""
+    others = tuple(part.name for part in parts if part.role != "payload")
+    missing = [name for name in others if name not in spec.exempt]
+    if spec.exempt and missing:
+        what = f"{missing[0]} would be stuffed, though the checksum is computed after the stuffing"
+        hint = "exempt all parts but the payload, or leave exempt out"
+        report.error("bad-frame", (*_PATH, "exempt"), what, hint)
+    return others
+
+
+def check_unique(frame: DelimitedFrame, report: Reporter) -> None:
+    """Warn of stuffing under which the preamble can still appear."""
+    stuffing = frame.stuffing
+    if stuffing is None:
+        return
+    needs = (_PATH, ("frame", "parts"))
+    if not frame.preamble:
+        what, hint = (
+            "the frame begins with no constant that stuffing could keep unique",
+            "remove it, or add a preamble",
+        )
+        report.error("preamble-not-unique", _PATH, what, hint, of_key=True, needs=needs)
+    elif not _broken(frame.preamble, stuffing.after, stuffing.insert):
+        what = (
+            f"stuffing does not keep the preamble {frame.preamble.hex(' ').upper()} from appearing in a frame"
+        )
+        hint = "let after be a part of the preamble, and insert a byte that does not follow it there"
+        report.error("preamble-not-unique", _PATH, what, hint, of_key=True, needs=needs)
+
+
+def _broken(preamble: bytes, after: bytes, insert: int) -> bool:
+    """Somewhere in the preamble the stuffed bytes stand without the inserted one behind them."""
+    ends = (at + len(after) for at in range(len(preamble) - len(after)) if preamble[at:].startswith(after))
+    return any(preamble[end] != insert for end in ends)

@@ -1,0 +1,168 @@
+"""Second pass, types: from the written notation of a type to the model's immutable one."""
+
+from __future__ import annotations
+
+from qlinkgen.model.types import FieldType
+from qlinkgen.schema.compounds import build_array, build_bits, build_blob, is_plain_item
+from qlinkgen.schema.constants import INTEGER, build_enum, build_flags
+from qlinkgen.schema.file_model import FieldSpec, SchemaFile
+from qlinkgen.schema.notation import TypeText, type_text
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.scalars import FIXED, KEYWORDS, ScalarBuilder
+from qlinkgen.schema.site import Site
+from qlinkgen.schema.source import Path
+
+_GROUPS = ("enums", "flags", "types")
+#: Longest chain of named types; each may refine the one below.
+_MAX_CHAIN = 20
+
+
+class TypeBuilder:
+    """Knows the named types of one file and builds the types of fields."""
+
+    def __init__(self, file: SchemaFile, report: Reporter, payload_max: int) -> None:
+        """``payload_max`` bounds byte strings and arrays that are written without a bound."""
+        self._file = file
+        self._report = report
+        self._payload_max = payload_max
+        self.enums = {name: build_enum(name, spec, report) for name, spec in file.enums.items()}
+        self.flags = {name: build_flags(name, spec, report) for name, spec in file.flags.items()}
+        self._scalars = ScalarBuilder(file, self.enums, self.flags)
+        #: Fields that are written without a bound: the rest of the payload bounds them.
+        self.unbounded: set[Path] = set()
+        self._checked: set[str] = set()
+        self._chain = 0
+        self._check_names()
+        for name in file.types:
+            self._check_named(name)
+
+    def _check_names(self) -> None:
+        seen: dict[str, str] = {}
+        for group in _GROUPS:
+            for name in getattr(self._file, group):
+                path = (group, name)
+                if name in KEYWORDS or INTEGER.match(name) or FIXED.match(name):
+                    what = f"'{name}' is a built-in type"
+                    self._report.error("type-clash", path, what, "rename it", of_key=True, needs=())
+                elif name in seen:
+                    what = f"'{name}' stands under {seen[name]} too"
+                    self._report.error("type-clash", path, what, "rename one of them", of_key=True, needs=())
+                seen.setdefault(name, group)
+
+    def _check_named(self, name: str) -> None:
+        """Report a fault of a named type once, at its own place, and not wherever it is used."""
+        if name in self._checked or self._chain > _MAX_CHAIN:
+            return
+        self._checked.add(name)
+        self._chain += 1
+        spec, path = self._file.types[name], ("types", name)
+        before = len(self._report.faults)
+        if spec.counts is not None:
+            what = "'counts' has no effect on a named type"
+            self._report.error("not-applicable", (*path, "counts"), what, "put it on a field", of_key=True)
+        if self.build(spec, path, (name,)) is None or len(self._report.faults) > before:
+            self._report.taint(path)
+        self._chain -= 1
+
+    def report_unused(self) -> None:
+        """Warn of named types that no field has."""
+        for group in _GROUPS:
+            for name in getattr(self._file, group):
+                if name not in self._scalars.used:
+                    hint = "remove it, or use it as the type of a field"
+                    needs = (("commands",), ("messages",), ("types",), ("defaults",))
+                    what = f"'{name}' is not used"
+                    self._report.error("unused-type", (group, name), what, hint, of_key=True, needs=needs)
+
+    def build(self, spec: FieldSpec, path: Path, seen: tuple[str, ...] = ()) -> FieldType | None:
+        """The type of a field; None where a fault that was reported leaves nothing to go on with.
+
+        ``seen`` are the named types that are being built, to find those that contain themselves.
+        """
+        site = Site(self._report, path, frozenset(spec.model_fields_set))
+        resolved = self._resolve(spec, site, seen)
+        kind = self._build(*resolved, site) if resolved else None
+        if kind is None:
+            self._report.taint(path)
+        return kind
+
+    def _build(self, spec: FieldSpec, text: TypeText, site: Site) -> FieldType | None:
+        if text.base in ("bytes", "text"):
+            self._note_unbounded(text, site)
+            return self._blob(spec, text, site)
+        plain = self._scalars.named(text.base, site)
+        if plain is None:
+            return None
+        if text.count is not None:
+            self._note_unbounded(text, site)
+            if not is_plain_item(spec, plain, text.base, site):
+                return None
+            item = self._scalars.build(_bare(spec, text.base), text.base, plain, site)
+            return build_array(item, spec, text, self._payload_max, site) if item else None
+        if spec.bits is None:
+            return self._scalars.build(spec, text.base, plain, site)
+        container = self._scalars.build(_bare(spec, text.base), text.base, plain, site)
+        return build_bits(spec, container, self._scalars, site) if container else None
+
+    def _blob(self, spec: FieldSpec, text: TypeText, site: Site) -> FieldType | None:
+        if text.base == "bytes" and self._file.groups is not None:
+            hint = f"use text or an array of u{self._file.groups.bits}"
+            site.fault(
+                "bad-width", "type", f"bytes have no place in groups of {self._file.groups.bits} bits", hint
+            )
+            return None
+        return build_blob(spec, text, self._payload_max, site)
+
+    def _note_unbounded(self, text: TypeText, site: Site) -> None:
+        if not (text.count or "").strip():
+            self.unbounded.add(site.path)
+
+    # Named types
+
+    def _resolve(
+        self, spec: FieldSpec, site: Site, seen: tuple[str, ...]
+    ) -> tuple[FieldSpec, TypeText] | None:
+        """Follow named types down to a built-in type, an enum or flags."""
+        try:
+            text = type_text(spec.type)
+        except ValueError as error:
+            what, _, hint = str(error).partition("; ")
+            site.fault("unknown-type", "type", what, hint)
+            return None
+        named = self._file.types.get(text.base)
+        if named is None or text.base in KEYWORDS:
+            return spec, text
+        self._scalars.used.add(text.base)
+        self._check_named(text.base)
+        if self._report.touched(("types", text.base)):
+            self._report.taint(site.path)
+        if text.base in seen or len(seen) > _MAX_CHAIN:
+            what = (
+                f"type '{text.base}' contains itself"
+                if text.base in seen
+                else "the chain of types is too long"
+            )
+            site.fault("recursive-type", "type", what, "end the chain in a built-in type")
+            return None
+        return self._refine(spec, text, named, site, (*seen, text.base))
+
+    def _refine(
+        self, spec: FieldSpec, text: TypeText, named: FieldSpec, site: Site, seen: tuple[str, ...]
+    ) -> tuple[FieldSpec, TypeText] | None:
+        """What a field says, on top of what its named type says."""
+        resolved = self._resolve(named, site, seen)
+        if resolved is None:
+            return None
+        base, below = resolved
+        if below.count is not None and text.count is not None:
+            site.fault("bad-array", "type", f"'{spec.type}' would be an array of arrays", "use one count")
+            return None
+        merged = base.model_copy(
+            update={key: getattr(spec, key) for key in spec.model_fields_set if key != "type"}
+        )
+        return merged, TypeText(below.base, below.count if text.count is None else text.count)
+
+
+def _bare(spec: FieldSpec, base: str) -> FieldSpec:
+    """The integer alone, without what describes the array or the bit fields that it is part of."""
+    return FieldSpec(type=base, byteorder=spec.byteorder, groups=spec.groups, parts=spec.parts)
