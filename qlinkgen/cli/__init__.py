@@ -1,0 +1,59 @@
+"""The command line. A command's module is imported when it is used, so that ``--help`` is quick."""
+
+from __future__ import annotations
+
+import importlib
+
+import click
+
+import qlinkgen
+from qlinkgen.cli.boundary import run
+
+#: Command to the one line of `qlinkgen --help`; the command itself is `command` in the module of its name.
+COMMANDS = {
+    "generate": "Write Python, C, construct and vectors for protocols, or check that they are up to date.",
+    "lint": "Check schema files; every fault with its line, column, rule and fix.",
+    "show": "Show a protocol or a message: layout, sizes, transactions.",
+    "encode": "Values to wire bytes.",
+    "decode": "Wire bytes to values: one JSON object a line.",
+    "explain": "Say what every byte of a frame is, and what is wrong with it.",
+}
+
+
+class LazyGroup(click.Group):
+    """A group that lists its commands without importing them."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  # click's interface
+        """Names, in the order of a user's work."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import a command when it is used."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"qlinkgen.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """List the commands from the table above."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.command(
+    cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
+@click.version_option(qlinkgen.__version__, prog_name="qlinkgen")
+def cli() -> None:
+    """Describe a serial protocol once in YAML: get codecs for Python and C, and look at its bytes.
+
+    PROTOCOL is the name of a schema that comes with qlinkgen (qlink, trio, mc1231a) or the path of a .yaml
+    file.
+
+    Exit codes: 0 fine, 1 what was checked is wrong (drift, bad frame, faulty schema), 2 wrong usage.
+    """
+
+
+def main() -> None:
+    """Run the command line and leave the process with its exit code."""
+    raise SystemExit(run(cli))

@@ -1,0 +1,75 @@
+"""Bit diagrams: which bit of an integer is what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from qlinkgen.model.frame import MarkedFrame
+from qlinkgen.model.types import Bits, Flags
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Bits ``shift .. shift + bits - 1`` and what they are."""
+
+    shift: int
+    bits: int
+    label: str
+
+
+def runs_of_flags(flags: Flags) -> list[Run]:
+    """One bit a flag."""
+    return [Run(member.value, 1, _labelled(member.name, member.doc)) for member in flags.members]
+
+
+def runs_of_bits(bits: Bits) -> list[Run]:
+    """The fields inside an integer."""
+    return [
+        Run(member.shift, member.type.bits, _labelled(member.name, member.doc)) for member in bits.members
+    ]
+
+
+def runs_of_header(frame: MarkedFrame) -> list[Run]:
+    """Marker, address and message id of a marked frame."""
+    marker = frame.marker.bit_length() - 1
+    return [
+        Run(marker, 1, "marker: set in header and end alone"),
+        Run(frame.address_bits.shift, frame.address_bits.bits, frame.address_name),
+        Run(frame.id_bits.shift, frame.id_bits.bits, f"{frame.id_name}; {frame.end_id} marks the end"),
+    ]
+
+
+def diagram(width: int, runs: Iterable[Run]) -> list[str]:
+    """Lines of a diagram: bit numbers, brackets below those in use, and a branch to each name.
+
+    ::
+
+         7  6  5  4  3  2  1  0
+         .  .  .  .  .  .  |  |
+                           |  +-- running
+                           +----- position_valid
+    """
+    ordered = sorted(runs, key=lambda run: run.shift)
+    marks = ["  ."] * width
+    for run in ordered:
+        for bit in range(run.shift, run.shift + run.bits):
+            marks[bit] = "  |" if bit == run.shift else "---" if bit < run.shift + run.bits - 1 else "  <"
+    for run in ordered:
+        for bit in range(run.shift, run.shift + run.bits - 1):
+            marks[bit] = f"--{marks[bit][2]}"
+    lines = ["".join(f"{bit:3}" for bit in reversed(range(width))), "".join(reversed(marks))]
+    return lines + [_branch(width, run, ordered[index + 1 :]) for index, run in enumerate(ordered)]
+
+
+def _branch(width: int, run: Run, above: Iterable[Run]) -> str:
+    columns = [" "] * (3 * width)
+    for other in above:
+        columns[3 * (width - other.shift) - 1] = "|"
+    start = 3 * (width - run.shift) - 1
+    line = "".join(columns[:start]) + "+" + "-" * (3 * run.shift)
+    return f"{line}-- {run.label}"
+
+
+def _labelled(name: str, doc: str) -> str:
+    return f"{name}: {doc}" if doc else name

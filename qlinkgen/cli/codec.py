@@ -1,0 +1,49 @@
+"""The live codec of a protocol: the generated Python module, made in memory, with values as JSON has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
+
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.common import did_you_mean
+from qlinkgen.model.message import Message
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import BadValue, from_json, to_json
+
+
+def load_codec(protocol: Protocol) -> ModuleType:
+    """The generated module of a protocol."""
+    from qlinkgen.backends.python import load  # noqa: PLC0415  # Jinja takes a while
+
+    return load(protocol)
+
+
+def build(codec: ModuleType, message: Message, given: Mapping[str, Any], address: Mapping[str, int]) -> Any:
+    """A message object from values as JSON or a command line has them."""
+    values = {value.name: value for value in message.values}
+    for name in given:
+        if name not in values:
+            raise Failure(_no_field(message, name, list(values)))
+    try:
+        natives = {name: from_json(values[name], each) for name, each in given.items()}
+    except BadValue as error:
+        raise Failure(f"{message.name}: {error}") from None
+    try:
+        return codec.MESSAGES[message.name](**address, **natives)
+    except codec.EncodeError as error:
+        raise Failure(str(error)) from None
+
+
+def fields(message: Message, found: Any) -> dict[str, Any]:
+    """The values of a message object, for JSON."""
+    return {value.name: to_json(value, getattr(found, value.name)) for value in message.values}
+
+
+def _no_field(message: Message, name: str, known: list[str]) -> str:
+    filled = [field.name for field in message.fields if field.name not in known]
+    if name in filled:
+        return f"{message.name}: '{name}' is filled by the encoder; leave it out"
+    listed = f"its fields are {', '.join(known)}" if known else "it has no fields"
+    return f"{message.name} has no field '{name}'; {did_you_mean(name, known) or listed}"

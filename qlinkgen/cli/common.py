@@ -1,0 +1,102 @@
+"""What the commands share: finding protocols and messages, warnings, hex input."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from collections.abc import Iterable
+from typing import IO
+
+import click
+
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.model.message import Message
+from qlinkgen.model.protocol import Protocol
+
+HEX_DIGITS = frozenset(b"0123456789abcdefABCDEF")
+
+
+def load_protocol(name: str, crc: str | None = None) -> Protocol:
+    """A protocol by shipped name or path. Raises SchemaError."""
+    from qlinkgen.schema import find, load  # noqa: PLC0415  # pydantic takes a while
+
+    return load(find(name), crc=crc)
+
+
+def find_message(protocol: Protocol, name: str) -> Message:
+    """A message by name; a command's name alone is its request."""
+    try:
+        return protocol.message(name)
+    except KeyError:
+        command = name.removesuffix(".response").removesuffix(".request")
+        silent = any(each.name == command for each in protocol.commands) and name.endswith(".response")
+        fix = (
+            f"{command} is not answered"
+            if silent
+            else did_you_mean(name, [*(each.name for each in protocol.commands), *protocol.by_name])
+        )
+        hint = fix or f"`qlinkgen show {protocol.name}` lists the messages"
+        raise Failure(f"{protocol.name} has no message '{name}'; {hint}") from None
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """A hint naming the closest known words, or ""."""
+    close = difflib.get_close_matches(word, list(known), n=2, cutoff=0.6)
+    return f"did you mean {' or '.join(close)}?" if close else ""
+
+
+def warn(text: str) -> None:
+    """A line on stderr that does not stop anything."""
+    click.echo(f"qlinkgen: warning: {text}", err=True)
+
+
+def warn_unconfirmed(protocol: Protocol, message: Message) -> None:
+    """Say that the source of a message or of its fields is weak."""
+    command = protocol.command_of(message)
+    weak = [field.name for field in message.fields if not field.confirmed]
+    if message.confirmed and (command is None or command.confirmed) and not weak:
+        return
+    what = f"{message.name} ({', '.join(weak)})" if weak and message.confirmed else message.name
+    warn(f"{what} is unconfirmed: its source is weak; try it at the device before trusting it")
+
+
+def parse_hex(text: str, what: str = "HEX") -> bytes:
+    """Bytes of hex text; white space is ignored, a 0x in front is allowed."""
+    packed = "".join(text.split())
+    packed = packed[2:] if packed[:2].lower() == "0x" else packed
+    for index, digit in enumerate(packed):
+        if ord(digit) not in HEX_DIGITS:
+            raise Failure(
+                f"{what}: '{digit}' at digit {index + 1} is no hex digit; write bytes as pairs of 0-9 and a-f"
+            )
+    if len(packed) % 2:
+        raise Failure(f"{what}: {len(packed)} hex digits; a byte has two, so their number must be even")
+    return bytes.fromhex(packed)
+
+
+def on_terminal(stream: IO[str] | None = None) -> bool:
+    """Colours and fitting to the width are wanted."""
+    if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return False
+    return bool(os.environ.get("FORCE_COLOR")) or (stream or sys.stdout).isatty()
+
+
+def addressed(protocol: Protocol, message: Message) -> bool:
+    """The message's frame carries an address (the answers of a packet protocol do not)."""
+    return protocol.address_name is not None and bool(message.addresses)
+
+
+def _crc(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:  # noqa: ARG001
+    if value is None:
+        return None
+    key, _, crc = value.partition("=")
+    if key != "crc" or not crc:
+        raise Failure(f"--set {value}: only crc=NAME can be set, for example --set crc=crc-16/xmodem")
+    return crc
+
+
+#: ``--set crc=NAME``; the command gets the algorithm's name as ``crc``.
+crc_option = click.option(
+    "--set", "crc", metavar="crc=NAME", callback=_crc, help="Use another checksum algorithm of the catalogue."
+)

@@ -1,0 +1,110 @@
+"""Packets, which have no frame: a conversation of requests and responses, or one side of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+from qlinkgen.cli.streams import Bad, Event, OneWay
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.sizes import max_frame_size
+
+
+class Conversation:
+    """Both sides on one line: behind a request, a response if its check value fits, else the next request.
+
+    The host need not read the check value, so requests may also follow one another directly.
+    """
+
+    def __init__(self, protocol: Protocol, codec: ModuleType) -> None:
+        """Begin with a request."""
+        self._protocol = protocol
+        self._codec = codec
+        self._requests = OneWay(codec, "request")
+        self._ids = {message.id for message in protocol.received("request")}
+        self._offset = 0
+        self._asked: Any = None
+        self._waiting = bytearray()
+
+    def feed(self, data: bytes) -> Iterator[Event]:
+        """Take bytes."""
+        self._waiting += data
+        yield from self._settle(last=False)
+
+    def finish(self) -> Iterator[Event]:
+        """The end of the stream: what waits to become a response may still be requests."""
+        yield from self._settle(last=True)
+        yield from self._requests.finish()
+
+    def _settle(self, *, last: bool) -> Iterator[Event]:
+        while self._waiting:
+            if self._asked is None:
+                yield from self._request(self._take(1))
+                continue
+            size = answer_size(self._protocol, self._asked)
+            if len(self._waiting) < size and not last:
+                return
+            asked, self._asked = self._asked, None
+            if size and len(self._waiting) >= size:
+                found = decode_answer(self._codec, bytes(self._waiting[:size]), asked, self._offset)
+                if self._is_answer(found):
+                    self._take(size)
+                    yield found
+
+    def _take(self, size: int) -> bytes:
+        taken = bytes(self._waiting[:size])
+        del self._waiting[:size]
+        self._offset += size
+        return taken
+
+    def _request(self, byte: bytes) -> Iterator[Event]:
+        for event in self._requests.feed(byte):
+            self._asked = None if isinstance(event, Bad) else event
+            yield event
+
+    def _is_answer(self, found: Event) -> bool:
+        """A check value fits, or it says that the command is unknown and nothing else can be meant."""
+        if not isinstance(found, Bad):
+            return True
+        return found.kind == "range" or (found.kind == "illegal" and found.raw[0] not in self._ids)
+
+
+class Answers:
+    """Responses to one and the same request, one after the other."""
+
+    def __init__(self, protocol: Protocol, codec: ModuleType, asked: Any) -> None:
+        """Every response answers ``asked``."""
+        self._size = answer_size(protocol, asked)
+        self._codec, self._asked = codec, asked
+        self._offset = 0
+        self._waiting = bytearray()
+
+    def feed(self, data: bytes) -> Iterator[Event]:
+        """Take bytes."""
+        self._waiting += data
+        while self._size and len(self._waiting) >= self._size:
+            raw = bytes(self._waiting[: self._size])
+            del self._waiting[: self._size]
+            yield decode_answer(self._codec, raw, self._asked, self._offset)
+            self._offset += len(raw)
+
+    def finish(self) -> Iterator[Event]:
+        """The end of the stream."""
+        if self._waiting:
+            text = f"{len(self._waiting)} bytes; a response to {self._asked.NAME} has {self._size}"
+            yield Bad("truncated", self._offset, bytes(self._waiting), text)
+
+
+def answer_size(protocol: Protocol, asked: Any) -> int:
+    """Bytes of the response to a request object, check value included; 0 if nothing answers."""
+    command = protocol.command_of(protocol.by_name[asked.NAME])
+    return max_frame_size(protocol.frame, command.response) if command and command.response else 0
+
+
+def decode_answer(codec: ModuleType, raw: bytes, asked: Any, offset: int) -> Event:
+    """The response in these bytes, or what is wrong with them."""
+    try:
+        return codec.decode_response(raw, asked)
+    except codec.DecodeError as error:
+        return Bad(error.kind, offset, raw, str(error))

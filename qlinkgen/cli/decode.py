@@ -1,0 +1,162 @@
+"""``qlinkgen decode``: wire bytes to values, one JSON object a line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from io import BufferedReader
+from typing import Any, cast
+
+import click
+
+from qlinkgen.cli import jsonlines
+from qlinkgen.cli.boundary import FINE, WRONG, Failure
+from qlinkgen.cli.codec import fields, load_codec
+from qlinkgen.cli.common import HEX_DIGITS, crc_option, load_protocol, parse_hex, warn, warn_unconfirmed
+from qlinkgen.cli.conversations import Answers, Conversation
+from qlinkgen.cli.encode import asked
+from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
+from qlinkgen.model.frame import PacketFrame
+from qlinkgen.model.message import Direction
+from qlinkgen.model.protocol import Protocol
+
+CHUNK = 65536
+
+
+@click.command("decode")
+@click.argument("protocol")
+@click.argument("hex_", metavar="[HEX|-]...", nargs=-1)
+@click.option(
+    "--direction", type=click.Choice(["request", "response"]), help="What the frames are; see above."
+)
+@click.option("--request", "request", metavar="HEX", help="Packets: the request that the responses answer.")
+@click.option("--raw", is_flag=True, help="Standard input is the bytes themselves, not hex text.")
+@crc_option
+def command(  # noqa: PLR0917  # click passes them by name
+    protocol: str,
+    hex_: tuple[str, ...],
+    direction: Direction | None,
+    request: str | None,
+    raw: bool,
+    crc: str | None,
+) -> int:
+    r"""Print every frame of a stream as a JSON object; bytes between frames are passed over.
+
+    - (or nothing) reads hex text from standard input as it comes, white space ignored. A bad frame is an
+    object {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad frame, or none at
+    all.
+
+    Nothing in most frames says whether it is a request or a response. Without --direction, what fits only one
+    of them is that; what fits both is the response if it directly follows a request of the same command and
+    node, else the request. Packets without --direction are a conversation: behind a request, a response if
+    its check value fits, else the next request; --direction response needs --request for them.
+
+    \b
+    qlinkgen decode qlink a5a504210315e8
+    qlinkgen decode qlink --direction response - < capture.txt
+    qlinkgen decode trio --raw < /dev/ttyUSB0
+    qlinkgen decode mc1231a --direction response --request 4a 0012d687d6e3
+    """
+    chunks = _input(hex_, raw=raw)
+    loaded = load_protocol(protocol, crc)
+    codec = load_codec(loaded)
+    stream = _stream(loaded, codec, direction, request)
+    printer = _Printer(loaded)
+    for chunk in chunks:
+        printer.show(stream.feed(chunk), len(chunk))
+    printer.show(stream.finish())
+    return printer.result()
+
+
+def _stream(protocol: Protocol, codec: Any, direction: Direction | None, request: str | None) -> Stream:
+    if direction and direction not in protocol.directions:
+        raise Failure(
+            f"{protocol.name} has neither requests nor responses; leave out --direction {direction}"
+        )
+    packets = isinstance(protocol.frame, PacketFrame)
+    if request is not None and not (packets and direction != "request"):
+        raise Failure("--request goes with the responses of a packet protocol; leave it out")
+    if not packets or direction == "request":
+        return open_stream(protocol, codec, direction)
+    if direction is None and request is None:
+        return Conversation(protocol, codec)
+    return Answers(protocol, codec, asked(protocol, codec, request))
+
+
+def _input(words: tuple[str, ...], *, raw: bool) -> Iterable[bytes]:
+    if words and words != ("-",):
+        if raw:
+            raise Failure("--raw reads bytes from standard input; leave out HEX, or --raw")
+        return [parse_hex(" ".join(words))]
+    if not words and sys.stdin.isatty():
+        raise Failure("nothing to decode; give HEX, or - to read it from standard input")
+    return _read_raw() if raw else _read_hex()
+
+
+def _read_raw() -> Iterator[bytes]:
+    while chunk := cast(BufferedReader, sys.stdin.buffer).read1(CHUNK):
+        yield chunk
+
+
+def _read_hex() -> Iterator[bytes]:
+    """Bytes as soon as both their digits are there; a chunk may end between them."""
+    digits, seen = b"", 0
+    for chunk in _read_raw():
+        digits += b"".join(chunk.split())
+        for index, digit in enumerate(digits):
+            if digit not in HEX_DIGITS:
+                at = seen + index + 1
+                raise Failure(f"standard input: {chr(digit)!r} at digit {at} is no hex digit")
+        whole = len(digits) & ~1
+        yield bytes.fromhex(digits[:whole].decode("ascii"))
+        digits, seen = digits[whole:], seen + whole
+    if digits:
+        raise Failure(f"standard input: an odd number of hex digits ({seen + 1}); a byte has two")
+
+
+class _Printer:
+    """Prints events as they come, and keeps what the exit code depends on."""
+
+    def __init__(self, protocol: Protocol) -> None:
+        self._protocol = protocol
+        self._bytes = self._good = self._bad = 0
+        self._warned: set[str] = set()
+
+    def show(self, events: Iterable[Event], size: int = 0) -> None:
+        """Print events; whoever reads along in a pipe sees each at once."""
+        self._bytes += size
+        for event in events:
+            sys.stdout.write(f"{jsonlines.line(self._record(event))}\n")
+            sys.stdout.flush()
+
+    def result(self) -> int:
+        """The exit code."""
+        if not self._good and not self._bad:
+            seen = f"no frame in {self._bytes} bytes" if self._bytes else "no bytes came"
+            warn(f"{seen}; `qlinkgen explain {self._protocol.name} HEX` looks for the reason")
+        return FINE if self._good and not self._bad else WRONG
+
+    def _record(self, event: Event) -> Mapping[str, Any]:
+        if isinstance(event, Bad):
+            self._bad += 1
+            return error_record(event)
+        self._good += 1
+        if event.NAME not in self._warned:
+            self._warned.add(event.NAME)
+            warn_unconfirmed(self._protocol, self._protocol.by_name[event.NAME])
+        return message_record(self._protocol, event)
+
+
+def message_record(protocol: Protocol, found: Any) -> dict[str, Any]:
+    """A message as decode prints it."""
+    message = protocol.by_name[found.NAME]
+    record: dict[str, Any] = {"message": message.name}
+    if protocol.address_name and message.addresses:
+        record[protocol.address_name] = getattr(found, protocol.address_name)
+    record["fields"] = fields(message, found)
+    return record
+
+
+def error_record(bad: Bad) -> dict[str, Any]:
+    """A bad frame as decode prints it."""
+    return {"error": {"kind": bad.kind, "offset": bad.offset, "raw": bad.raw.hex(), "message": bad.message}}

@@ -1,0 +1,213 @@
+"""``qlinkgen generate``: write the outputs, or check that they are up to date."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from qlinkgen._resources import schemas_dir
+from qlinkgen.backends.base import Options
+from qlinkgen.cli.boundary import FINE, WRONG, Failure
+from qlinkgen.cli.common import crc_option, did_you_mean, on_terminal, warn
+from qlinkgen.cli.drift import Change, Folder
+from qlinkgen.cli.manifest import schema_of
+from qlinkgen.cli.targets import TARGETS, reference_outputs
+from qlinkgen.errors import Fault, SchemaError
+from qlinkgen.model.protocol import Protocol
+
+Role = Literal["both", "master", "slave"]
+
+
+@click.command("generate")
+@click.argument("schemas", metavar="[SCHEMA]...", nargs=-1)
+@click.option(
+    "--target",
+    "targets",
+    multiple=True,
+    type=click.Choice([*TARGETS]),
+    help="Repeat for several; default all.",
+)
+@click.option("-o", "--output", default="generated", show_default=True, help="Folder for the output.")
+@click.option(
+    "--check", is_flag=True, help="Write nothing; show what differs and exit with 1 if anything does."
+)
+@crc_option
+@click.option(
+    "--role", type=click.Choice(["both", "master", "slave"]), default="both", help="Leave out the other side."
+)
+@click.option(
+    "--only", multiple=True, metavar="NAME", help="Keep these commands or messages; repeat for several."
+)
+@click.option("--list-outputs", is_flag=True, help="Print the paths that would be written, one a line.")
+def command(  # noqa: PLR0917  # click passes them by name
+    schemas: tuple[str, ...],
+    targets: tuple[str, ...],
+    output: str,
+    check: bool,
+    crc: str | None,
+    role: Role,
+    only: tuple[str, ...],
+    list_outputs: bool,
+) -> int:
+    r"""Write what is made of the SCHEMAs, by default of all that come with qlinkgen.
+
+    Only files that change are written, and files that nothing makes any more are removed. In the repository
+    of qlinkgen, a run without SCHEMA and -o also writes the parts of docs/ that are made from the code.
+
+    \b
+    qlinkgen generate                        everything that is shipped, to generated/
+    qlinkgen generate bus.yaml --target c    one header
+    qlinkgen generate --check                for CI: 1 and a diff if anything is out of date
+    qlinkgen generate qlink --set crc=crc-16/xmodem --role slave --only motion
+    """
+    from qlinkgen.schema import shipped  # noqa: PLC0415  # pydantic takes a while
+
+    protocols = _load(schemas or shipped(), crc)
+    options = Options(role=role, only=_kept(only, list(protocols.values())))
+    folder = Folder(Path(output), complete=not schemas)
+    _fill(folder, protocols, targets or tuple(TARGETS), options)
+    folders = [folder]
+    if not (schemas or targets) and output == "generated" and schemas_dir().parent == Path.cwd():
+        folders.append(_reference())
+    if list_outputs:
+        click.echo(
+            "\n".join(sorted(str(folder.root / path) for folder in folders for path in folder.files()))
+        )
+        return FINE
+    return _check(folders) if check else _update(folders)
+
+
+def _load(schemas: Sequence[str], crc: str | None) -> dict[str, Protocol]:
+    """Every protocol by its schema as given; the faults of all files are reported together."""
+    from qlinkgen.schema import find, load  # noqa: PLC0415  # pydantic takes a while
+
+    protocols: dict[str, Protocol] = {}
+    faults: list[Fault] = []
+    for schema in schemas:
+        try:
+            protocols[schema] = load(find(schema), crc=crc)
+        except SchemaError as error:
+            faults += error.faults
+    if faults:
+        raise SchemaError(faults)
+    names = [protocol.name for protocol in protocols.values()]
+    for name in names:
+        if names.count(name) > 1:
+            raise Failure(f"two schemas describe a protocol '{name}'; rename one under protocol: name")
+    return protocols
+
+
+def _kept(only: Sequence[str], protocols: Sequence[Protocol]) -> tuple[str, ...]:
+    known = {
+        name
+        for protocol in protocols
+        for message in protocol.messages
+        for name in (message.name, message.command)
+    }
+    for name in only:
+        if name not in known:
+            raise Failure(
+                f"--only {name}: no command or message has this name; {did_you_mean(name, sorted(known))}"
+            )
+    return tuple(only)
+
+
+def _fill(
+    folder: Folder, protocols: Mapping[str, Protocol], targets: Sequence[str], options: Options
+) -> None:
+    with _progress(len(targets) * len(protocols)) as step:
+        for target in dict.fromkeys(targets):
+            generate, shared = TARGETS[target].load()
+            folder.want("", "", target, dict(shared))
+            for schema, protocol in protocols.items():
+                if not _keeps(protocol, options):
+                    continue
+                step(f"{target} {protocol.name}")
+                source = schema_of(protocol, schema, folder.root)
+                folder.want(protocol.name, source, target, dict(generate(protocol, options)))
+
+
+def _keeps(protocol: Protocol, options: Options) -> bool:
+    """Something is left of a protocol after --only."""
+    names = {name for message in protocol.messages for name in (message.name, message.command)}
+    return not options.only or not names.isdisjoint(options.only)
+
+
+def _reference() -> Folder:
+    folder = Folder(schemas_dir().parent, listed=False)
+    folder.want("", "", "reference", dict(reference_outputs()))
+    return folder
+
+
+def _no_step(what: str) -> None:
+    """Show nothing."""
+
+
+@contextlib.contextmanager
+def _progress(total: int) -> Iterator[Callable[[str], None]]:
+    """A bar on a terminal, nothing elsewhere; the function takes what is worked on next."""
+    if not on_terminal(sys.stderr):
+        yield _no_step
+        return
+    from rich.console import Console  # noqa: PLC0415  # only a terminal needs it
+    from rich.progress import Progress  # noqa: PLC0415
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("generating", total=total)
+        yield lambda what: bar.update(task, advance=1, description=what)
+
+
+def _update(folders: Sequence[Folder]) -> int:
+    written = removed = total = 0
+    for folder in folders:
+        changes = folder.changes()
+        folder.update(changes)
+        total += len(folder.files())
+        written += sum(change.kind != "orphan" for change in changes)
+        removed += sum(change.kind == "orphan" and change.ours for change in changes)
+        for change in changes:
+            if not change.ours:
+                warn(
+                    f"{folder.root / change.path} stands among generated files, but nothing makes it; move it"
+                )
+    gone = f", {removed} removed" if removed else ""
+    click.echo(f"{written} written, {total - written} unchanged{gone} in {folders[0].root}")
+    return FINE
+
+
+def _check(folders: Sequence[Folder]) -> int:
+    changes = [(folder, change) for folder in folders for change in folder.changes()]
+    for folder, change in changes:
+        _report(folder, change)
+    if not changes:
+        click.echo(
+            f"{sum(len(folder.files()) for folder in folders)} files are up to date in {folders[0].root}"
+        )
+        return FINE
+    what = f"{len(changes)} file{'s' if len(changes) > 1 else ''} out of date in {folders[0].root}"
+    click.echo(
+        f"qlinkgen: {what}; run `qlinkgen generate` with the same arguments, and never edit the files",
+        err=True,
+    )
+    return WRONG
+
+
+def _report(folder: Folder, change: Change) -> None:
+    explained = {
+        "missing": "is missing",
+        "changed": "differs",
+        "orphan": "is an orphan: no schema makes it any more",
+    }[change.kind]
+    click.echo(f"{folder.root / change.path}: {explained}")
+    for line in change.diff:
+        click.echo(_coloured(line) if on_terminal() else line)
+
+
+def _coloured(line: str) -> str:
+    colour = {"+": "green", "-": "red", "@": "cyan"}.get(line[:1])
+    return click.style(line, fg=colour) if colour else line

@@ -1,0 +1,51 @@
+"""JSON with every digit: numbers are read as Decimal and written as they are, one object a line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Any
+
+from qlinkgen.cli.boundary import Failure
+
+
+def line(found: Any) -> str:
+    """An object on one line; a Decimal becomes a number with all its digits."""
+    if isinstance(found, Mapping):
+        return "{" + ", ".join(f"{json.dumps(str(name))}: {line(each)}" for name, each in found.items()) + "}"
+    if isinstance(found, list | tuple):
+        return "[" + ", ".join(map(line, found)) + "]"
+    if isinstance(found, Decimal):
+        return f"{found:f}"
+    return json.dumps(found)
+
+
+def parse_object(text: str, what: str) -> dict[str, Any]:
+    """The object that a text holds."""
+    try:
+        found = json.loads(
+            text, parse_float=Decimal, parse_constant=_refuse_constant, object_pairs_hook=_refuse_doubles
+        )
+    except json.JSONDecodeError as error:
+        raise Failure(f"{what}: no JSON at character {error.pos + 1}: {error.msg}") from None
+    except RecursionError:
+        raise Failure(f"{what}: nested too deeply; fields hold numbers, texts and lists of numbers") from None
+    except ValueError as error:
+        raise Failure(f"{what}: {error}") from None
+    if not isinstance(found, dict):
+        raise Failure(f'{what}: a JSON object is needed, such as {{"counter": 1}}')
+    return found
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is no number that can be sent")
+
+
+def _refuse_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        names = [name for name, _ in pairs]
+        double = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"'{double}' stands there twice; keep one")
+    return found

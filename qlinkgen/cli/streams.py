@@ -1,0 +1,137 @@
+"""Streams of bytes to messages and faults, whatever the protocol and whether or not the direction is known.
+
+Nothing in most frames says whether it is a request or a response. Without a direction both are tried, byte
+by byte:
+
+* what fits only one direction is that;
+* what fits both is the response if it directly follows a request of the same command and address, else the
+  request.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any, Protocol
+
+from qlinkgen.model.message import Direction
+from qlinkgen.model.protocol import Protocol as Described
+
+#: A frame that both directions refuse is reported by the one that came further with it.
+PROGRESS = ("unknown", "length", "frame", "stuffing", "truncated", "crc", "illegal", "range")
+
+
+@dataclass(frozen=True, slots=True)
+class Bad:
+    """Bytes that are no message; the generated module's Fault with its place in the whole stream."""
+
+    kind: str
+    offset: int
+    raw: bytes
+    message: str
+
+
+#: A generated message object, or bytes that are none.
+Event = Any
+
+
+class Stream(Protocol):
+    """Bytes in, events out."""
+
+    def feed(self, data: bytes) -> Iterable[Event]:
+        """Take bytes; what became certain with them, in order."""
+
+    def finish(self) -> Iterable[Event]:
+        """The end of the stream; what was left."""
+
+
+class OneWay:
+    """Frames of one known direction (or of a protocol that has none)."""
+
+    def __init__(self, codec: ModuleType, direction: Direction, base: int = 0) -> None:
+        """``base`` is the place of the first byte in the whole stream."""
+        self._decoder = codec.StreamDecoder() if direction == "message" else codec.StreamDecoder(direction)
+        self._base = base
+
+    def feed(self, data: bytes) -> list[Event]:
+        """Take bytes."""
+        return [self._placed(event) for event in self._decoder.feed(data)]
+
+    def finish(self) -> list[Event]:
+        """The end of the stream."""
+        return [self._placed(event) for event in self._decoder.finish()]
+
+    def _placed(self, event: Event) -> Event:
+        if hasattr(event, "kind") and hasattr(event, "raw"):
+            return Bad(event.kind, event.offset + self._base, bytes(event.raw), event.message)
+        return event
+
+
+class EitherWay:
+    """Frames of both directions on one line."""
+
+    def __init__(self, codec: ModuleType) -> None:
+        """Hunt in both directions."""
+        self._codec = codec
+        self._ways: dict[Direction, OneWay] = {way: OneWay(codec, way) for way in ("request", "response")}
+        self._held: dict[Direction, list[Event]] = {"request": [], "response": []}
+        self._offset = 0
+        self._asked: tuple[str, object] | None = None
+
+    def feed(self, data: bytes) -> Iterator[Event]:
+        """Take bytes, one at a time: both directions must be asked about the same frame."""
+        for byte in data:
+            self._offset += 1
+            yield from self._settle({way: each.feed(bytes((byte,))) for way, each in self._ways.items()})
+
+    def finish(self) -> Iterator[Event]:
+        """The end of the stream: the direction that understood more tells what is left."""
+        for way, each in self._ways.items():
+            self._held[way] += each.finish()
+        best = min(self._held.values(), key=len)
+        other = max(self._held.values(), key=len)
+        yield from best or other
+        self._held = {"request": [], "response": []}
+
+    def _settle(self, new: dict[Direction, list[Event]]) -> Iterator[Event]:
+        for way, events in new.items():
+            self._held[way] += events
+        delivered = [way for way, events in new.items() if events and not isinstance(events[-1], Bad)]
+        if delivered:
+            chosen = delivered[0] if len(delivered) == 1 else self._choose(new)
+            yield from self._deliver(chosen, new)
+        elif len(self._held["request"]) == len(self._held["response"]):
+            pairs = zip(self._held["request"], self._held["response"], strict=True)
+            yield from [max(pair, key=lambda bad: PROGRESS.index(bad.kind)) for pair in pairs]
+            self._held = {"request": [], "response": []}
+            self._asked = self._asked if not any(new.values()) else None
+
+    def _choose(self, new: dict[Direction, list[Event]]) -> Direction:
+        return "response" if self._asked == _transaction(new["response"][-1]) else "request"
+
+    def _deliver(self, way: Direction, new: dict[Direction, list[Event]]) -> list[Event]:
+        """One direction has a message: what it saw before is the truth about the bytes before."""
+        events = self._held[way]
+        other: Direction = "request" if way == "response" else "response"
+        if not new[other]:
+            # The other one reads a longer frame into these bytes; it must not swallow the next one.
+            self._ways[other] = OneWay(self._codec, other, self._offset)
+        self._held = {"request": [], "response": []}
+        self._asked = _transaction(events[-1]) if way == "request" else None
+        return events
+
+
+def _transaction(message: Any) -> tuple[str, object]:
+    """Command and address: what a response has in common with its request."""
+    address = (
+        getattr(message, "node", None) if hasattr(message, "node") else getattr(message, "address", None)
+    )
+    return message.NAME.rpartition(".")[0], address
+
+
+def open_stream(protocol: Described, codec: ModuleType, direction: Direction | None) -> Stream:
+    """The stream for a protocol with frames."""
+    if protocol.directions == ("message",):
+        return OneWay(codec, "message")
+    return OneWay(codec, direction) if direction else EitherWay(codec)

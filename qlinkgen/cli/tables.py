@@ -1,0 +1,87 @@
+"""Tables: coloured and fitted on a terminal, aligned text of any width in a pipe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import click
+
+from qlinkgen.cli.common import on_terminal
+
+
+@dataclass
+class Table:
+    """Rows of text under headings; columns named in ``right`` are aligned to the right."""
+
+    columns: Sequence[str]
+    title: str = ""
+    right: frozenset[str] = frozenset()
+    rows: list[tuple[str, ...]] = field(default_factory=list)
+
+    def add(self, *cells: object) -> None:
+        """Append a row; None is an empty cell."""
+        self.rows.append(tuple("" if cell is None else str(cell) for cell in cells))
+
+    def show(self) -> None:
+        """Print it, without the columns in which nothing stands."""
+        table = self._without_empty()
+        if not table.rows:
+            return
+        if on_terminal():
+            _show_rich(table)
+        else:
+            click.echo("\n".join(table.lines()))
+
+    def lines(self) -> list[str]:
+        """Plain text, two blanks between columns."""
+        head = [self.title] if self.title else []
+        widths = [
+            max(len(row[index]) for row in (tuple(self.columns), *self.rows))
+            for index in range(len(self.columns))
+        ]
+        rule = tuple("-" * width for width in widths)
+        return head + [self._line(row, widths) for row in (tuple(self.columns), rule, *self.rows)] + [""]
+
+    def _line(self, row: tuple[str, ...], widths: Sequence[int]) -> str:
+        cells = (
+            cell.rjust(width) if column in self.right else cell.ljust(width)
+            for cell, width, column in zip(row, widths, self.columns, strict=True)
+        )
+        return "  ".join(cells).rstrip()
+
+    def _without_empty(self) -> Table:
+        used = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
+        rows = [tuple(row[index] for index in used) for row in self.rows]
+        return Table([self.columns[index] for index in used], self.title, self.right, rows)
+
+
+def _show_rich(table: Table) -> None:
+    from rich import box  # noqa: PLC0415  # only a terminal needs it
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table as RichTable  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    shown = RichTable(
+        title=table.title or None, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD
+    )
+    for index, column in enumerate(table.columns):
+        style = ("cyan", "green")[index] if index < 2 else None
+        side: Literal["left", "right"] = "right" if column in table.right else "left"
+        shown.add_column(column, justify=side, style=style, overflow="fold")
+    for row in table.rows:
+        shown.add_row(*(Text(cell) for cell in row))
+    Console().print(shown)
+
+
+def heading(text: str) -> None:
+    """A line that stands out on a terminal."""
+    click.echo(click.style(text, bold=True) if on_terminal() else text)
+
+
+def paragraph(lines: Iterable[str]) -> None:
+    """Lines, and an empty one if there were any."""
+    shown = [line for line in lines if line]
+    if shown:
+        click.echo("\n".join((*shown, "")))

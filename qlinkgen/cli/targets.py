@@ -1,0 +1,75 @@
+"""The registry of targets: the one place that knows every back-end, so that none has to know another."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from qlinkgen.backends.base import Options, Outputs
+from qlinkgen.model.protocol import Protocol
+
+Generate = Callable[[Protocol, Options], Outputs]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What can be generated.
+
+    Attributes:
+        name: word behind ``--target``.
+        summary: what it is, for help texts.
+        load: imports the back-end, and hands over `generate` and the files that all protocols share.
+    """
+
+    name: str
+    summary: str
+    load: Callable[[], tuple[Generate, Outputs]]
+
+
+def _backend(name: str) -> Any:
+    return importlib.import_module(f"qlinkgen.backends.{name}")
+
+
+def _plain(name: str) -> tuple[Generate, Outputs]:
+    module = _backend(name)
+    return module.generate, module.shared()
+
+
+def _vectors() -> tuple[Generate, Outputs]:
+    """The vectors take the encoder that makes their bytes as an argument; it is construct's."""
+    vectors, construct = _backend("vectors"), _backend("construct")
+
+    def generate(protocol: Protocol, options: Options) -> Outputs:
+        outputs: Outputs = vectors.generate(protocol, options, construct.live(protocol))
+        return outputs
+
+    return generate, vectors.shared()
+
+
+def _target(name: str, summary: str) -> Target:
+    return Target(name, summary, partial(_plain, name))
+
+
+TARGETS = {
+    target.name: target
+    for target in (
+        _target("python", "typed module, standard library only"),
+        _target("c", "self-contained C99 header"),
+        _target("construct", "structures for the construct library"),
+        Target("vectors", "test vectors as JSON", _vectors),
+    )
+}
+
+
+#: Parts of docs/ that are made from the code; in the project's own repository alone.
+REFERENCE = "reference"
+
+
+def reference_outputs() -> Outputs:
+    """Documentation of the schema language: rules, reference, JSON Schema; paths below the repository."""
+    documents = importlib.import_module("qlinkgen.schema.documents")
+    outputs: Outputs = documents.outputs()
+    return outputs

@@ -1,0 +1,31 @@
+"""`make demo` shows three outputs that agree."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.cli.test_boundary import ENVIRONMENT
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+def demo(environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(REPOSITORY / "examples" / "demo.py")]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_all_three_agree(require_tool: Callable[..., str]) -> None:
+    require_tool("gcc", package="gcc")
+    done = demo(ENVIRONMENT)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("\n  equal\n") == 3
+    assert "00 12 d6 87 d6 e3" in done.stdout
+
+
+def test_without_a_compiler() -> None:
+    done = demo({**ENVIRONMENT, "PATH": "/nowhere", "CC": ""})
+    assert done.returncode == 2
+    assert "apt-get install gcc" in done.stderr

@@ -1,0 +1,316 @@
+"""`qlinkgen encode` and `decode`: scripts rely on what goes in and comes out."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.cli.conftest import Run
+from tests.cli.test_boundary import COMMAND, ENVIRONMENT
+
+#: Message, arguments, wire bytes; worked out by hand but for the check values.
+GOLDEN = [
+    ("qlink motor_position --node 3", "a5a504210315e8"),
+    ("qlink motion --node 3 counter=1 outputs=0x0F segments=100,200", "a5a50a2003010f006400c86bb6"),
+    ("qlink motion.request --node 3 counter=1 outputs=15 segments=[100,200]", "a5a50a2003010f006400c86bb6"),
+    ("qlink motion.response --node 3 position=-5 motor_status=running|position_valid",
+     "a5a50d20030000fffffffb000300f525"),
+    ("qlink node_sync counter=9", "a5a505050009"),
+    ("qlink node_setup --node 0 node_number=4 t1_delay=0.3 position_type=metronix", "a5a508010004030a02"),
+    ("qlink write --node 1 offset=0 data=A5a5", "a5a507820100a500a500"),
+    ("trio keypad_mode --address 2 mode=on_off", "947f90"),
+    ("trio keypad_mode --node 2 mode=0x7f", "947f90"),
+    ("trio character_transfer --address 15 characters=AZ", "f9415af8"),
+    ("mc1231a set_pos value=1234567", "100012d687"),
+    ("mc1231a set_vel value=2.75", "110002c000"),
+    ("mc1231a get_pos.response --request 4a value=1234567", "0012d687d6e3"),
+    ("mc1231a get_pos.response value=1234567", "0012d687d6e3"),
+    ("mc1231a set_pos.response --request 10fffffff1", "0000"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("command", "wire"), GOLDEN)
+def test_encode(qlinkgen: Run, command: str, wire: str) -> None:
+    result = qlinkgen("encode", *command.split())
+    assert result.code == 0, result.err
+    assert result.out.startswith(wire)
+    assert result.out == result.out.lower()
+    assert len(result.lines) == 1
+
+
+def decoded(qlinkgen: Run, *arguments: str | Path, stdin: bytes = b"", code: int = 0) -> list[dict[str, Any]]:
+    result = qlinkgen("decode", *arguments, stdin=stdin)
+    assert result.code == code, result.out + result.err
+    return [json.loads(line, parse_float=Decimal) for line in result.lines]
+
+
+def encoded(qlinkgen: Run, command: str) -> str:
+    return qlinkgen("encode", *command.split()).out.strip()
+
+
+def test_decode_inverts_encode(qlinkgen: Run) -> None:
+    wire = encoded(qlinkgen, "qlink node_setup --node 0 node_number=4 t1_delay=0.3 position_type=metronix")
+    fields = {
+        "node_number": 4,
+        "t1_delay": Decimal("0.3"),
+        "t2_delay": Decimal("1.0"),
+        "position_type": "metronix",
+    }
+    assert decoded(qlinkgen, "qlink", wire) == [
+        {"message": "node_setup.request", "node": 0, "fields": fields}
+    ]
+
+
+def test_json_in_and_out(qlinkgen: Run) -> None:
+    fields = '{"counter": 255, "inputs": 165, "position": -1, "motor_status": ["running"], "fifo_space": 3}'
+    wire = qlinkgen(
+        "encode", "qlink", "motion.response", "--node", "16", "--json", fields, "fifo_space=4"
+    ).out.strip()
+    (found,) = decoded(qlinkgen, "qlink", "--direction", "response", wire)
+    assert found == {
+        "message": "motion.response",
+        "node": 16,
+        "fields": {"counter": 255, "inputs": 165, "position": -1, "motor_status": 1, "fifo_space": 4},
+    }
+
+
+def test_unnamed_enum_numbers_are_kept(qlinkgen: Run) -> None:
+    wire = encoded(qlinkgen, "qlink node_setup --node 1 position_type=77")
+    assert decoded(qlinkgen, "qlink", wire)[0]["fields"]["position_type"] == 77
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "-2147483648",
+        "2147483647.99999999976716935634613037109375",
+        "-0.25",
+        "0.00000000023283064365386962890625",
+    ],
+)
+def test_every_digit_survives(qlinkgen: Run, value: str) -> None:
+    for arguments in ((f"value={value}",), ("--json", f'{{"value": {value}}}')):
+        wire = qlinkgen(
+            "encode", "trio", "direct_variable_transfer", "--address", "1", *arguments
+        ).out.strip()
+        out = qlinkgen("decode", "trio", wire).out
+        assert f'"value": {value}' in out
+
+
+def test_noise_between_frames_is_fine(qlinkgen: Run) -> None:
+    frame = encoded(qlinkgen, "qlink motor_position --node 3")
+    found = decoded(qlinkgen, "qlink", "00ff" + frame + "a500" + frame + "1234")
+    assert [each["message"] for each in found] == ["motor_position.request"] * 2
+
+
+def test_directions_of_delimited_frames(qlinkgen: Run) -> None:
+    """write_read has the same size both ways; a direct answer is taken for one."""
+    request = encoded(qlinkgen, "qlink write_read --node 3")
+    response = encoded(qlinkgen, "qlink write_read.response --node 3")
+    other = encoded(qlinkgen, "qlink write_read --node 4")
+    assert request == response
+    names = [each["message"] for each in decoded(qlinkgen, "qlink", request + request + request)]
+    assert names == ["write_read.request", "write_read.response", "write_read.request"]
+    names = [each["message"] for each in decoded(qlinkgen, "qlink", request + other + response)]
+    assert names == ["write_read.request"] * 3
+    answer = encoded(qlinkgen, "qlink motion.response --node 3")
+    (found,) = decoded(qlinkgen, "qlink", answer)
+    assert found["message"] == "motion.response"
+    (found,) = decoded(qlinkgen, "qlink", "--direction", "request", answer, code=1)
+    assert found["error"]["kind"] == "length"
+
+
+def test_bad_frames(qlinkgen: Run) -> None:
+    good = encoded(qlinkgen, "qlink motor_position --node 3")
+    bad = good[:-1] + ("0" if good[-1] != "0" else "1")
+    found = decoded(qlinkgen, "qlink", "00" + bad + good + "a5a50421", code=1)
+    assert [each.get("message") or each["error"]["kind"] for each in found] == [
+        "crc",
+        "motor_position.request",
+        "truncated",
+    ]
+    assert found[0]["error"]["offset"] == 1
+    assert found[0]["error"]["raw"] == bad
+    assert set(found[0]["error"]) == {"kind", "offset", "raw", "message"}
+    assert found[2]["error"]["offset"] == 15
+
+
+@pytest.mark.parametrize("wire", ["", "00", "a5"])
+def test_no_frame_at_all(qlinkgen: Run, wire: str) -> None:
+    result = qlinkgen("decode", "qlink", "-", stdin=wire.encode())
+    assert result.code == 1
+    assert "no frame" in result.err or "no bytes" in result.err
+
+
+def test_standard_input(qlinkgen: Run) -> None:
+    frame = encoded(qlinkgen, "qlink motor_position --node 3")
+    spaced = " ".join(frame).upper().replace(" ", "\n", 3).encode()
+    for arguments, stdin in (
+        ((), spaced),
+        (("-",), spaced),
+        (("--raw",), bytes.fromhex(frame)),
+        (("-", "--raw"), bytes.fromhex(frame)),
+    ):
+        (found,) = decoded(qlinkgen, "qlink", *arguments, stdin=stdin)
+        assert found["node"] == 3
+    assert qlinkgen("decode", "qlink", "-", stdin=b"a5a").code == 2
+    assert qlinkgen("decode", "qlink", "-", stdin=b"a5 zz").code == 2
+    assert qlinkgen("decode", "qlink", "--raw", "a5").code == 2
+
+
+def test_output_comes_frame_by_frame(qlinkgen: Run) -> None:
+    """Who pipes a live line into decode sees each frame when it is there."""
+    frame = encoded(qlinkgen, "trio keypad_mode --address 2")
+    with subprocess.Popen([*COMMAND, "decode", "trio", "-"], env=ENVIRONMENT, stdin=-1, stdout=-1) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for half in (frame[:3], frame[3:]):
+            process.stdin.write(half.encode())
+            process.stdin.flush()
+        assert b'"keypad_mode"' in process.stdout.readline()
+        process.stdin.close()
+        assert process.wait(10) == 0
+
+
+def test_marked_frames(qlinkgen: Run) -> None:
+    found = decoded(qlinkgen, "trio", "947f90" + "8a", code=1)
+    assert found[0] == {"message": "keypad_mode", "address": 2, "fields": {"mode": "on_off"}}
+    assert found[1]["error"]["kind"] == "truncated"
+    assert qlinkgen("decode", "trio", "--direction", "request", "947f90").code == 2
+
+
+def test_a_conversation_of_packets(qlinkgen: Run) -> None:
+    wire = "02" + "0003" + "0005" + "10ffff8000" + "4a" + "0012d687d6e3" + "4a" + "4a"
+    found = decoded(qlinkgen, "mc1231a", wire)
+    names = ["set_2.request", "set_2.response", "set_pos.request", "get_pos.request", "get_pos.response"]
+    assert [each["message"] for each in found] == [*names, "get_pos.request", "get_pos.request"]
+    assert found[4]["fields"] == {"value": 1234567}
+    assert "node" not in found[0]
+
+
+def test_one_side_of_packets(qlinkgen: Run) -> None:
+    found = decoded(qlinkgen, "mc1231a", "--direction", "request", "02100000000a4a")
+    assert [each["message"] for each in found] == ["set_2.request", "set_pos.request", "get_pos.request"]
+    for arguments in (("--request", "4a"), ("--direction", "response", "--request", "4a")):
+        (answer,) = decoded(qlinkgen, "mc1231a", *arguments, "0012d687d6e3")
+        assert answer == {"message": "get_pos.response", "fields": {"value": 1234567}}
+    kinds = [
+        each["error"]["kind"]
+        for each in decoded(
+            qlinkgen, "mc1231a", "--request", "4a", "0012d6870000" + "0012d687d6e4" + "00", code=1
+        )
+    ]
+    assert kinds == ["illegal", "crc", "truncated"]
+    assert "--request" in qlinkgen("decode", "mc1231a", "--direction", "response", "00").err
+
+
+def test_a_refused_command_in_a_conversation(qlinkgen: Run) -> None:
+    found = decoded(qlinkgen, "mc1231a", "4a" + "ffffffff0000" + "02", code=1)
+    assert [each.get("message") or each["error"]["kind"] for each in found] == [
+        "get_pos.request",
+        "illegal",
+        "set_2.request",
+    ]
+
+
+def test_an_own_schema(qlinkgen: Run, thermo: Path) -> None:
+    wire = qlinkgen("encode", thermo, "set_target", "--node", "3", "target=21.5", "mode=cool").out.strip()
+    assert wire == "7e81" + "0303" + "10" + "02" + "6608" + "86"
+    answer = qlinkgen(
+        "encode", thermo, "get_log.response", "--node", "3", "samples=-1,2", "heating=true", "level=5"
+    )
+    assert answer.out.strip() == "7e81" + "0306" + "11" + "02" + "ffff0200" + "51" + "6d"
+    assert "get_log.response is unconfirmed" in answer.err
+    found = decoded(qlinkgen, thermo, "99" + wire + answer.out.strip())
+    assert found[0] == {
+        "message": "set_target.request",
+        "unit": 3,
+        "fields": {"mode": "cool", "target": Decimal("21.5")},
+    }
+    assert found[1]["fields"] == {"samples": [-1, 2], "heating": True, "level": 5}
+
+
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("qlink moton --node 1", "did you mean motion"),
+        ("qlink motion", "does not say for whom; give --node N with N in 1..16"),
+        ("qlink motion --node x", "not a whole number"),
+        ("qlink motion --node 17", "1..16"),
+        ("qlink motion --node 1 countr=1", "did you mean counter?"),
+        ("qlink motion --node 1 counter", "is no FIELD=VALUE"),
+        ("qlink motion --node 1 counter=256", "0..255"),
+        ("qlink motion --node 1 counter=a", "'a' is not a whole number"),
+        ("qlink motion --node 1 segments=1,2,3,4,5,6,7,8,9,10,11,12,13", "12"),
+        ("qlink node_setup --node 1 t1_delay=25.6", "25.5"),
+        ("qlink node_setup --node 1 t1_delay=nan", "nan"),
+        (
+            "qlink node_setup --node 1 position_type=nothing",
+            "one of none, jvl_mactalk, metronix, or a number",
+        ),
+        ("qlink write --node 1 offset=0 data=a", "pairs of hex digits"),
+        ("qlink motion --node 1 --json [1]", "a JSON object is needed"),
+        ("qlink motion --node 1 --json {", "no JSON at character"),
+        ('qlink motion --node 1 --json {"counter":1,"counter":2}', "stands there twice"),
+        ('qlink motion --node 1 --json {"counter":NaN}', "NaN is no number"),
+        ('qlink motion --node 1 --json {"counter":1.5}', "not a whole number"),
+        ('qlink motion --node 1 --json {"counter":null}', "not a whole number"),
+        ("mc1231a set_pos --node 1", "has no address"),
+        ("mc1231a set_pos.response", "give it with --request HEX"),
+        ("mc1231a get_pos.response --request 02", "which get_pos.response does not answer"),
+        ("mc1231a get_pos.response --request ff", "--request ff"),
+        ("qlink motion --node 1 --request 00", "leave out --request"),
+        ("trio character_transfer --address 1 characters=\u00e4", "characters"),
+    ],
+)
+def test_wrong_values(qlinkgen: Run, command: str, said: str) -> None:
+    result = qlinkgen("encode", *command.split())
+    assert result.code == 2
+    assert said in result.err
+    assert result.out == ""
+
+
+def test_fields_that_the_codec_fills(qlinkgen: Run, thermo: Path) -> None:
+    result = qlinkgen("encode", thermo, "get_log.response", "--node", "1", "count=2")
+    assert result.code == 2
+    assert "'count' is filled by the encoder" in result.err
+
+
+@pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])
+def test_another_crc(qlinkgen: Run, protocol: str) -> None:
+    result = qlinkgen("encode", "qlink", "motor_position", "--node", "3", "--set", "crc=crc-16/xmodem")
+    assert result.out.startswith("a5a5042103")
+    assert qlinkgen("decode", "qlink", result.out.strip()).code == 1
+    assert qlinkgen("decode", "qlink", result.out.strip(), "--set", "crc=xmodem").code == 0
+    assert qlinkgen("explain", "qlink", result.out.strip(), "--set", "crc=xmodem").code == 0
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(data=st.binary(max_size=60), mixed=st.booleans())
+@pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])
+def test_any_bytes_end_without_a_traceback(qlinkgen: Run, protocol: str, data: bytes, mixed: bool) -> None:
+    """Random bytes, and ones that frames are made of, so that some of them come far."""
+    if mixed:
+        likely = bytes.fromhex("a5a50420210300034a10948a92")
+        data = bytes(likely[byte % len(likely)] for byte in data)
+    for command in ("decode", "explain"):
+        result = qlinkgen(command, protocol, data.hex() or "00")
+        assert result.code in (0, 1), result.err
+        assert "a fault of qlinkgen" not in result.err
+    for line in qlinkgen("decode", protocol, "-", "--raw", stdin=data).lines:
+        assert set(json.loads(line)) <= {"message", "node", "address", "fields", "error"}
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(text=st.text(max_size=20))
+def test_any_text_as_hex(qlinkgen: Run, text: str) -> None:
+    result = qlinkgen("decode", "qlink", "--", text)
+    assert result.code in (1, 2)
+    assert "a fault of qlinkgen" not in result.err

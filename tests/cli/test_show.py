@@ -1,0 +1,89 @@
+"""`qlinkgen show`: what a person looks up in it is there, and a pipe gets it unfolded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Run
+
+
+@pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])
+def test_a_protocol(qlinkgen: Run, protocol: str) -> None:
+    result = qlinkgen("show", protocol)
+    assert result.code == 0
+    assert result.err == ""
+    assert protocol in result.lines[0]
+    assert "\x1b" not in result.out
+
+
+def test_the_commands_of_qlink(qlinkgen: Run) -> None:
+    out = qlinkgen("show", "qlink").out
+    (motion,) = [line.split() for line in out.splitlines() if line.startswith("0x20")]
+    assert motion == [
+        "0x20",
+        "motion",
+        "2..26",
+        "9",
+        "61",
+        "+",
+        "27",
+        "one",
+        "node",
+        "3",
+        "byte",
+        "times",
+        "by",
+        "counter",
+        "7.10",
+    ]
+    assert "crc-16/ibm-3740 over length, command, node, data" in out
+    assert "a byte 00 is inserted behind every A5" in out
+
+
+def test_the_command_shows_both_messages(qlinkgen: Run) -> None:
+    out = qlinkgen("show", "qlink", "motion").out
+    assert "motion.request, id 0x20" in out
+    assert "motion.response, id 0x20" in out
+    assert "payload 9 bytes, frame 16, on the wire at most 27, node 1..16" in out
+    (position,) = [line for line in out.splitlines() if "position  " in line and "i32" in line]
+    assert position.split()[:4] == ["2", "position", "4", "i32"]
+    assert "encoder counts" in position
+    assert "|  +-- running: The motor runs" in out
+
+
+def test_a_message_alone(qlinkgen: Run) -> None:
+    out = qlinkgen("show", "trio", "direct_variable_transfer").out
+    assert "1/2^32" in out
+    assert "-2147483648..2147483647.99999999976716935634613037109375" in out
+
+
+def test_unconfirmed_is_marked_and_announced(qlinkgen: Run) -> None:
+    result = qlinkgen("show", "mc1231a", "get_vel")
+    assert "unconfirmed" in result.out
+    assert "warning: get_vel.request is unconfirmed" in result.err
+    (row,) = [line for line in qlinkgen("show", "mc1231a").lines if line.startswith("0x4B ")]
+    assert row.endswith("unconfirmed")
+
+
+def test_bits_counts_and_steps_of_an_own_schema(qlinkgen: Run, thermo: Path) -> None:
+    out = qlinkgen("show", thermo, "get_log.response").out
+    assert "items of samples" in out
+    assert "i16 little[0..8, by count]" in out
+    assert "  7  6  5  4  3  2  1  0" in out
+    assert "+-- heating" in out
+    out = qlinkgen("show", thermo, "set_target").out
+    assert "-40..85" in out
+    assert "1/100" in out
+    assert "degC" in out
+
+
+def test_unknown_names(qlinkgen: Run) -> None:
+    result = qlinkgen("show", "qlink", "moton")
+    assert result.code == 2
+    assert "no message 'moton'; did you mean motion" in result.err
+    assert "is not answered" in qlinkgen("show", "qlink", "node_sync.response").err
+    result = qlinkgen("show", "qlnk")
+    assert result.code == 2
+    assert "did you mean 'qlink'?" in result.err
