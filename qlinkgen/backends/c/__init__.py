@@ -1,0 +1,28 @@
+"""C headers: one self-contained C99 header for each protocol."""
+
+from __future__ import annotations
+
+import functools
+
+import jinja2
+
+from qlinkgen.backends.base import Options, Outputs, environment
+from qlinkgen.backends.c.header import Header
+from qlinkgen.model.protocol import Protocol
+
+__all__ = ["generate", "shared"]
+
+
+def generate(protocol: Protocol, options: Options) -> Outputs:
+    """The header of a protocol."""
+    return {f"c/{protocol.name}.h": Header(protocol, options, _templates()).text()}
+
+
+def shared() -> Outputs:
+    """Nothing: a header needs no other file."""
+    return {}
+
+
+@functools.cache
+def _templates() -> jinja2.Environment:
+    return environment(__name__)

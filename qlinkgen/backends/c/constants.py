@@ -1,0 +1,71 @@
+"""Limits of a protocol, its enums and flags, as macros."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qlinkgen.backends.c.describe import wrapped
+from qlinkgen.backends.c.names import Names, integer_type, literal, unsigned
+from qlinkgen.model import sizes
+from qlinkgen.model.message import Message
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Constant, Enum, Flags
+
+
+def limits(protocol: Protocol, kept: tuple[Message, ...]) -> list[tuple[str, str]]:
+    """Names and values of what holds for the whole protocol."""
+    bus, frame = protocol.bus, protocol.frame
+    longest = max((sizes.max_frame_size(frame, message) for message in protocol.messages), default=0)
+    values = [
+        ("MAX_PAYLOAD_SIZE", f"{sizes.max_payload(protocol)}u"),
+        (
+            "MAX_FRAME_SIZE",
+            f"{max(longest, sizes.frame_size(frame, protocol.messages[0], sizes.max_payload(protocol)))}u",
+        ),
+        ("MAX_WIRE_SIZE", f"{max((sizes.max_wire_size(frame, m) for m in kept), default=0)}u"),
+    ]
+    if bus.nodes:
+        values += [("FIRST_NODE", f"{bus.nodes[0]}u"), ("LAST_NODE", f"{bus.nodes[1]}u")]
+    if bus.broadcast is not None:
+        values.append(("BROADCAST", f"{bus.broadcast}u"))
+    if bus.baud is not None:
+        values.append(("BAUD", f"{bus.baud}ul"))
+    return [*values, ("BITS_PER_BYTE", f"{bus.bits_per_byte}u")]
+
+
+def enum_views(protocol: Protocol, names: Names) -> list[dict[str, Any]]:
+    """Enums and flags for the template."""
+    return [_view(each, names) for each in _all(protocol)]
+
+
+def _all(protocol: Protocol) -> list[Enum | Flags]:
+    return [*protocol.enums, *protocol.flags]
+
+
+def _view(each: Enum | Flags, names: Names) -> dict[str, Any]:
+    is_enum = isinstance(each, Enum)
+    signed = is_enum and any(member.value < 0 for member in each.members)
+    kind = "Enum" if is_enum else "Flags"
+    section = f" (section {each.section})" if each.section else ""
+    doc = " ".join(wrapped(f"{each.doc}"))
+    return {
+        "name": each.name,
+        "is_enum": is_enum,
+        "type": integer_type(each.bits, signed=signed),
+        "title": f"{kind} {each.name}{section}{': ' + doc if doc else ''}",
+        "members": [
+            {
+                "name": member.name,
+                "constant": f"{names.upper}_{each.name.upper()}_{member.name.upper()}",
+                "value": _number(member, each, signed=signed),
+                "doc": " ".join(wrapped(member.doc)),
+            }
+            for member in each.members
+        ],
+    }
+
+
+def _number(member: Constant, each: Enum | Flags, *, signed: bool) -> str:
+    if isinstance(each, Flags):
+        return unsigned(1 << member.value, each.bits, hexadecimal=True)
+    return literal(member.value, each.bits, signed=signed)

@@ -1,0 +1,102 @@
+"""Dispatch tables: one function pointer for each command of a slave, for each response of a master."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qlinkgen.backends.c.describe import wrapped
+from qlinkgen.backends.c.names import Names
+from qlinkgen.model.message import Message
+from qlinkgen.model.naming import C_RESERVED, snake
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.transaction import Allowance, Bus, Command
+
+#: Members that a table has beside its functions.
+_TAKEN = frozenset({"node", "address", "broadcast", "context", "id"})
+
+
+def member_name(name: str) -> str:
+    """A command's name as a member of a table; a word of C, or one the table uses itself, gets a suffix."""
+    return f"{name}_" if name in C_RESERVED or name in _TAKEN else name
+
+
+def told_name(names: Names, message: Message) -> str:
+    """The member for a message that a master or a listener is told of."""
+    stem = names.stem(message)
+    return member_name(stem.removesuffix("_response") if message.direction == "response" else stem)
+
+
+def slave_entries(names: Names, kept: tuple[Message, ...]) -> list[dict[str, Any]]:
+    """What a slave can be asked, in schema order."""
+    entries, present = [], {message.name for message in kept}
+    for message in kept:
+        if message.direction == "response":
+            continue
+        command = names.command_of(message)
+        answer = command.response if command else None
+        answer = answer if answer and answer.name in present else None
+        entries.append(_entry(names, message, answer, command))
+    return entries
+
+
+def _entry(names: Names, message: Message, answer: Message | None, command: Command | None) -> dict[str, Any]:
+    addressing = command.addressing if command else "none"
+    return {
+        "name": member_name(snake(command.name) if command else names.stem(message)),
+        "constant": names.constant(message),
+        "function": names.function(message),
+        "has_struct": bool(message.values),
+        "has_bytes": bool(message.fields),
+        "answered": answer is not None,
+        "answer_function": names.function(answer) if answer else "",
+        "answer_constant": names.constant(answer) if answer else "",
+        "answer_struct": bool(answer and answer.values),
+        "refuses_broadcast": addressing == "node",
+        "broadcast_only": addressing == "broadcast",
+        "silent_broadcast": answer is not None and addressing == "either",
+        "doc": wrapped(command.doc if command else message.doc)[:1],
+    }
+
+
+def master_entries(names: Names, kept: tuple[Message, ...]) -> list[dict[str, Any]]:
+    """What a master can be told, in schema order."""
+    return [
+        {
+            "name": told_name(names, message),
+            "constant": names.constant(message),
+            "function": names.function(message),
+            "has_struct": bool(message.values),
+            "has_bytes": bool(message.fields),
+        }
+        for message in kept
+        if message.direction != "request"
+    ]
+
+
+def transactions(protocol: Protocol, upper: str, commands: tuple[Command, ...]) -> list[dict[str, Any]]:
+    """Constants of each transaction."""
+    return [
+        {
+            "constant": f"{upper}_{snake(command.name).upper()}",
+            "name": command.name,
+            "answered": int(command.response is not None),
+            "bits": _bits(command.response_within, protocol.bus),
+            "microseconds": _microseconds(command.response_within),
+            "repeat_safe": int(command.repeat.safe),
+            "in_flight": command.in_flight,
+            "broadcast": {"node": 0, "none": 0, "broadcast": 1, "either": 2, "answered_broadcast": 2}[
+                command.addressing
+            ],
+        }
+        for command in commands
+    ]
+
+
+def _bits(allowance: Allowance, bus: Bus) -> int:
+    bits = allowance.byte_times * bus.bits_per_byte
+    return -(-bits.numerator // bits.denominator)
+
+
+def _microseconds(allowance: Allowance) -> int:
+    time = allowance.seconds * 1_000_000
+    return -(-time.numerator // time.denominator)

@@ -1,0 +1,128 @@
+"""The frame of a protocol as one object, whatever its kind: templates, values, calls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from qlinkgen.backends.c import crc, delimited_view, framing
+from qlinkgen.backends.c.delimited import DelimitedWriter
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.marked import marked_view, shapes
+from qlinkgen.backends.c.names import Names
+from qlinkgen.backends.c.packet import packet_from_frame, packet_view, sizes_by_value
+from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
+from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.protocol import Protocol
+
+
+@dataclass
+class FrameSection:
+    """What the header places for its frame."""
+
+    protocol: Protocol
+    view: dict[str, Any]
+    check: dict[str, Any] | None
+    templates: tuple[str, ...]
+    receivers: tuple[str, ...]
+    #: There is a receiver for slaves alone (packets: an answer cannot be told from the next one).
+    slave_only: bool = False
+    has_checks: bool = True
+
+    @property
+    def rescans(self) -> bool:
+        """One byte can bring several events."""
+        return "receiver_rescan" in self.receivers
+
+    @property
+    def needs_ids(self) -> bool:
+        """Receiving a frame needs to know the messages, so their ids stand in front of them."""
+        return bool(self.view.get("needs_direction")) or not isinstance(self.protocol.frame, DelimitedFrame)
+
+    def groups(
+        self, names: Names, received: list[tuple[Direction, tuple[Message, ...]]]
+    ) -> list[dict[str, Any]]:
+        """What a receiver knows of the messages, for each direction."""
+        frame, upper = self.protocol.frame, names.upper
+        if isinstance(frame, PacketFrame):
+            return [group for d, m in received if d == "request" for group in sizes_by_value(names, m)]
+        if not isinstance(frame, MarkedFrame):
+            return []
+        return [
+            {"direction": f"{upper}_{d.upper()}", "messages": shapes(names, m, frame)} for d, m in received
+        ]
+
+    def to_frame(self, names: Names, address: framing.Address, message: Message) -> dict[str, Any]:
+        """The function that makes a whole frame."""
+        found = framing.to_frame(self.protocol, names, address, message)
+        return {
+            **found,
+            "parameters": found["parameters"].replace("{sum_type}", self.view.get("sum_type", "")),
+        }
+
+    def from_frame(self, names: Names, message: Message) -> dict[str, Any] | None:
+        """The function that takes a whole frame apart, where the frame alone does not tell its message."""
+        if not self.slave_only or message.direction != "response":
+            return None
+        return packet_from_frame(names, message, self.view)
+
+    def left_out(self, role: str) -> str:
+        """The direction that a role never receives."""
+        return {"slave": "response", "master": "request"}[role]
+
+    def dispatch_view(self, protocol: Protocol, upper: str) -> dict[str, Any]:
+        """What the dispatch template needs of the frame."""
+        name, ring = self.view["address"], protocol.directions == ("message",)
+        return {
+            "is_broadcast": f"frame->{name} == {upper}_BROADCAST"
+            if protocol.bus.broadcast is not None
+            else "false",
+            "slave_arguments": f"slave->{name}, " if name else self.view.get("slave_arguments", ""),
+            "unknown_answer": self.view.get("unknown_answer", "0u"),
+            "listener": "listener" if ring else "master",
+            "listener_title": "Listener" if ring else "Master",
+            "listener_address": f", {self.view['address_type']} {name}" if name else "",
+            "listener_argument": f", frame->{name}" if name else "",
+        }
+
+    def slave_entry(self, entry: dict[str, Any], upper: str) -> dict[str, Any]:
+        """Conditions of one command of a slave."""
+        has_address = bool(self.view["address"])
+        condition = ""
+        if has_address and entry["refuses_broadcast"]:
+            condition = "slave->broadcast ? 0u : "
+        elif has_address and entry["broadcast_only"]:
+            condition = "!slave->broadcast ? 0u : "
+        target = "&request, " if entry["has_struct"] else ""
+        call = f"{entry['function']}_decode({target}frame->payload, frame->size)"
+        wrong = f"{call} != {upper}_OK" if entry["has_bytes"] else "frame->size != 0u"
+        silent = " || slave->broadcast" if has_address and entry["silent_broadcast"] else ""
+        reject = (
+            f"{self.view['reject']}({entry['answer_constant']}_MIN_SIZE, wire, capacity)"
+            if self.view.get("reject")
+            else "0u"
+        )
+        return {"unsupported": reject, "condition": condition, "refused": wrong, "silent": silent}
+
+
+def frame_section(protocol: Protocol, layouts: Layouts) -> FrameSection:
+    """Choose by the kind of frame."""
+    frame = protocol.frame
+    if isinstance(frame, DelimitedFrame):
+        return _delimited(protocol, frame, layouts)
+    check = crc.render(frame.checksum)
+    if isinstance(frame, MarkedFrame):
+        view = marked_view(protocol, frame)
+        return FrameSection(protocol, view, check, ("marked",), ("receiver_marked",))
+    view = packet_view(protocol, frame)
+    return FrameSection(protocol, view, None, ("packet",), ("receiver_packet",), slave_only=True)
+
+
+def _delimited(protocol: Protocol, frame: DelimitedFrame, layouts: Layouts) -> FrameSection:
+    writer = DelimitedWriter(protocol, frame, layouts)
+    view = delimited_view.render(protocol, frame, writer)
+    part = frame.part("checksum")
+    check = crc.render(part.checksum if part else None)
+    own = "frame_stuffed" if writer.stuffed_whole else "frame_plain"
+    receiver = "receiver_streamed" if writer.streamed else "receiver_rescan"
+    return FrameSection(protocol, view, check, (own, "frame_public"), (receiver,))

@@ -1,0 +1,183 @@
+"""One protocol's header: the render model of every section, in the order in which they stand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jinja2
+
+from qlinkgen.backends.base import Options, banner
+from qlinkgen.backends.c import dispatch, framing
+from qlinkgen.backends.c.constants import enum_views, limits
+from qlinkgen.backends.c.describe import wrapped
+from qlinkgen.backends.c.example import example_lines, option_lines
+from qlinkgen.backends.c.extents import extents
+from qlinkgen.backends.c.frames import FrameSection, frame_section
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.messages import MessageWriter, nearest_helpers
+from qlinkgen.backends.c.names import Names
+from qlinkgen.backends.c.tidy import tidy
+from qlinkgen.model import sizes
+from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.naming import snake
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.transaction import Command
+from qlinkgen.model.types import Blob
+
+
+class Header:
+    """Collects the sections of one header."""
+
+    def __init__(self, protocol: Protocol, options: Options, templates: jinja2.Environment) -> None:
+        """What is kept is decided once, here."""
+        self._protocol = protocol
+        self._options = options
+        self._templates = templates
+        self._names = Names(protocol)
+        self._layouts = Layouts(protocol.name)
+        self._kept = tuple(message for message in protocol.messages if self._wanted(message))
+        self._present = {message.name for message in self._kept}
+        self._section = frame_section(protocol, self._layouts)
+        self._address = framing.address_of(protocol, self._section.view["address"])
+
+    def text(self) -> str:
+        """The whole header."""
+        sections = [
+            self._check_value(),
+            self._place("frame_common", f=self._section.view),
+            *self._directions(),
+            *[self._frame_part(name) for name in self._section.templates],
+            *[self._message(message) for message in self._kept],
+            *self._checks(),
+            *[self._frame_part(name) for name in self._receivers()],
+            self._dispatch(),
+        ]
+        return tidy(self._place("header", **self._head(), body="".join(sections)))
+
+    # What is kept
+
+    def _wanted(self, message: Message) -> bool:
+        only, command = self._options.only, self._names.command_of(message)
+        return not only or message.name in only or (command is not None and command.name in only)
+
+    def _encoded(self, message: Message) -> bool:
+        return self._sent_by(message) in ("both", self._options.role) or self._options.role == "both"
+
+    def _decoded(self, message: Message) -> bool:
+        sender = self._sent_by(message)
+        return self._options.role == "both" or sender == "both" or sender != self._options.role
+
+    @staticmethod
+    def _sent_by(message: Message) -> str:
+        return {"request": "master", "response": "slave", "message": "both"}[message.direction]
+
+    def _received(self) -> list[tuple[Direction, tuple[Message, ...]]]:
+        """Messages that are decoded, for each direction that a receiver can wait for."""
+        found: list[tuple[Direction, tuple[Message, ...]]] = []
+        for direction in self._protocol.directions:
+            if self._options.role != "both" and direction == self._section.left_out(self._options.role):
+                continue
+            messages = tuple(m for m in self._protocol.received(direction) if m.name in self._present)
+            if messages:
+                found.append((direction, messages))
+        return found
+
+    # Sections
+
+    def _place(self, template: str, **values: Any) -> str:
+        return self._templates.get_template(f"templates/{template}.h.j2").render(
+            p=self._names.prefix, P=self._names.upper, **values
+        )
+
+    def _frame_part(self, template: str) -> str:
+        groups = self._section.groups(self._names, self._received())
+        return self._place(template, f=self._section.view, crc=self._section.check, shapes=groups)
+
+    def _check_value(self) -> str:
+        check = self._section.check
+        if check is None:
+            return ""
+        return "\n" + self._place("crc" if check["is_crc"] else "sum", crc=check)
+
+    def _directions(self) -> list[str]:
+        """What a receiver has to know of the messages before it can find the end of a frame."""
+        if not self._section.needs_ids:
+            return []
+        names, view = self._names, self._section.view
+        received = [(f"{names.upper}_{direction.upper()}", m) for direction, m in self._received()]
+        texts = ["\n", *(self._id_constant(message) for message in self._kept)]
+        if view["reports_runs"]:
+            address = self._address
+            admits = [{"direction": d, "messages": framing.checks(names, address, m)} for d, m in received]
+            texts.append(self._place("admit", f=view, admits=admits))
+        if view["needs_extent"]:
+            get = self._layouts.get
+            sizes_known = [{"direction": d, "messages": extents(names, m, get)} for d, m in received]
+            texts.append(self._place("extent", f=view, extents=sizes_known))
+        return texts
+
+    def _id_constant(self, message: Message) -> str:
+        return f"#define {self._names.constant(message)}_ID 0x{message.id:02X}\n"
+
+    def _message(self, message: Message) -> str:
+        writer = MessageWriter(self._protocol, self._names, self._layouts)
+        view = writer.render(message, encoded=self._encoded(message), decoded=self._decoded(message))
+        view["early_id"] = self._section.needs_ids
+        if self._encoded(message):
+            view["to_frame"] = self._section.to_frame(self._names, self._address, message)
+        if self._decoded(message):
+            view["from_frame"] = self._section.from_frame(self._names, message)
+        return self._place("message", m=view)
+
+    def _checks(self) -> list[str]:
+        if not self._section.has_checks:
+            return []
+        checks = [
+            {"direction": direction, "messages": framing.checks(self._names, self._address, messages)}
+            for direction, messages in self._received()
+        ]
+        return [self._place("checks", checks=checks, f=self._section.view)]
+
+    def _receivers(self) -> tuple[str, ...]:
+        """Packets have a receiver for slaves alone."""
+        return () if self._options.role == "master" and self._section.slave_only else self._section.receivers
+
+    def _dispatch(self) -> str:
+        ring = self._protocol.directions == ("message",)
+        commands: tuple[Command, ...] = tuple(
+            c for c in self._protocol.commands if c.request.name in self._present
+        )
+        slave = [] if ring or self._options.role == "master" else self._slave()
+        master = (
+            []
+            if self._options.role == "slave" and not ring
+            else dispatch.master_entries(self._names, self._kept)
+        )
+        transactions = dispatch.transactions(self._protocol, self._names.upper, commands)
+        view = {**self._section.view, **self._section.dispatch_view(self._protocol, self._names.upper)}
+        view["example_command"] = snake(commands[0].name).upper() if commands else ""
+        if self._section.slave_only:
+            master = []
+        return self._place("dispatch", f=view, slave=slave, master=master, transactions=transactions)
+
+    def _slave(self) -> list[dict[str, Any]]:
+        entries = dispatch.slave_entries(self._names, self._kept)
+        return [{**entry, **self._section.slave_entry(entry, self._names.upper)} for entry in entries]
+
+    def _head(self) -> dict[str, Any]:
+        protocol = self._protocol
+        return {
+            "banner": [piece for line in banner(protocol) for piece in wrapped(line)],
+            "about": wrapped(protocol.doc),
+            "options": option_lines(self._names.upper, self._section.check),
+            "example": example_lines(protocol, self._names, self._section, self._kept, self._options.role),
+            "max_wire_size": sizes.protocol_max_wire_size(protocol),
+            "limits": limits(protocol, self._kept),
+            "enums": enum_views(protocol, self._names),
+            "helpers": self._layouts.helpers(),
+            "has_text": any(isinstance(f.type, Blob) and f.type.text for m in self._kept for f in m.fields),
+            "nearest": nearest_helpers(self._kept),
+        }
+
+
+__all__ = ["FrameSection", "Header"]

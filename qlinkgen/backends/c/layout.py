@@ -1,0 +1,120 @@
+"""How integers lie in bytes: one pair of functions for each layout that a protocol uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from qlinkgen.backends.c.names import unsigned, unsigned_type
+from qlinkgen.model.types import Chunk, Scalar
+
+Chunks = tuple[Chunk, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Helper:
+    """Lines of the functions for one layout."""
+
+    comment: str
+    lines: tuple[str, ...]
+
+
+@dataclass
+class Layouts:
+    """The layouts in use, in order of their first use, and the calls that read and write with them."""
+
+    prefix: str
+    _names: dict[tuple[int, Chunks], str] = field(default_factory=dict)
+    _partial: set[tuple[int, Chunks]] = field(default_factory=set)
+    _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
+
+    def put(self, scalar: Scalar, place: str, offset: int, value: str) -> str:
+        """A statement that writes an unsigned value."""
+        if scalar.size == 1:
+            return f"{place}[{offset}] = {value};"
+        return f"{self._call('put', scalar)}({pointer(place, offset)}, {value});"
+
+    def get(self, scalar: Scalar, place: str, offset: int) -> str:
+        """An expression for the unsigned value that is there."""
+        if scalar.size == 1:
+            return f"{place}[{offset}]"
+        return f"{self._call('get', scalar)}({pointer(place, offset)})"
+
+    def misfit(self, scalar: Scalar, place: str, offset: int) -> str | None:
+        """A condition that holds where bits of no chunk are set, None where there are no such bits."""
+        if all(chunk.bits == 8 for chunk in scalar.chunks):
+            return None
+        if scalar.size == 1:
+            return (
+                f"({place}[{offset}] & {unsigned(scalar.chunks[0].mask ^ 0xFF, 8, hexadecimal=True)}) != 0u"
+            )
+        self._partial.add((scalar.bits, scalar.chunks))
+        return f"{self._call('misfit', scalar)}({pointer(place, offset)})"
+
+    def helpers(self) -> list[Helper]:
+        """The functions of every layout in use."""
+        return [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
+
+    def _call(self, verb: str, scalar: Scalar) -> str:
+        key = (scalar.bits, scalar.chunks)
+        self._used.add((verb, *key))
+        if key not in self._names:
+            self._names[key] = self._name(scalar)
+        return f"{self.prefix}_{verb}_{self._names[key]}_"
+
+    def _name(self, scalar: Scalar) -> str:
+        if scalar.byteorder:
+            return f"u{scalar.bits}_{'be' if scalar.byteorder == 'big' else 'le'}"
+        known = sum(1 for name in self._names.values() if name.startswith(f"u{scalar.bits}_groups"))
+        return f"u{scalar.bits}_groups{known or ''}"
+
+    def _helper(self, bits: int, chunks: Chunks, name: str) -> Helper:
+        lines: list[str] = []
+        if ("put", bits, chunks) in self._used:
+            lines += self._putter(bits, chunks, name)
+        if ("get", bits, chunks) in self._used:
+            lines += self._getter(bits, chunks, name)
+        if (bits, chunks) in self._partial:
+            lines += self._checker(chunks, name)
+        places = ", ".join(f"{c.shift}..{c.shift + c.bits - 1}" for c in chunks)
+        return Helper(f"{bits} bits in {len(chunks)} bytes: bits {places}", tuple(lines))
+
+    def _putter(self, bits: int, chunks: Chunks, name: str) -> list[str]:
+        kind = unsigned_type(bits)
+        body = [f"    at[{index}] = {_taken(chunk)};" for index, chunk in enumerate(chunks)]
+        return [f"static inline void {self.prefix}_put_{name}_(uint8_t *at, {kind} value)", "{", *body, "}"]
+
+    def _getter(self, bits: int, chunks: Chunks, name: str) -> list[str]:
+        kind = unsigned_type(bits)
+        terms = [_placed(index, chunk, kind) for index, chunk in enumerate(chunks)]
+        head = f"static inline {kind} {self.prefix}_get_{name}_(const uint8_t *at)"
+        joined = " |\n        ".join(terms)
+        return [head, "{", f"    return ({kind})(\n        {joined});", "}"]
+
+    def _checker(self, chunks: Chunks, name: str) -> list[str]:
+        masks = [(index, chunk.mask ^ 0xFF) for index, chunk in enumerate(chunks) if chunk.bits < 8]
+        terms = " | ".join(f"(at[{index}] & {unsigned(mask, 8, hexadecimal=True)})" for index, mask in masks)
+        return [
+            f"static inline bool {self.prefix}_misfit_{name}_(const uint8_t *at)",
+            "{",
+            f"    return ({terms}) != 0u;",
+            "}",
+        ]
+
+
+def pointer(place: str, offset: int) -> str:
+    """The address of a byte."""
+    return f"{place} + {offset}" if offset else place
+
+
+def _taken(chunk: Chunk) -> str:
+    shifted = f"value >> {chunk.shift}" if chunk.shift else "value"
+    if chunk.bits == 8:
+        return f"(uint8_t)({shifted})"
+    return f"(uint8_t)(({shifted}) & {unsigned(chunk.mask, 8, hexadecimal=True)})"
+
+
+def _placed(index: int, chunk: Chunk, kind: str) -> str:
+    byte = (
+        f"at[{index}]" if chunk.bits == 8 else f"(at[{index}] & {unsigned(chunk.mask, 8, hexadecimal=True)})"
+    )
+    return f"({kind})(({kind}){byte} << {chunk.shift})" if chunk.shift else f"({kind}){byte}"

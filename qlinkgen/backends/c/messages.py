@@ -1,0 +1,158 @@
+"""Everything that a header says of one message, as strings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from qlinkgen.backends.c.decode import Decoder
+from qlinkgen.backends.c.describe import field_rows, member_note, message_head
+from qlinkgen.backends.c.encode import Encoder, count_member, size_terms
+from qlinkgen.backends.c.framing import struct_parameter
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.names import Names, count_type, integer_type, scalar_literal, scalar_type, unsigned
+from qlinkgen.model import sizes
+from qlinkgen.model.message import Message, Value
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Array, Blob, Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One line of a struct."""
+
+    declaration: str
+    note: str
+
+
+class MessageWriter:
+    """Lowers messages to what the template places."""
+
+    def __init__(self, protocol: Protocol, names: Names, layouts: Layouts) -> None:
+        """Names and layouts are shared by the whole header."""
+        self._protocol = protocol
+        self._names = names
+        self._layouts = layouts
+
+    def render(self, message: Message, *, encoded: bool, decoded: bool) -> dict[str, Any]:
+        """The message for the template; only the directions that are kept have statements."""
+        frame, head = self._protocol.frame, message_head(self._names.command_of(message), message)
+        return {
+            "name": message.name,
+            "stem": self._names.stem(message),
+            "function": self._names.function(message),
+            "constant": self._names.constant(message),
+            "head": head,
+            "rows": field_rows(message),
+            "id_text": f"0x{message.id:02X}",
+            "min_size": message.min_size,
+            "max_size": message.max_size,
+            "max_frame_size": sizes.max_frame_size(frame, message),
+            "max_wire_size": sizes.max_wire_size(frame, message),
+            "has_struct": bool(message.values),
+            "has_bytes": bool(message.fields),
+            "members": [member for value in message.values for member in _members(value)],
+            "initialiser": ", ".join(_initialiser(value) for value in message.values),
+            "size_terms": size_terms(message) if message.variable else "",
+            "encode": self._encode(message) if encoded else None,
+            "decode": self._decode(message) if decoded else None,
+            "scales": [scale for value in message.values if (scale := self._scale(message, value))],
+            "early_id": False,
+            "encode_parameters": struct_parameter(self._names, message, const=True),
+            "decode_parameters": struct_parameter(self._names, message, const=False),
+            "encoded_size": "(int)size"
+            if message.variable
+            else f"(int){self._names.constant(message)}_MAX_SIZE",
+            "size_text": _size_text(message),
+            "comment_ends_at_head": not message.fields and len(head) == 1,
+            "to_frame": None,
+            "from_frame": None,
+        }
+
+    def _encode(self, message: Message) -> dict[str, Any]:
+        encoder = Encoder(message, self._names.prefix, self._layouts)
+        statements = encoder.statements()
+        return {"lines": statements, "pointer": encoder.uses_pointer, "variable": bool(message.variable)}
+
+    def _decode(self, message: Message) -> dict[str, Any]:
+        decoder = Decoder(message, self._names.prefix, self._layouts)
+        statements = decoder.statements()
+        return {
+            "lines": statements,
+            "pointer": decoder.uses_pointer,
+            "counters": decoder.counters,
+            "rest": decoder.uses_rest,
+            "empty_is_default": message.empty_is_default and message.min_size > 0,
+            "reads": message.max_size > 0,
+        }
+
+    def _scale(self, message: Message, value: Value) -> dict[str, Any] | None:
+        scalar = value.type
+        if not isinstance(scalar, Scalar) or scalar.scaling is None:
+            return None
+        return {
+            "constant": f"{self._names.constant(message)}_{value.name.upper()}",
+            "function": f"{self._names.function(message)}_{value.name}",
+            "type": scalar_type(scalar),
+            "helper": scalar_type(scalar).removesuffix("_t"),
+            "text": f"{value.name} = (raw * FACTOR + BIAS) / DIVISOR {scalar.unit}".rstrip(),
+            "factor": _whole(scalar.scaling.factor),
+            "bias": _whole(scalar.scaling.bias),
+            "divisor": _whole(scalar.scaling.divisor),
+            "minimum": scalar_literal(scalar, scalar.minimum),
+            "maximum": scalar_literal(scalar, scalar.maximum),
+            "unit": scalar.unit,
+        }
+
+
+def _whole(value: int) -> str:
+    """An integer constant of the least type that holds it everywhere."""
+    size = abs(value).bit_length()
+    return f"{value}{'' if size < 16 else 'l' if size < 32 else 'll' if size < 64 else 'ull'}"
+
+
+def _members(value: Value) -> list[Member]:
+    kind, note = value.type, member_note(value)
+    if isinstance(kind, Scalar):
+        return [Member(f"{scalar_type(kind)} {value.name};", note)]
+    item = integer_type(kind.item.bits, signed=kind.item.signed) if isinstance(kind, Array) else "uint8_t"
+    most = kind.length.maximum
+    members = [Member(f"{item} {value.name}[{most}];", note)]
+    if not kind.length.fixed:
+        what = "items" if isinstance(kind, Array) else "bytes"
+        number = Member(f"{count_type(most)} {count_member(value.field)};", f"{what} in {value.name}")
+        members.insert(0, number)
+    return members
+
+
+def _initialiser(value: Value) -> str:
+    kind = value.type
+    if isinstance(kind, Scalar):
+        return scalar_literal(kind, kind.default)
+    items = (
+        [scalar_literal(kind.item, item) for item in kind.default]
+        if isinstance(kind, Array)
+        else _bytes(kind)
+    )
+    content = f"{{{', '.join(items) or '0'}}}"
+    return content if kind.length.fixed else f"{len(items)}u, {content}"
+
+
+def _bytes(kind: Blob) -> list[str]:
+    return [unsigned(byte, 8, hexadecimal=True) for byte in kind.default]
+
+
+def _size_text(message: Message) -> str:
+    least, most = message.min_size, message.max_size
+    return f"{most} byte{'s' if most > 1 else ''}" if least == most else f"{least}..{most} bytes"
+
+
+def nearest_helpers(messages: tuple[Message, ...]) -> list[dict[str, str]]:
+    """The C types that physical values are rounded to."""
+    types = {
+        scalar_type(value.type): None
+        for message in messages
+        for value in message.values
+        if isinstance(value.type, Scalar) and value.type.scaling
+    }
+    return [{"name": kind.removesuffix("_t"), "type": kind} for kind in types]

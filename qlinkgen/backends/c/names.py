@@ -1,0 +1,92 @@
+"""Names, types and literals of C."""
+
+from __future__ import annotations
+
+from qlinkgen.model.message import Message
+from qlinkgen.model.naming import snake
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.transaction import Command
+from qlinkgen.model.types import Scalar
+
+_WIDTHS = (8, 16, 32, 64)
+
+
+def storage(bits: int) -> int:
+    """Bits of the smallest C integer that holds so many."""
+    return next(width for width in _WIDTHS if width >= bits)
+
+
+def unsigned_type(bits: int) -> str:
+    """The unsigned C type for so many bits."""
+    return f"uint{storage(bits)}_t"
+
+
+def integer_type(bits: int, *, signed: bool) -> str:
+    """The C type for an integer of so many bits."""
+    return f"int{storage(bits)}_t" if signed else unsigned_type(bits)
+
+
+def scalar_type(scalar: Scalar) -> str:
+    """The C type that a struct member has."""
+    return "bool" if scalar.meaning == "bool" else integer_type(scalar.bits, signed=scalar.signed)
+
+
+def count_type(most: int) -> str:
+    """The C type of a number of items or bytes."""
+    return unsigned_type(max(8, most.bit_length()))
+
+
+def unsigned(value: int, bits: int, *, hexadecimal: bool = False) -> str:
+    """A constant of an unsigned type; int may have 16 bits, so the suffix follows the width."""
+    suffix = {8: "u", 16: "u", 32: "ul", 64: "ull"}[storage(bits)]
+    return (f"0x{value:0{storage(bits) // 4}X}" if hexadecimal else str(value)) + suffix
+
+
+def literal(value: int, bits: int, *, signed: bool) -> str:
+    """A constant of any type; the least value of a signed type has no literal of its own."""
+    if not signed:
+        return unsigned(value, bits)
+    width = storage(bits)
+    if value == -(1 << (width - 1)):
+        return f"INT{width}_MIN"
+    return str(value) + {8: "", 16: "", 32: "l", 64: "ll"}[width]
+
+
+def scalar_literal(scalar: Scalar, value: int) -> str:
+    """A constant of a scalar's type."""
+    if scalar.meaning == "bool":
+        return "true" if value else "false"
+    return literal(value, scalar.bits, signed=scalar.signed)
+
+
+class Names:
+    """Names of everything in one header: each begins with the protocol's."""
+
+    def __init__(self, protocol: Protocol) -> None:
+        """Note which names are taken by enums and flags."""
+        self.prefix = protocol.name
+        self.upper = protocol.name.upper()
+        self._taken = {each.name for each in protocol.enums} | {each.name for each in protocol.flags}
+        self._commands = {
+            message.name: command
+            for command in protocol.commands
+            for message in (command.request, command.response)
+            if message is not None
+        }
+
+    def command_of(self, message: Message) -> Command | None:
+        """The transaction of a message; a look-up, so that cost grows with the number of messages alone."""
+        return self._commands.get(message.name)
+
+    def stem(self, message: Message) -> str:
+        """``motion.request`` as part of a name; a message called like an enum gets a suffix."""
+        name = snake(message.name)
+        return f"{name}_message" if name in self._taken else name
+
+    def function(self, message: Message) -> str:
+        """What a message's functions and its struct begin with."""
+        return f"{self.prefix}_{self.stem(message)}"
+
+    def constant(self, message: Message) -> str:
+        """What a message's macros begin with."""
+        return self.function(message).upper()

@@ -1,0 +1,51 @@
+"""Protocols, headers and drivers, each made once in a session."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.schema import find, load
+from tests.support.cdriver import WARNINGS, Driver, build
+
+SHIPPED = ("qlink", "trio", "mc1231a")
+OTHERS = ("kitchen_sink", "modbus_rtu", "dynamixel")
+PROTOCOLS = SHIPPED + OTHERS
+
+
+@functools.cache
+def protocol_of(name: str) -> Protocol:
+    """A shipped protocol, or one of those for tests."""
+    path = Path(__file__).parents[1] / "schemas" / f"{name}.yaml"
+    return load(find(name) if name in SHIPPED else path)
+
+
+@pytest.fixture(scope="session")
+def drivers(
+    tmp_path_factory: pytest.TempPathFactory, require_tool: Callable[..., str]
+) -> Iterator[Callable[[str], Driver]]:
+    """Give the driver of a protocol, under address and undefined-behaviour sanitizers."""
+    compiler = require_tool("gcc", package="gcc")
+    running: dict[str, Driver] = {}
+
+    def get(name: str) -> Driver:
+        if name not in running:
+            folder = tmp_path_factory.mktemp(f"c_{name}")
+            flags = (
+                "-O1",
+                "-g",
+                "-std=c99",
+                *WARNINGS,
+                "-fsanitize=address,undefined",
+                "-fno-sanitize-recover=all",
+            )
+            running[name] = Driver(build(protocol_of(name), folder, compiler, flags))
+        return running[name]
+
+    yield get
+    for driver in running.values():
+        driver.close()

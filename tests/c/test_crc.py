@@ -1,0 +1,68 @@
+"""Every 16-bit algorithm of the catalogue, in every form, gives its check value."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.model.checksum import Algorithm, catalogue, find
+from tests.c.test_compile import header, run
+
+PROGRAM = """
+#include "qlink.h"
+#include <stdio.h>
+int main(void)
+{
+    const uint8_t digits[] = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
+    uint16_t value = qlink_check_start();
+    for (unsigned index = 0; index < 9u; ++index) { value = qlink_check_update(value, digits[index]); }
+    printf("%04x", (unsigned)qlink_check_finish(value));
+    return 0;
+}
+"""
+GENERATED = find("crc-16/ibm-3740")
+
+
+def macro(algorithm: Algorithm) -> str:
+    return "QLINK_" + algorithm.name.upper().replace("/", "_").replace("-", "_")
+
+
+def compiled(tmp_path: Path, compiler: str, algorithm: str, form: str) -> subprocess.CompletedProcess[str]:
+    (tmp_path / "check.c").write_text(PROGRAM)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wundef", "-Werror", f"-DQLINK_CRC={algorithm}"]
+    command = [
+        compiler,
+        *flags,
+        f"-DQLINK_CRC_FORM=QLINK_CRC_FORM_{form}",
+        str(tmp_path / "check.c"),
+        "-o",
+        str(tmp_path / "check"),
+    ]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.mark.parametrize("form", ["LOOP", "NIBBLE", "TABLE"])
+def test_check_values(form: str, tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    compiler = require_tool("gcc", package="gcc")
+    assert isinstance(GENERATED, Algorithm)
+    header("qlink", tmp_path)
+    assert len(catalogue(16)) == 31
+    for algorithm in catalogue(16):
+        done = compiled(tmp_path, compiler, macro(algorithm), form)
+        if form == "TABLE" and (algorithm.poly, algorithm.refin) != (GENERATED.poly, GENERATED.refin):
+            assert done.returncode != 0
+            assert "choose QLINK_CRC_FORM_NIBBLE, or generate with --set crc=NAME" in done.stderr
+            continue
+        assert done.returncode == 0, done.stderr
+        assert run(tmp_path / "check") == f"{algorithm.check:04x}", algorithm.name
+
+
+def test_an_algorithm_of_ones_own(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    compiler = require_tool("gcc", package="gcc")
+    header("qlink", tmp_path)
+    done = compiled(tmp_path, compiler, "(0x8005u, 0xFFFFu, 1, 0x0000u)", "NIBBLE")
+    assert done.returncode == 0, done.stderr
+    assert run(tmp_path / "check") == "4b37"

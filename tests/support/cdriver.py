@@ -1,0 +1,105 @@
+"""A C program that speaks for a generated header: one process proves every vector of a protocol.
+
+`build` writes the program (with cdriver_source) and compiles it, `Driver` talks to it. It answers each line
+with one line:
+
+    encode MESSAGE NODE VALUE...        ok PAYLOAD WIRE              | error KIND
+    decode MESSAGE WIRE [REQUEST]       ok NODE VALUE...             | error KIND
+    payload MESSAGE PAYLOAD             ok VALUE...                  | error KIND
+    stream DIRECTION BYTES              ok EVENT...
+    check BYTES                         ok NUMBER                    (check value of the bytes)
+
+Bytes are hex, "-" where there are none. VALUEs are those of `Message.values` in that order: a raw integer
+(decimal or 0x, a bool is 0 or 1), an array as integers with commas between them, bytes and text as hex; "-"
+for an empty one. NODE is the address, "-" where the frame has none. For the response of a packet protocol
+NODE (encode) and REQUEST (decode) is the request's packet, because the check value covers it. MESSAGE is
+the full name, DIRECTION is request, response or message. KIND is capacity, length, range, unknown, crc,
+stuffing, truncated, frame or illegal. An EVENT is `AT:KIND` or `AT:message:MESSAGE:NODE:PAYLOAD`, where AT
+is the number of the byte, from 0, with which it came; a fault of what an intact frame carries (unknown,
+length, range) is an event like the others. A last `end:KIND` comes from the header's finish function where
+it has one. A line that is not understood is answered by `usage`.
+"""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from qlinkgen.backends import c
+from qlinkgen.backends.base import Options
+from qlinkgen.model.message import Value
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Blob, Scalar
+from tests.support.cdriver_source import source
+
+#: The flags under which every generated header has to be clean.
+WARNINGS = (
+    *("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion"),
+    *("-Wcast-qual", "-Wundef", "-Werror"),
+)
+
+
+def build(
+    protocol: Protocol, folder: Path, compiler: str, flags: Sequence[str] = ("-O1", "-std=c99")
+) -> Path:
+    """Write header and program into a folder and compile them; returns the program."""
+    for name, text in c.generate(protocol, Options()).items():
+        (folder / Path(name).name).write_text(text, "utf-8")
+    program = folder / f"{protocol.name}_driver"
+    program.with_suffix(".c").write_text(source(protocol), "utf-8")
+    command = [compiler, *flags, "-I", str(folder), str(program.with_suffix(".c")), "-o", str(program)]
+    subprocess.run(command, check=True, timeout=300)
+    return program
+
+
+class Driver:
+    """A running program; one question, one answer."""
+
+    def __init__(self, *command: str | Path) -> None:
+        """Start it, under an emulator where the command names one."""
+        words = [str(word) for word in command]
+        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def ask(self, *words: object) -> str:
+        """Send a line; return the answer without its line end."""
+        assert self._process.stdin
+        assert self._process.stdout
+        self._process.stdin.write(" ".join(str(word) for word in words) + "\n")
+        self._process.stdin.flush()
+        answer = self._process.stdout.readline()
+        if not answer.endswith("\n"):
+            raise RuntimeError(f"the driver stopped with status {self._process.wait()} at {words}")
+        return answer[:-1]
+
+    def close(self) -> None:
+        """End the program."""
+        assert self._process.stdin
+        assert self._process.stdout
+        self._process.stdin.close()
+        self._process.stdout.close()
+        self._process.wait(timeout=60)
+
+    def __enter__(self) -> Self:
+        """The driver itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the program."""
+        self.close()
+
+
+def raw_text(value: Value, raw: int | Sequence[int] | bytes) -> str:
+    """A raw value as the program reads and prints it."""
+    if isinstance(value.type, Scalar):
+        assert isinstance(raw, int)
+        return str(int(raw))
+    if isinstance(value.type, Blob):
+        assert isinstance(raw, bytes)
+        return raw.hex() or "-"
+    assert not isinstance(raw, int)
+    return ",".join(str(item) for item in raw) or "-"

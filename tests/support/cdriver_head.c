@@ -1,0 +1,70 @@
+/* Front of every driver program; the writer puts the protocol's prefix in place of the marks. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LINE_SIZE 65536
+static char line[LINE_SIZE];
+static uint8_t bytes_a[LINE_SIZE / 2];
+static uint8_t bytes_b[LINE_SIZE / 2];
+
+static char *word(void) { return strtok(NULL, " \n"); }
+
+static int digit(char c)
+{
+    return (c >= '0' && c <= '9') ? c - '0' : (c >= 'a' && c <= 'f') ? c - 'a' + 10 : (c >= 'A' && c <= 'F') ? c - 'A' + 10 : -1;
+}
+
+static size_t from_hex(const char *text, uint8_t *out)
+{
+    size_t size = 0u;
+    while (text != NULL && digit(text[0]) >= 0 && digit(text[1]) >= 0) {
+        out[size] = (uint8_t)(digit(text[0]) * 16 + digit(text[1]));
+        ++size;
+        text += 2;
+    }
+    return size;
+}
+
+static void put_digits(const uint8_t *data, size_t size)
+{
+    for (size_t index = 0u; index < size; ++index) { printf("%02x", data[index]); }
+}
+
+static void put_hex(const uint8_t *data, size_t size)
+{
+    putchar(' ');
+    if (size == 0u) { putchar('-'); }
+    put_digits(data, size);
+}
+
+static const char *kind_of(int status)
+{
+    switch (status) {
+    case @P@_ERROR_CAPACITY: return "capacity";
+    case @P@_ERROR_LENGTH: return "length";
+    case @P@_ERROR_RANGE: return "range";
+    case @P@_ERROR_UNKNOWN: return "unknown";
+    case @P@_ERROR_CRC: return "crc";
+    case @P@_ERROR_STUFFING: return "stuffing";
+    case @P@_ERROR_TRUNCATED: return "truncated";
+    case @P@_ERROR_FRAME: return "frame";
+    case @P@_ERROR_ILLEGAL: return "illegal";
+    default: return "?";
+    }
+}
+
+static const char *kind_of_event(@p@_event_t event)
+{
+    switch (event) {
+    case @P@_EVENT_CRC: return "crc";
+    case @P@_EVENT_STUFFING: return "stuffing";
+    case @P@_EVENT_LENGTH: return "length";
+    case @P@_EVENT_UNKNOWN: return "unknown";
+    case @P@_EVENT_TRUNCATED: return "truncated";
+    case @P@_EVENT_FRAMING: return "frame";
+    default: return "?";
+    }
+}
+
+static void fail(int status) { printf("error %s", kind_of(status)); }

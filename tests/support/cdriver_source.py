@@ -1,0 +1,385 @@
+"""The text of the program that cdriver.py tells of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from qlinkgen.backends.c.encode import count_member
+from qlinkgen.backends.c.names import Names
+from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
+from qlinkgen.model.message import Message, Value
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Array, Blob, Scalar
+
+_HEAD, _MAIN = (Path(__file__).with_name(f"cdriver_{part}.c").read_text("utf-8") for part in ("head", "main"))
+
+
+def source(protocol: Protocol) -> str:
+    """The program's text; it includes the header by its name alone."""
+    return _Source(protocol).text()
+
+
+class _Source:
+    """Writes the program for one protocol."""
+
+    def __init__(self, protocol: Protocol) -> None:
+        self.protocol = protocol
+        self.names = Names(protocol)
+        self.packet = isinstance(protocol.frame, PacketFrame)
+        self.lines: list[str] = []
+
+    def text(self) -> str:
+        head = f'#include "{self.protocol.name}.h"\n' + self._filled(_HEAD)
+        for message in self.protocol.messages:
+            self._show(message)
+            self._encode(message)
+            self._decode(message)
+        self._stream()
+        self._check()
+        rows = [f'    {{"{m.name}", encode_{s}, decode_{s}, payload_{s}}},' for m, s in self._stems()]
+        table = [
+            "typedef void (*action_t)(void);",
+            "typedef struct { const char *name; action_t encode, decode, payload; } entry_t;",
+        ]
+        table += ["static const entry_t entries[] = {", *rows, "};"]
+        return head + "\n".join([*self.lines, *table]) + _MAIN
+
+    def _filled(self, text: str) -> str:
+        return text.replace("@p@", self.names.prefix).replace("@P@", self.names.upper)
+
+    def _stems(self) -> list[tuple[Message, str]]:
+        return [(message, self.names.stem(message)) for message in self.protocol.messages]
+
+    def _add(self, *lines: str) -> None:
+        self.lines += [self._filled(line) for line in lines]
+
+    # Values
+
+    def _show(self, message: Message) -> None:
+        if not message.values:
+            return
+        self._add(
+            f"static void show_{self.names.stem(message)}(const {self.names.function(message)}_t *m)", "{"
+        )
+        for value in message.values:
+            self._add(*(f"    {line}" for line in _printed(value)))
+        self._add("}")
+
+    def _encode(self, message: Message) -> None:
+        function, has_struct = self.names.function(message), bool(message.values)
+        self._add(f"static void encode_{self.names.stem(message)}(void)", "{")
+        if has_struct:
+            self._add(f"    {function}_t m = {self.names.constant(message)}_INIT;")
+        self._add(
+            "    const char *node = word();",
+            f"    uint8_t payload[{self.names.constant(message)}_MAX_SIZE + 1u] = {{0u}};",
+        )
+        self._add(
+            f"    uint8_t wire[{self.names.constant(message)}_MAX_WIRE_SIZE];",
+            "    int size = 0;",
+            "    int total;",
+        )
+        self._add("    (void)node;")
+        for value in message.values:
+            self._add(*(f"    {line}" for line in _parsed(value)))
+        call = "&m, " if has_struct else ""
+        if message.fields:
+            self._add(
+                f"    size = {function}_encode({call}payload, {self.names.constant(message)}_MAX_SIZE);"
+            )
+            self._add("    if (size < 0) { fail(size); return; }")
+        self._add(f"    total = {function}_to_frame({call}{self._whom(message)}wire, sizeof wire);")
+        self._add("    if (total < 0) { fail(total); return; }", '    printf("ok");')
+        self._add("    put_hex(payload, (size_t)size);", "    put_hex(wire, (size_t)total);", "}")
+
+    def _whom(self, message: Message) -> str:
+        frame = self.protocol.frame
+        if self.packet:
+            has_sum = (
+                isinstance(frame, PacketFrame)
+                and frame.checksum is not None
+                and message.direction == "response"
+            )
+            return self._filled("@p@_request_sum(bytes_a, from_hex(node, bytes_a)), ") if has_sum else ""
+        bits = _address_bits(self.protocol)
+        return f"(uint{bits}_t)strtoul(node, NULL, 0), " if bits else ""
+
+    def _decode(self, message: Message) -> None:
+        function, stem = self.names.function(message), self.names.stem(message)
+        struct = f"    {function}_t m = {self.names.constant(message)}_INIT;" if message.values else ""
+        call, shown = ("&m, ", f"    show_{stem}(&m);") if message.values else ("", "")
+        decode = (
+            f"{function}_decode({call}bytes_a, size)"
+            if message.fields
+            else "(size == 0u) ? @P@_OK : @P@_ERROR_LENGTH"
+        )
+        self._add(f"static void payload_{stem}(void)", "{", struct)
+        self._add("    const size_t size = from_hex(word(), bytes_a);", f"    const int status = {decode};")
+        self._add("    if (status != @P@_OK) { fail(status); return; }", '    printf("ok");', shown, "}")
+        self._add(
+            f"static void decode_{stem}(void)",
+            "{",
+            struct,
+            "    const size_t size = from_hex(word(), bytes_a);",
+            "    int status;",
+        )
+        if self.packet and message.direction == "response":
+            self._add(
+                f"    status = {function}_from_frame({call}@SUM@bytes_a, size);".replace("@SUM@", self._sum())
+            )
+            self._add(
+                "    if (status != @P@_OK) { fail(status); return; }", '    printf("ok -");', shown, "}"
+            )
+            return
+        self._decode_frame(message, call, shown)
+
+    def _sum(self) -> str:
+        frame = self.protocol.frame
+        has_sum = isinstance(frame, PacketFrame) and frame.checksum is not None
+        return "@p@_request_sum(bytes_b, from_hex(word(), bytes_b)), " if has_sum else ""
+
+    def _decode_frame(self, message: Message, call: str, shown: str) -> None:
+        function = self.names.function(message)
+        field = _id_name(self.protocol)
+        buffer = "bytes_b, " if _unpacks(self.protocol.frame) else ""
+        self._add("    @p@_frame_t frame;")
+        self._add(f"    status = @p@_frame_decode({self._direction(message)}&frame, {buffer}bytes_a, size);")
+        name = _check_of(self.protocol, message)
+        self._add(f"    if (status == @P@_OK) {{ status = @p@_{name}_check(&frame); }}")
+        self._add(
+            f"    if (status == @P@_OK && frame.{field} != {self.names.constant(message)}_ID) {{",
+            "        status = @P@_ERROR_UNKNOWN;",
+            "    }",
+        )
+        if message.fields:
+            self._add(
+                "    if (status == @P@_OK) {",
+                f"        status = {function}_decode({call}frame.payload, frame.size);",
+                "    }",
+            )
+        self._add("    if (status != @P@_OK) { fail(status); return; }")
+        address = self.protocol.address_name
+        self._add(
+            f'    printf("ok %u", (unsigned)frame.{address});' if address else '    printf("ok -");',
+            shown,
+            "}",
+        )
+
+    def _direction(self, message: Message) -> str:
+        return f"@P@_{_check_of(self.protocol, message).upper()}, " if _directed(self.protocol) else ""
+
+    # Streams
+
+    def _stream(self) -> None:
+        address, field = self.protocol.address_name, _id_name(self.protocol)
+        node = f'printf("%u:", (unsigned)frame.{address});' if address else 'printf("-:");'
+        self._add(
+            "static void deliver(size_t at, @p@_event_t event, const @p@_receiver_t *rx,",
+            "                    const char *direction)",
+            "{",
+        )
+        self._add(
+            "    if (event == @P@_EVENT_NONE) { return; }",
+            '    printf(" %lu:", (unsigned long)at);',
+            "    if (event != @P@_EVENT_FRAME) {",
+        )
+        self._add(
+            '        printf("%s", kind_of_event(event));',
+            "    } else {",
+            "        const @p@_frame_t frame = @p@_receiver_frame(rx);",
+        )
+        self._add(
+            "        int status = @P@_ERROR_UNKNOWN;",
+            '        const char *name = "?";',
+            "        (void)direction;",
+        )
+        for direction in self._directions():
+            self._add(
+                f'        if (strcmp(direction, "{direction}") == 0) {{',
+                f"            status = @p@_{direction}_check(&frame);",
+            )
+            self._add(f"            switch (frame.{field}) {{")
+            for message in self.protocol.received(direction):  # type: ignore[arg-type]
+                self._add(
+                    f'            case {self.names.constant(message)}_ID: name = "{message.name}"; break;'
+                )
+            self._add("            default: break;", "            }", "        }")
+        length = "frame" if isinstance(self.protocol.frame, MarkedFrame) else "length"
+        self._add(
+            "        if (status != @P@_OK) {",
+            f'            printf("%s", status == @P@_ERROR_LENGTH ? "{length}" : kind_of(status));',
+        )
+        self._add("        } else {", '            printf("message:%s:", name);', f"            {node}")
+        self._add("            if (frame.size == 0u) { putchar('-'); }")
+        self._add(
+            "            put_digits(frame.payload, frame.size);",
+            "        }",
+            "    }",
+            "}",
+        )
+        self._stream_loop()
+
+    def _directions(self) -> list[str]:
+        return ["request"] if self.packet else list(self.protocol.directions)
+
+    def _stream_loop(self) -> None:
+        rescan = _rescans(self.protocol)
+        chosen = (
+            ', strcmp(direction, "request") == 0 ? @P@_REQUEST : @P@_RESPONSE'
+            if _directed(self.protocol)
+            else ""
+        )
+        self._add("static void stream(const char *direction)", "{", "    static @p@_receiver_t rx;")
+        self._add(
+            "    const size_t size = from_hex(word(), bytes_a);",
+            '    if (direction == NULL) { printf("usage"); return; }',
+        )
+        self._add(
+            f"    @p@_receiver_init(&rx{chosen});",
+            '    printf("ok");',
+            "    for (size_t at = 0u; at < size; ++at) {",
+        )
+        self._add(
+            "        @p@_event_t event = @p@_receive(&rx, bytes_a[at]);",
+            "        deliver(at, event, &rx, direction);",
+        )
+        if rescan:
+            self._add(
+                "        while (event != @P@_EVENT_NONE) {", "            event = @p@_receiver_next(&rx);"
+            )
+            self._add("            deliver(at, event, &rx, direction);", "        }")
+        self._add("    }")
+        if rescan:
+            self._add(
+                "    for (;;) {",
+                "        const @p@_event_t event = @p@_receiver_finish(&rx);",
+                "        if (event == @P@_EVENT_NONE) { break; }",
+            )
+            self._add(
+                "        deliver(size, event, &rx, direction);",
+                "    }",
+            )
+        self._add("}")
+
+    def _check(self) -> None:
+        frame = self.protocol.frame
+        part = frame.part("checksum") if isinstance(frame, DelimitedFrame) else frame
+        checksum = getattr(part, "checksum", None)
+        self._add(
+            "static void check(const char *text)",
+            "{",
+            "    const size_t size = from_hex(text, bytes_a);",
+            "    (void)bytes_b;",
+        )
+        if checksum is None:
+            self._add("    (void)size;", '    printf("usage");', "}")
+        elif self.packet:
+            self._add(
+                '    printf("ok %llu", (unsigned long long)@p@_finish_sum_(@p@_sum_(0u, bytes_a, size)));',
+                "}",
+            )
+        else:
+            width = next(w for w in (8, 16, 32, 64) if w >= checksum.algorithm.width)
+            self._add(
+                f"    uint{width}_t value = @p@_check_start();",
+                "    for (size_t index = 0u; index < size; ++index) {",
+            )
+            self._add("        value = @p@_check_update(value, bytes_a[index]);", "    }")
+            self._add('    printf("ok %llu", (unsigned long long)@p@_check_finish(value));', "}")
+
+
+def _parsed(value: Value) -> list[str]:
+    kind, name = value.type, value.name
+    if isinstance(kind, Scalar):
+        number = "strtoll" if kind.signed else "strtoull"
+        width = next(w for w in (8, 16, 32, 64) if w >= kind.bits)
+        cast = "0ull != " if kind.meaning == "bool" else f"({'' if kind.signed else 'u'}int{width}_t)"
+        return [f"m.{name} = {cast}{number}(word(), NULL, 0);"]
+    count_type = "" if kind.length.fixed else ("uint8_t" if kind.length.maximum < 256 else "uint16_t")
+    if isinstance(kind, Blob):
+        lines = [
+            "{",
+            "    const size_t count = from_hex(word(), bytes_b);",
+            f"    memcpy(m.{name}, bytes_b, count < sizeof m.{name} ? count : sizeof m.{name});",
+        ]
+        lines += (
+            [f"    m.{count_member(value.field)} = ({count_type})count;"]
+            if count_type
+            else ["    (void)count;"]
+        )
+        return [*lines, "}"]
+    number = "strtoll" if kind.item.signed else "strtoull"
+    width = next(w for w in (8, 16, 32, 64) if w >= kind.item.bits)
+    item = f"({'' if kind.item.signed else 'u'}int{width}_t){number}(text, &text, 0)"
+    lines = [
+        "{",
+        "    char *text = word();",
+        "    size_t count = 0u;",
+        "    while (text != NULL && *text != '\\0' && strcmp(text, \"-\") != 0) {",
+    ]
+    lines += [
+        f"        if (count < {kind.length.maximum}u) {{",
+        f"            m.{name}[count] = {item};",
+        "        } else {",
+        f"            (void){number}(text, &text, 0);",
+        "        }",
+    ]
+    lines += ["        ++count;", "        if (*text == ',') { ++text; }", "    }"]
+    lines += (
+        [f"    m.{count_member(value.field)} = ({count_type})count;"] if count_type else ["    (void)count;"]
+    )
+    return [*lines, "}"]
+
+
+def _printed(value: Value) -> list[str]:
+    kind, name = value.type, value.name
+    if isinstance(kind, Scalar):
+        form, cast = ("%lld", "long long") if kind.signed else ("%llu", "unsigned long long")
+        return [f'printf(" {form}", ({cast})m->{name});']
+    count = f"{kind.length.maximum}u" if kind.length.fixed else f"m->{count_member(value.field)}"
+    if isinstance(kind, Blob):
+        return [f"put_hex(m->{name}, {count});"]
+    assert isinstance(kind, Array)
+    form, cast = ("%lld", "long long") if kind.item.signed else ("%llu", "unsigned long long")
+    return [
+        f'printf({count} == 0u ? " -" : " ");',
+        f"for (size_t index = 0u; index < {count}; ++index) {{",
+        f'    printf("%s{form}", index == 0u ? "" : ",", ({cast})m->{name}[index]);',
+        "}",
+    ]
+
+
+def _address_bits(protocol: Protocol) -> int:
+    frame = protocol.frame
+    if isinstance(frame, DelimitedFrame):
+        part = frame.part("address")
+        return part.scalar.bits if part and part.scalar else 0
+    return 8 if isinstance(frame, MarkedFrame) else 0
+
+
+def _check_of(protocol: Protocol, message: Message) -> str:
+    if message.direction != "message" or protocol.directions == ("message",):
+        return message.direction
+    return "request"
+
+
+def _directed(protocol: Protocol) -> bool:
+    frame = protocol.frame
+    if isinstance(frame, DelimitedFrame):
+        return frame.part("length") is None or not frame.preamble
+    return isinstance(frame, MarkedFrame) and len(protocol.directions) > 1
+
+
+def _unpacks(frame: object) -> bool:
+    return isinstance(frame, DelimitedFrame) and frame.stuffing is not None
+
+
+def _rescans(protocol: Protocol) -> bool:
+    frame = protocol.frame
+    return isinstance(frame, DelimitedFrame) and not frame.unique_preamble
+
+
+def _id_name(protocol: Protocol) -> str:
+    frame = protocol.frame
+    part = frame.part("message") if isinstance(frame, DelimitedFrame) else None
+    return part.name if part and protocol.address_name == "id" else "id"

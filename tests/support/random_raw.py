@@ -1,0 +1,69 @@
+"""Random messages as raw values, and random damage to a stream; the same for the same seed."""
+
+from __future__ import annotations
+
+import random
+
+from qlinkgen.model.message import Message, Value
+from qlinkgen.model.types import Array, Blob, Flags, Scalar
+
+Raw = int | list[int] | bytes
+
+
+def random_values(message: Message, rng: random.Random) -> list[Raw]:
+    """A raw value for each value of a message, all of them legal; bounds come often."""
+    return [_random(value, rng) for value in message.values]
+
+
+def random_address(message: Message, rng: random.Random) -> int:
+    """An address that the message may carry, 0 where the frame has none."""
+    if not message.addresses:
+        return 0
+    first, last = rng.choice(message.addresses)
+    return rng.choice((first, last, rng.randint(first, last)))
+
+
+def damaged(stream: bytes, rng: random.Random, alphabet: bytes) -> bytes:
+    """The stream with a few bytes changed, lost, doubled or added."""
+    data = bytearray(stream)
+    for _ in range(rng.randint(1, 6)):
+        at = rng.randrange(len(data) + 1)
+        noise = bytes(
+            rng.choice((rng.randrange(256), rng.choice(alphabet))) for _ in range(rng.choice((1, 1, 2, 5)))
+        )
+        action = rng.choice(("change", "lose", "double", "add"))
+        if action == "add":
+            data[at:at] = noise
+        elif action == "change":
+            data[at : at + len(noise)] = noise
+        elif action == "lose":
+            del data[at : at + rng.choice((1, 1, 2, 9))]
+        else:
+            data[at:at] = data[max(0, at - 4) : at]
+    return bytes(data)
+
+
+def _random(value: Value, rng: random.Random) -> Raw:
+    kind = value.type
+    if isinstance(kind, Scalar):
+        return _number(kind, rng)
+    low, high = kind.length.minimum, kind.length.maximum
+    size = rng.choice((low, high, rng.randint(low, high), min(high, low + rng.randint(0, 4))))
+    if isinstance(kind, Array):
+        return [_number(kind.item, rng) for _ in range(size)]
+    assert isinstance(kind, Blob)
+    return bytes(
+        rng.choice((rng.randrange(256), 0xA5, 0x00, 0xFF, 0xFD)) & (0x7F if kind.text else 0xFF)
+        for _ in range(size)
+    )
+
+
+def _number(kind: Scalar, rng: random.Random) -> int:
+    if kind.meaning == "bool":
+        return rng.randrange(2)
+    low, high = kind.minimum, kind.maximum
+    number = rng.choice(
+        (low, high, rng.randint(low, high), rng.randint(low, high), min(high, max(low, 0xA5)))
+    )
+    flags = kind.meaning
+    return number & flags.mask if isinstance(flags, Flags) and flags.reserved_zero else number
