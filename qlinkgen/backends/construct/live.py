@@ -1,0 +1,55 @@
+"""Live structures: the tree evaluated. Construct is imported here alone, and only when this is asked for."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Any
+
+from qlinkgen.backends.base import Options
+from qlinkgen.backends.construct.module import definitions
+from qlinkgen.backends.construct.tree import evaluate
+from qlinkgen.model.protocol import Protocol
+
+
+class Live:
+    """What a generated module defines, and short ways to use it as the reference.
+
+    Attributes:
+        names: everything that the module defines, under the names that its source has.
+        messages: payload structures by full name.
+        frames: frame structures by direction.
+    """
+
+    def __init__(self, names: Mapping[str, Any]) -> None:
+        self.names = names
+        self.messages: Mapping[str, Any] = names["MESSAGES"]
+        known = {"request": "REQUEST_FRAME", "response": "RESPONSE_FRAME", "message": "FRAME"}
+        self.frames = {direction: names[name] for direction, name in known.items() if name in names}
+
+    def payload(self, message: str, fields: Mapping[str, Any]) -> bytes:
+        """The payload of a message; fields that are not given have their defaults."""
+        return bytes(self.messages[message].build(fields))
+
+    def seal(
+        self, message: str, payload: bytes, address: int = 0, request: bytes = b"", number: int | None = None
+    ) -> bytes:
+        """The frame around a payload, whatever the payload is; ``number`` replaces the message id."""
+        frame = next(each for each in self.frames.values() if message in each.by_name)
+        return bytes(
+            frame.seal(self.messages[message].id if number is None else number, payload, address, request)
+        )
+
+    def parse(self, direction: str, wire: bytes, request: bytes = b"") -> Any:
+        """Message, address and fields of exactly one frame. Raises construct's ConstructError."""
+        return self.frames[direction].parse(wire, request=request)
+
+
+def live(protocol: Protocol, options: Options | None = None) -> Live:
+    """The structures of a protocol."""
+    modules = ("construct", f"{__package__}._fields", f"{__package__}._frames")
+    names: dict[str, Any] = {"Decimal": Decimal}
+    for module in modules:
+        names |= vars(importlib.import_module(module))
+    return Live(evaluate(definitions(protocol, options or Options()), names))

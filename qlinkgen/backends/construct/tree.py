@@ -1,0 +1,215 @@
+"""A tree of constructor calls: evaluated it is live structures, printed it is their source.
+
+There is one tree for both, so what a reader reviews is what the tests run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+#: Characters of a line of source.
+WIDTH = 110
+
+
+@dataclass(frozen=True, slots=True)
+class Ref:
+    """A name: of a class or of something defined further up."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Hex:
+    """An integer that is read more easily in hexadecimal digits."""
+
+    value: int
+    digits: int = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Power:
+    """A power of two, by its exponent."""
+
+    exponent: int
+
+    @property
+    def value(self) -> int:
+        """The number itself."""
+        return 1 << self.exponent
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """``name(*args, **kwargs)``."""
+
+    name: str
+    args: tuple[Node, ...] = ()
+    kwargs: tuple[tuple[str, Node], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """``"name" / node``, construct's way of naming a field; the doc is printed beside it."""
+
+    name: str
+    node: Node
+    doc: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A list."""
+
+    items: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A dictionary from names."""
+
+    items: tuple[tuple[str, Node], ...]
+
+
+#: Besides these, what `repr` prints as it is written: numbers, text, bytes, and tuples of them.
+Node = (
+    Ref
+    | Hex
+    | Power
+    | Call
+    | Named
+    | Sequence
+    | Table
+    | int
+    | float
+    | str
+    | bytes
+    | bool
+    | None
+    | tuple[Any, ...]
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """``name = node`` with a comment above."""
+
+    name: str
+    node: Node
+    comment: str = ""
+    #: It belongs to the definition above and stands directly below it.
+    attached: bool = False
+
+
+# Evaluation
+
+
+def evaluate(definitions: tuple[Definition, ...], names: Mapping[str, Any]) -> dict[str, Any]:
+    """What the definitions define, given what they may refer to."""
+    known = dict(names)
+    return {each.name: known.setdefault(each.name, _value(each.node, known)) for each in definitions}
+
+
+def _value(node: Node, known: Mapping[str, Any]) -> Any:
+    if isinstance(node, Call):
+        args = [_value(each, known) for each in node.args]
+        return known[node.name](*args, **{key: _value(each, known) for key, each in node.kwargs})
+    if isinstance(node, Named):
+        return node.name / _value(node.node, known)
+    if isinstance(node, Sequence):
+        return [_value(each, known) for each in node.items]
+    if isinstance(node, Table):
+        return {key: _value(each, known) for key, each in node.items}
+    if isinstance(node, Ref):
+        return known[node.name]
+    return node.value if isinstance(node, Hex | Power) else node
+
+
+def used(node: Node) -> Iterator[str]:
+    """Every name that a node refers to."""
+    if isinstance(node, Ref | Call):
+        yield node.name
+    children: tuple[Node, ...] = ()
+    if isinstance(node, Call):
+        children = node.args + tuple(each for _, each in node.kwargs)
+    elif isinstance(node, Named):
+        children = (node.node,)
+    elif isinstance(node, Sequence):
+        children = node.items
+    elif isinstance(node, Table):
+        children = tuple(each for _, each in node.items)
+    for child in children:
+        yield from used(child)
+
+
+# Printing
+
+
+def printed(definition: Definition) -> str:
+    """The source of a definition, its comment above, and an empty line above that."""
+    comment = "".join(f"# {line}\n" for line in definition.comment.splitlines())
+    gap = "" if definition.attached else "\n"
+    return f"{gap}{comment}{definition.name} = {_text(definition.node, len(definition.name) + 3, 0)}\n"
+
+
+def _text(node: Node, column: int, indent: int) -> str:
+    """The source of a node that begins in a column; where it does not fit, each part gets a line."""
+    flat = _flat(node)
+    if column + len(flat) < WIDTH and not _documented(node):
+        return flat
+    inner = indent + 4
+    if isinstance(node, Named):
+        return f'"{node.name}" / {_text(node.node, column + len(node.name) + 5, indent)}'
+    if isinstance(node, Call):
+        parts = [_part("", each, inner) for each in node.args]
+        parts += [_part(f"{key}=", each, inner) for key, each in node.kwargs]
+        return f"{node.name}(\n{''.join(parts)}{' ' * indent})"
+    if isinstance(node, Sequence):
+        return f"[\n{''.join(_part('', each, inner) for each in node.items)}{' ' * indent}]"
+    if isinstance(node, Table):
+        parts = [_part(f'"{key}": ', each, inner) for key, each in node.items]
+        return f"{{\n{''.join(parts)}{' ' * indent}}}"
+    return flat
+
+
+def _part(prefix: str, node: Node, indent: int) -> str:
+    line = f"{' ' * indent}{prefix}{_text(node, indent + len(prefix), indent)},"
+    if not isinstance(node, Named) or not node.doc:
+        return f"{line}\n"
+    if "\n" not in line and len(line) + len(node.doc) + 4 <= WIDTH:
+        return f"{line}  # {node.doc}\n"
+    return f"{' ' * indent}# {node.doc}\n{line}\n"
+
+
+def _documented(node: Node) -> bool:
+    parts = node.args if isinstance(node, Call) else ()
+    return any(isinstance(part, Named) and (part.doc or _documented(part.node)) for part in parts)
+
+
+def _flat(node: Node) -> str:
+    if isinstance(node, Call):
+        parts = [_flat(each) for each in node.args] + [f"{key}={_flat(each)}" for key, each in node.kwargs]
+        return f"{node.name}({', '.join(parts)})"
+    if isinstance(node, Named):
+        return f'"{node.name}" / {_flat(node.node)}'
+    if isinstance(node, Sequence):
+        return f"[{', '.join(map(_flat, node.items))}]"
+    if isinstance(node, Table):
+        parts = [f'"{key}": {_flat(each)}' for key, each in node.items]
+        return f"{{{', '.join(parts)}}}"
+    if isinstance(node, Hex):
+        return f"0x{node.value:0{node.digits}X}"
+    if isinstance(node, Power):
+        return f"2**{node.exponent}"
+    return node.name if isinstance(node, Ref) else _literal(node)
+
+
+def _literal(value: Any) -> str:
+    """As `repr`, in double quotes."""
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_literal, value))}{',' if len(value) == 1 else ''})"
+    text = repr(value)
+    if isinstance(value, str | bytes) and '"' not in text and text.endswith("'"):
+        text = text.replace("'", '"', 1)[:-1] + '"'
+    return text

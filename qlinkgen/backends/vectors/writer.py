@@ -1,0 +1,31 @@
+"""JSON that shows differences well: one vector a line, and every digit of a Decimal."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from decimal import Decimal
+from typing import Any
+
+
+def document(head: Mapping[str, Any], lists: Mapping[str, Iterable[Mapping[str, Any]]]) -> str:
+    """An object of a few plain entries and of lists, whose items get a line each."""
+    lines = [f"  {text(key)}: {text(value)}" for key, value in head.items()]
+    for key, items in lists.items():
+        rows = ",\n".join(f"    {text(item)}" for item in items)
+        lines.append(f"  {text(key)}: [\n{rows}\n  ]" if rows else f"  {text(key)}: []")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def text(value: Any) -> str:
+    """A value as JSON in one line."""
+    if isinstance(value, Decimal):
+        return str(value)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_plain(key)}: {text(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(text, value)) + "]"
+    return _plain(value)
+
+
+_plain = json.JSONEncoder().encode

@@ -1,0 +1,37 @@
+"""Outputs that have to be compiled first."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.proof import cases
+from tests.proof.outputs import COMPILED, OUTPUTS, COutput, Output
+from tests.support.cdriver import Driver, build
+
+Make = Callable[[str, str], Output]
+
+
+@pytest.fixture(scope="session")
+def make(tmp_path_factory: pytest.TempPathFactory, require_tool: Callable[..., str]) -> Iterator[Make]:
+    """Give a function that gives an output of a protocol, and makes it once."""
+    made: dict[tuple[str, str], Output] = {}
+    programs = contextlib.ExitStack()
+
+    def compiled(name: str, output: str) -> Output:
+        compiler, flags = COMPILED[output]
+        path = require_tool(compiler, package=compiler)
+        folder: Path = tmp_path_factory.mktemp(f"{name}-{output}".replace(", ", "-"))
+        program = build(cases.protocol(name), folder, path, flags)
+        return COutput(cases.protocol(name), programs.enter_context(Driver(program)))
+
+    def get(name: str, output: str) -> Output:
+        if (name, output) not in made:
+            made[name, output] = OUTPUTS[output](name) if output in OUTPUTS else compiled(name, output)
+        return made[name, output]
+
+    with programs:
+        yield get

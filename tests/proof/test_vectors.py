@@ -1,0 +1,80 @@
+"""One expectation, every output: the vectors, both ways, bytes and values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Any
+
+import pytest
+
+from tests.proof import cases
+from tests.proof.conftest import Make
+from tests.proof.outputs import COMPILED, OUTPUTS, Decoded, Refused
+
+everywhere = pytest.mark.parametrize("output", [*OUTPUTS, *COMPILED])
+every_protocol = pytest.mark.parametrize("name", cases.PROTOCOLS)
+
+
+@everywhere
+@every_protocol
+def test_values_become_the_bytes(name: str, output: str, make: Make) -> None:
+    made = make(name, output)
+    disagreements = []
+    for case in cases.cases(name):
+        if not case.decode_only:
+            payload, wire = made.encode(case.message, case.fields, case.address, case.request)
+            if (payload, wire) != (case.payload, case.wire):
+                disagreements.append((case.message.name, dict(case.fields), wire.hex(), case.wire.hex()))
+    assert not disagreements
+
+
+@everywhere
+@every_protocol
+def test_bytes_become_the_values(name: str, output: str, make: Make) -> None:
+    made = make(name, output)
+    disagreements = []
+    for case in cases.cases(name):
+        found = made.decode(case.message, case.wire, case.request)
+        expected = Decoded(case.message.name, case.address, case.fields)
+        if not same(found, expected):
+            disagreements.append((found, expected, case.wire.hex()))
+        if not same_values(made.decode_payload(case.message, case.payload), case.fields):
+            disagreements.append((found, expected, case.payload.hex()))
+    assert not disagreements
+
+
+@everywhere
+@every_protocol
+def test_what_is_wrong_is_refused_for_the_same_reason(name: str, output: str, make: Make) -> None:
+    made = make(name, output)
+    disagreements = []
+    for refusal in cases.refusals(name):
+        try:
+            found: object = made.decode(refusal.message, refusal.wire, refusal.request)
+        except Refused as error:
+            found = error.kind
+        if found != refusal.kind:
+            disagreements.append(
+                (refusal.message.name, refusal.what, found, refusal.kind, refusal.wire.hex())
+            )
+    assert not disagreements
+
+
+def same(found: Decoded, expected: Decoded) -> bool:
+    """The same message, and the same value of the same type for every field that is expected."""
+    return (found.message, found.address) == (expected.message, expected.address) and same_values(
+        found.fields, expected.fields
+    )
+
+
+def same_values(found: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
+    """The same value of the same type for every field that is expected; enums and flags are integers."""
+    return all(
+        found[name] == value and isinstance(found[name], _kind(value)) for name, value in expected.items()
+    )
+
+
+def _kind(value: object) -> type | tuple[type, ...]:
+    # A whole number stands for a float or a Decimal in hand-written vectors and in JSON.
+    return (int, float, Decimal) if type(value) is int else type(value)
