@@ -1,0 +1,71 @@
+"""What importing a generated module costs over a bare interpreter."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks import ROOT
+from benchmarks.processes import Run, interleave
+from benchmarks.report import Goal, Section
+
+GENERATED = ROOT / "generated" / "python" / "qlinkgen_codecs"
+BARE = "bare interpreter"
+LIMITS_MS = {"qlink": 10.0, "trio": 10.0, "mc1231a": 30.0}
+GOALS = ("qlink", "mc1231a")
+OTHERS = ("dataclasses", "enum", "construct", "serial", "pymavlink.mavutil", "cantools")
+
+INTRO = """\
+A new interpreter for each import, in turns with one that imports nothing (`python -I -S`, bytecode
+cached); what an import costs is the difference of the two. The goals are held against the best wall
+clock. The others are there for scale."""
+
+
+def _command(module: str, path: str = "") -> list[str]:
+    """`-S` leaves site-packages out, so that what a peer needs is put on the path by name."""
+    setup = f"import sys; sys.path[:0] = {[path] if path else _site()!r}; " if module else ""
+    return [sys.executable, "-I", "-S", "-c", f"{setup}import {module}" if module else ""]
+
+
+def _site() -> list[str]:
+    return [entry for entry in sys.path if entry.endswith("-packages")]
+
+
+def section(rounds: int) -> Section:
+    """Bare, generated and known imports, interleaved."""
+    result = Section(
+        "Import time over a bare interpreter", INTRO, ["", "wall, best", "wall, median", "CPU, median"]
+    )
+    others = [name for name in OTHERS if importlib.util.find_spec(name.partition(".")[0])]
+    result.missing = [f"{name} (not installed)" for name in OTHERS if name not in others]
+    with tempfile.TemporaryDirectory() as folder:  # a copy: the bytecode is left there
+        shutil.copytree(GENERATED, Path(folder, GENERATED.name))
+        commands = {BARE: _command("")}
+        commands |= {
+            f"{GENERATED.name}.{name}": _command(f"{GENERATED.name}.{name}", folder) for name in LIMITS_MS
+        }
+        commands |= {name: _command(name) for name in others}
+        runs = interleave(commands, rounds)
+    result.rows = [_row(name, runs) for name in commands]
+    result.goals = [_goal(name, runs) for name in GOALS]
+    return result
+
+
+def _row(name: str, runs: dict[str, Run]) -> list[str]:
+    run, bare = runs[name], runs[BARE]
+    if name == BARE:
+        return [name, *(f"({seconds * 1e3:.1f} ms)" for seconds in _figures(run))]
+    costs = (mine - its for mine, its in zip(_figures(run), _figures(bare), strict=True))
+    return [name, *(f"{seconds * 1e3:.1f} ms" for seconds in costs)]
+
+
+def _figures(run: Run) -> tuple[float, float, float]:
+    return run.wall.best, run.wall.median, run.cpu.median
+
+
+def _goal(name: str, runs: dict[str, Run]) -> Goal:
+    cost = runs[f"{GENERATED.name}.{name}"].wall.best - runs[BARE].wall.best
+    return Goal(f"import of {name}", cost * 1e3, LIMITS_MS[name], "ms over bare")

@@ -1,0 +1,50 @@
+"""Whole processes, timed from outside: wall clock, and the CPU time the system has counted for them."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+
+from benchmarks.measure import Timing
+
+
+class Run:
+    """One command, run again and again."""
+
+    def __init__(self) -> None:
+        self.wall = Timing()
+        self.cpu = Timing()
+
+    def add(self, command: Sequence[str], environment: Mapping[str, str] | None = None) -> None:
+        """Run it once more; its output is not wanted, its failure is."""
+        before = _cpu()
+        start = time.perf_counter()
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+        self.wall.rounds.append(time.perf_counter() - start)
+        self.cpu.rounds.append(_cpu() - before)
+        if done.returncode:
+            raise RuntimeError(f"{' '.join(command)}: {done.stderr.strip()}")
+
+
+def _cpu() -> float:
+    """Seconds of CPU time of all child processes so far; os.times() would only count in ticks of 10 ms."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def interleave(
+    commands: Mapping[str, Sequence[str]],
+    rounds: int,
+    environment: Mapping[str, str] | None = None,
+    warm: bool = True,
+) -> dict[str, Run]:
+    """All commands in turns; a turn that warms caches up is not counted."""
+    for command in commands.values() if warm else ():
+        Run().add(command, environment)
+    runs = {name: Run() for name in commands}
+    for _ in range(rounds):
+        for name, command in commands.items():
+            runs[name].add(command, environment)
+    return runs
