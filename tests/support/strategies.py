@@ -22,7 +22,9 @@ def raw_values(scalar: Scalar) -> st.SearchStrategy[int]:
         bits = [1 << member.value for member in scalar.meaning.members]
         return st.lists(st.sampled_from(bits), unique=True).map(sum)
     likely = [scalar.minimum, scalar.maximum, scalar.default, 0, 1, -1]
-    likely += [int.from_bytes(bytes((byte,)) * 8, "big") & ((1 << scalar.bits) - 1) for byte in (0xA5, 0x7E, 0xFF)]
+    likely += [
+        int.from_bytes(bytes((byte,)) * 8, "big") & ((1 << scalar.bits) - 1) for byte in (0xA5, 0x7E, 0xFF)
+    ]
     if isinstance(scalar.meaning, Enum):
         likely += [member.value for member in scalar.meaning.members]
     known = sorted({value for value in likely if scalar.minimum <= value <= scalar.maximum})

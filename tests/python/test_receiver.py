@@ -1,0 +1,93 @@
+"""The generated stream decoders: the events of the byte-at-a-time reference, whatever the pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.python.protocols import EVERY, directions, module, protocol, stream, wire_of
+from tests.support import strategies
+from tests.support.receiver_model import receiver
+
+STREAMS = [(name, direction) for name in EVERY for direction in directions(name)]
+
+
+def some_wire(name: str, direction: Any) -> st.SearchStrategy[bytes]:
+    """A good frame, one with a byte changed, lost or added, one that breaks off, or noise."""
+    kinds = module(name).MESSAGES
+    good = strategies.messages(protocol(name), direction).map(
+        lambda both: wire_of(name, both[0], kinds[both[0].name](**both[1]))
+    )
+    damaged = st.tuples(
+        good,
+        st.integers(0, 400),
+        st.sampled_from([b"", b"\xa5", b"\x00", b"\xff", b"\x7e\x7e"]),
+        st.integers(0, 2),
+    )
+    spoilt = damaged.map(lambda d: d[0][: d[1] % len(d[0])] + d[2] + d[0][d[1] % len(d[0]) + d[3] :])
+    cut = st.tuples(good, st.integers(0, 400)).map(lambda both: both[0][: both[1] % len(both[0])])
+    return st.one_of(good, good, spoilt, cut, strategies.junk(protocol(name)))
+
+
+def streams(name: str, direction: Any) -> st.SearchStrategy[bytes]:
+    return st.lists(some_wire(name, direction), max_size=6).map(b"".join)
+
+
+def summary(events: Iterable[Any]) -> list[tuple[Any, ...]]:
+    """Events with everything that has to be the same in another run."""
+    return [(e.kind, e.offset, e.raw) if hasattr(e, "kind") else ("message", repr(e), b"") for e in events]
+
+
+@pytest.mark.parametrize(("name", "direction"), STREAMS)
+@settings(max_examples=150)
+@given(data=st.data())
+def test_the_pieces_do_not_matter(name: str, direction: Any, data: st.DataObject) -> None:
+    wire = data.draw(streams(name, direction))
+    whole = stream(name, direction)
+    expected = summary([*whole.feed(wire), *whole.finish()])
+    cuts = data.draw(st.lists(st.integers(1, 20), max_size=40))
+    decoder, at = stream(name, direction), 0
+    found: list[Any] = []
+    for size in [*cuts, len(wire)]:
+        found += decoder.feed(wire[at : at + size])
+        at += size
+    found += decoder.finish()
+    assert summary(found) == expected
+    single = stream(name, direction)
+    one_by_one = [event for byte in wire for event in single.feed(bytes((byte,)))]
+    assert summary([*one_by_one, *single.finish()]) == expected
+    counters = whole.counters
+    assert counters.frames == sum(kind == "message" for kind, _, _ in expected)
+    assert sum(counters.faults.values()) == len(expected) - counters.frames
+    assert (decoder.counters.frames, decoder.counters.skipped) == (counters.frames, counters.skipped)
+
+
+def described(events: Iterable[Any]) -> list[tuple[object, ...]]:
+    """Events of the generated decoder, as the reference tells them."""
+    return [
+        ("fault", e.kind, e.offset)
+        if hasattr(e, "offset") and hasattr(e, "kind")
+        else ("message", e.NAME, e.to_bytes().hex())
+        for e in events
+    ]
+
+
+@pytest.mark.parametrize(("name", "direction"), STREAMS)
+@settings(max_examples=250)
+@given(data=st.data())
+def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObject) -> None:
+    wire = data.draw(streams(name, direction))
+    decoder, machine = stream(name, direction), receiver(protocol(name), direction)
+    for at, byte in enumerate(wire):
+        expected: list[tuple[object, ...]] = []
+        for event in machine.feed(byte):
+            if event.kind == "message":
+                again = module(name).MESSAGES[event.name].from_bytes(event.payload)
+                expected.append(("message", event.name, again.to_bytes().hex()))
+            else:
+                expected.append(("fault", event.kind, event.offset))
+        assert described(decoder.feed(bytes((byte,)))) == expected, f"byte {at} of {wire.hex(' ')}"
