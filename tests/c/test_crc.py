@@ -60,6 +60,19 @@ def test_check_values(form: str, tmp_path: Path, require_tool: Callable[..., str
         assert run(tmp_path / "check") == f"{algorithm.check:04x}", algorithm.name
 
 
+@pytest.mark.parametrize("choice", ["BOGUS", "QLINK_CRC_16_XMODEMM", "", "1", "0x1021u"])
+@pytest.mark.parametrize("tool", ["gcc", "clang"])
+def test_an_unknown_algorithm_is_named(
+    tool: str, choice: str, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    header("qlink", tmp_path)
+    done = compiled(tmp_path, require_tool(tool, package=tool), choice, "NIBBLE")
+    assert done.returncode != 0
+    errors = [line for line in done.stderr.splitlines() if "error:" in line]
+    assert len(errors) == 1, done.stderr
+    assert "QLINK_CRC is neither an algorithm of this header, such as QLINK_CRC_16_IBM_3740," in errors[0]
+
+
 def test_an_algorithm_of_ones_own(tmp_path: Path, require_tool: Callable[..., str]) -> None:
     compiler = require_tool("gcc", package="gcc")
     header("qlink", tmp_path)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.c.conftest import SHIPPED
+from qlinkgen.model.naming import snake
+from tests.c.conftest import PROTOCOLS, SHIPPED, protocol_of
 from tests.c.test_compile import header, run
 from tests.support.cdriver import WARNINGS
 
@@ -23,3 +24,22 @@ def test_dispatch(name: str, tmp_path: Path, require_tool: Callable[..., str]) -
     program = PROGRAMS / f"dispatch_{name}.c"
     run(compiler, "-std=gnu99", "-g", *WARNINGS, *SANITIZED, "-I", tmp_path, program, "-o", tmp_path / "test")
     run(tmp_path / "test")
+
+
+def test_transactions_are_told_in_full(tmp_path: Path) -> None:
+    """Each command has what holds for it, and none what does not."""
+    for name in PROTOCOLS:
+        text, protocol = header(name, tmp_path), protocol_of(name)
+        assert ("_ADDRESSING_EITHER 2 " in text) == bool(protocol.address_name and protocol.commands)
+        for command in protocol.commands:
+            constant = f"#define {name.upper()}_{snake(command.name).upper()}"
+            assert (f"{constant}_RESPONSE_BITS " in text) == (command.response is not None)
+            assert (f"{constant}_RESPONSE_US " in text) == (command.response is not None)
+            if protocol.address_name:
+                kind = f"{name.upper()}_ADDRESSING_{command.addressing.upper()}"
+                assert f"{constant}_ADDRESSING {kind}\n" in text
+            if command.repeat.counter:
+                how = f"{name.upper()}_REPEAT_BY_COUNTER /* field {command.repeat.counter} */"
+            else:
+                how = f"{name.upper()}_REPEAT_{'SAFE' if command.repeat.safe else 'UNSAFE'}"
+            assert f"{constant}_REPEAT {how}\n" in text

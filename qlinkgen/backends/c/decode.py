@@ -17,8 +17,9 @@ from qlinkgen.model.types import Array, Bits, Blob, Scalar
 class Decoder:
     """Collects the statements for one message.
 
-    In a message of variable size, ``rest`` is how many bytes there are beyond the fewest: each variable field
-    takes its share, and none may be left. So every fixed byte is known to be there before it is read.
+    In a message with several fields of variable size, ``rest`` is how many bytes there are beyond the fewest:
+    each takes its share, and none may be left. One such field alone has all that ``size`` leaves. Either way
+    every fixed byte is known to be there before it is read.
     """
 
     message: Message
@@ -47,7 +48,7 @@ class Decoder:
     @property
     def uses_rest(self) -> bool:
         """The bytes beyond the fewest are counted."""
-        return bool(self.message.variable)
+        return len(self.message.variable) > 1
 
     @property
     def counters(self) -> list[str]:
@@ -67,7 +68,8 @@ class Decoder:
             return
         terms = [f"size < {message.min_size}u"] if message.min_size else []
         self._refuse([*terms, f"size > {message.max_size}u"], "LENGTH")
-        self.lines.append(f"rest = size - {message.min_size}u;" if message.min_size else "rest = size;")
+        if self.uses_rest:
+            self.lines.append(f"rest = {_less('size', message.min_size)};")
 
     def _read(self, each: Field) -> None:
         kind = each.type
@@ -185,17 +187,28 @@ class Decoder:
         """Find how many items there are, and take their bytes from the rest."""
         least, step = kind.length.minimum * kind.item_size, kind.item_size
         counted, alone = each.name in self._counted, len(self.message.variable) == 1
-        if not counted:
-            self._measure(each, kind, alone=alone)
-            if alone:
-                return
         share = f"{step}u * {each.name}_count" if step > 1 else f"{each.name}_count"
-        share = f"{share} - {least}u" if least else share
-        self._refuse([f"{share} {'!=' if alone else '>'} rest"], "LENGTH")
-        if not alone:
-            self.lines.append(f"rest -= {share};")
+        if alone:
+            left = _less("size", self.message.min_size - least)
+            if counted:
+                self._refuse([f"{share} != {left}"], "LENGTH")
+            else:  # bounded by the size of the message
+                self._count_items(each, left, step)
+            return
+        if not counted:
+            self._measure(each, kind)
+        share = _less(share, least)
+        self._refuse([f"{share} > rest"], "LENGTH")
+        self.lines.append(f"rest -= {share};")
 
-    def _measure(self, each: Field, kind: Array | Blob, *, alone: bool) -> None:
+    def _count_items(self, each: Field, left: str, step: int) -> None:
+        if step > 1:
+            left = f"({left})" if " " in left else left
+            self._refuse([f"{left} % {step}u != 0u"], "LENGTH")
+            left = f"{left} / {step}u"
+        self.lines.append(f"{each.name}_count = {left};")
+
+    def _measure(self, each: Field, kind: Array | Blob) -> None:
         later = self._later_shares(each)
         if later:
             self._refuse([f"{' + '.join(later)} > rest"], "LENGTH")
@@ -207,8 +220,7 @@ class Decoder:
         self.lines.append(
             f"{each.name}_count = {left} + {least}u;" if least else f"{each.name}_count = {left};"
         )
-        if not alone:  # alone it is bounded by the size of the message
-            self._refuse([f"{each.name}_count > {kind.length.maximum}u"], "LENGTH")
+        self._refuse([f"{each.name}_count > {kind.length.maximum}u"], "LENGTH")
 
     def _later_shares(self, each: Field) -> list[str]:
         behind = self.message.variable[self.message.variable.index(each) + 1 :]
@@ -231,6 +243,10 @@ class Decoder:
             self.lines.append(f"at += {self._offset};")
         self._offset = 0
         self._moved = True
+
+
+def _less(value: str, number: int) -> str:
+    return f"{value} - {number}u" if number else value
 
 
 def _loop(count: str, body: list[str]) -> list[str]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from qlinkgen.backends.c.describe import wrapped
+from qlinkgen.backends.c.framing import Address, checks
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import C_RESERVED, snake
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.transaction import Allowance, Bus, Command
+from qlinkgen.model.transaction import Allowance, Bus, Command, Repeat
 
 #: Members that a table has beside its functions.
 _TAKEN = frozenset({"node", "address", "broadcast", "context", "id"})
@@ -58,18 +59,12 @@ def _entry(names: Names, message: Message, answer: Message | None, command: Comm
     }
 
 
-def master_entries(names: Names, kept: tuple[Message, ...]) -> list[dict[str, Any]]:
+def master_entries(names: Names, address: Address, kept: tuple[Message, ...]) -> list[dict[str, Any]]:
     """What a master can be told, in schema order."""
+    told = tuple(message for message in kept if message.direction != "request")
     return [
-        {
-            "name": told_name(names, message),
-            "constant": names.constant(message),
-            "function": names.function(message),
-            "has_struct": bool(message.values),
-            "has_bytes": bool(message.fields),
-        }
-        for message in kept
-        if message.direction != "request"
+        {**check, "name": told_name(names, message)}
+        for message, check in zip(told, checks(names, address, told), strict=True)
     ]
 
 
@@ -79,17 +74,22 @@ def transactions(protocol: Protocol, upper: str, commands: tuple[Command, ...]) 
         {
             "constant": f"{upper}_{snake(command.name).upper()}",
             "name": command.name,
-            "answered": int(command.response is not None),
+            "answered": command.response is not None,
             "bits": _bits(command.response_within, protocol.bus),
             "microseconds": _microseconds(command.response_within),
-            "repeat_safe": int(command.repeat.safe),
+            "addressing": command.addressing.upper(),
+            "repeat": _repeat(command.repeat),
+            "counter": command.repeat.counter,
             "in_flight": command.in_flight,
-            "broadcast": {"node": 0, "none": 0, "broadcast": 1, "either": 2, "answered_broadcast": 2}[
-                command.addressing
-            ],
         }
         for command in commands
     ]
+
+
+def _repeat(repeat: Repeat) -> str:
+    if repeat.counter:
+        return "BY_COUNTER"
+    return "SAFE" if repeat.safe else "UNSAFE"
 
 
 def _bits(allowance: Allowance, bus: Bus) -> int:

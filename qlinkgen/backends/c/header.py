@@ -151,11 +151,12 @@ class Header:
         master = (
             []
             if self._options.role == "slave" and not ring
-            else dispatch.master_entries(self._names, self._kept)
+            else dispatch.master_entries(self._names, self._address, self._kept)
         )
         transactions = dispatch.transactions(self._protocol, self._names.upper, commands)
         view = {**self._section.view, **self._section.dispatch_view(self._protocol, self._names.upper)}
-        view["example_command"] = snake(commands[0].name).upper() if commands else ""
+        answered = next((c for c in commands if c.response is not None), None)
+        view["example_command"] = snake(answered.name).upper() if answered else ""
         if self._section.slave_only:
             master = []
         return self._place("dispatch", f=view, slave=slave, master=master, transactions=transactions)

@@ -2,34 +2,98 @@
 
 from __future__ import annotations
 
-_WIDTH = 110
+import textwrap
+
+_WIDTH = 120
+#: Where code is folded; the operator stays at the end of its line.
+_SEPARATORS = (", ", " || ", " && ", " | ", " + ", " - ", " ? ", " : ", " = ")
 
 
 def tidy(text: str) -> str:
-    """Without trailing space and needless blank lines; long code is folded at a comma."""
+    """Without trailing space and needless blank lines; what is too long is folded."""
     lines: list[str] = []
-    for line in text.split("\n"):
-        line = line.rstrip()  # noqa: PLW2901 - the same line, tidied
+    for line in _folded([line.rstrip() for line in text.split("\n")]):
         if not line and (not lines or not lines[-1] or lines[-1].endswith("{")):
             continue
         if line.lstrip() == "}" and lines and not lines[-1]:
             lines.pop()
-        lines += _folded(line) if len(line) > _WIDTH else [line]
+        lines.append(line)
     return "\n".join(lines) + "\n" if lines[-1] else "\n".join(lines)
 
 
-def _folded(line: str) -> list[str]:
-    if line.lstrip().startswith(("#", "/*", "*")) or "/*" in line or line.endswith("\\"):
-        return [line]
-    indent = " " * (len(line) - len(line.lstrip()) + 4)
+def _folded(lines: list[str]) -> list[str]:
+    folded: list[str] = []
+    carried = ""  # words of a comment that its line had no room for
+    for number, line in enumerate(lines):
+        following = lines[number + 1] if number + 1 < len(lines) else ""
+        if carried:
+            line = f" * {carried} {line[3:]}"  # noqa: PLW2901 - the same line, with what the last one had left
+            carried = ""
+        if len(line) <= _WIDTH:
+            folded.append(line)
+        elif line.startswith(" *") or (line.startswith("/*") and "*/" not in line):
+            first, *more = textwrap.wrap(line, _WIDTH, subsequent_indent=" * ", break_on_hyphens=False)
+            if len(more) == 1 and _is_prose(following) and "*/" not in line:
+                carried, more = more[0][3:], []
+            folded += [first, *more]
+        else:
+            folded += _shorter(line, in_macro=bool(folded) and folded[-1].endswith("\\"))
+    return folded
+
+
+def _is_prose(line: str) -> bool:
+    return line.startswith(" * ") and line[3:4].isalpha()
+
+
+def _shorter(line: str, *, in_macro: bool) -> list[str]:
+    code, opening, note = line.partition("/*")
+    indent = line[: len(line) - len(line.lstrip())]
+    if opening and note.endswith("*/"):
+        comment = _comment(note.removesuffix("*/").strip(), indent)
+        return comment + _folded([code.rstrip()] if code.strip() else [])
+    if line.startswith("#error "):
+        words = textwrap.wrap(line.removeprefix("#error ").strip('"'), _WIDTH - 12)
+        return ['#error "' + ' " \\\n    "'.join(words) + '"']
+    if line.startswith("static inline ") and line.endswith(")"):
+        head, parameters = line.split("(", 1)
+        return [f"{head}(", *_pieces(f"    {parameters}", "    ", _WIDTH)]
+    if line.startswith("#") or in_macro or line.endswith("\\"):
+        pieces = _pieces(line.removesuffix("\\").rstrip(), indent + "    ", _WIDTH - 2)
+        end = " \\" if line.endswith("\\") else ""
+        return [f"{piece} \\" for piece in pieces[:-1]] + [pieces[-1] + end]
+    return _pieces(line, indent + "    ", _WIDTH)
+
+
+def _comment(text: str, indent: str) -> list[str]:
+    one = f"{indent}/* {text} */"
+    if len(one) <= _WIDTH:
+        return [one]
+    lines = textwrap.wrap(text, _WIDTH - len(indent) - 6, break_on_hyphens=False)
+    return [
+        f"{indent}/* {lines[0]}",
+        *(f"{indent} * {line}" for line in lines[1:-1]),
+        f"{indent} * {lines[-1]} */",
+    ]
+
+
+def _pieces(line: str, indent: str, width: int) -> list[str]:
     pieces = []
-    while len(line) > _WIDTH:
-        cut = max(
-            line.rfind(separator, len(indent), _WIDTH) + len(separator)
-            for separator in (", ", " || ", " && ")
-        )
-        if cut <= len(indent) + 4:
+    while len(line) > width:
+        cut = _best_cut(line, len(indent) + 4, width)
+        if not cut:
             break
         pieces.append(line[:cut].rstrip())
         line = indent + line[cut:]
     return [*pieces, line]
+
+
+def _best_cut(line: str, least: int, width: int) -> int:
+    """Behind the separator that is nested least, the last of several; 0 where there is none."""
+    best, depth, nested = 0, len(line), 0
+    for place, character in enumerate(line[: width + 1]):
+        nested += (character in "([{") - (character in ")]}")
+        found = next((each for each in _SEPARATORS if line.startswith(each, place)), "")
+        end = place + len(found)
+        if found and least < end <= width + 1 and (nested <= depth or best < width // 3):
+            best, depth = end, nested
+    return best

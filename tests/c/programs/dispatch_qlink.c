@@ -44,6 +44,16 @@ int main(void)
     assert(qlink_frame_decode(&reply, body, answer, size) == QLINK_OK && reply.node == 3u);
     master.motion = on_response;
     assert(qlink_master_dispatch(&master, &reply) == QLINK_OK && responses == 302);
+    /* an answer cannot come from everybody, nor from a node that cannot be; what is wrong in it is told first */
+    responses = 0;
+    for (unsigned node = 0u; node <= 255u; ++node) {
+        reply.node = (uint8_t)node;
+        assert(qlink_master_dispatch(&master, &reply) == qlink_response_check(&reply));
+        assert(qlink_response_check(&reply) == ((node >= 1u && node <= 16u) ? QLINK_OK : QLINK_ERROR_RANGE));
+    }
+    assert(responses == 1602);
+    --reply.size;
+    assert(qlink_master_dispatch(&master, &reply) == QLINK_ERROR_LENGTH && responses == 1602);
     /* another node; a function that says no */
     assert(asked(qlink_motion_request_to_frame(&motion, 4u, wire, sizeof wire), wire) == 0u && motions == 1);
     motion.outputs = 0xFFu;
@@ -82,6 +92,14 @@ int main(void)
         assert(qlink_node_program_load_request_decode(&load, bad, 0u) == QLINK_OK && load.counter == 0u && load.program_data_size == 0u);
     }
     assert(QLINK_RESPONSE_US(MOTION, 115200ul) == 261ul && QLINK_RESPONSE_US(NODE_PROGRAM_LOAD, 115200ul) == 10000ul);
-    assert(QLINK_MOTION_REPEAT_SAFE == 1 && QLINK_MOTOR_REQUEST_REPEAT_SAFE == 0 && QLINK_NODE_START_ANSWERED == 0);
+    assert(QLINK_NODE_START_ANSWERED == 0 && QLINK_MOTION_ANSWERED == 1);
+    assert(QLINK_MOTION_REPEAT == QLINK_REPEAT_BY_COUNTER && QLINK_NODE_PROGRAM_LOAD_REPEAT == QLINK_REPEAT_BY_COUNTER);
+    assert(QLINK_MOTOR_REQUEST_REPEAT == QLINK_REPEAT_UNSAFE && QLINK_NODE_START_REPEAT == QLINK_REPEAT_SAFE);
+    assert(QLINK_MOTION_ADDRESSING == QLINK_ADDRESSING_NODE && QLINK_NODE_START_ADDRESSING == QLINK_ADDRESSING_EITHER);
+    assert(QLINK_NODE_SYNC_ADDRESSING == QLINK_ADDRESSING_BROADCAST);
+    assert(QLINK_NODE_SETUP_ADDRESSING == QLINK_ADDRESSING_ANSWERED_BROADCAST);
+#if defined(QLINK_NODE_START_RESPONSE_BITS) || defined(QLINK_NODE_SYNC_RESPONSE_US)
+#error "what is not answered has no time to answer in"
+#endif
     return 0;
 }
