@@ -54,6 +54,11 @@ class Value:
     field: Field
     bits: BitField | None = None
 
+    @property
+    def required(self) -> bool:
+        """The caller has to choose the value; its default is for vectors alone."""
+        return self.type.required
+
 
 @dataclass(frozen=True)
 class Message:

@@ -20,7 +20,9 @@ C_RESERVED = frozenset(
 )
 
 #: Attributes that generated message classes have themselves.
-GENERATED_ATTRIBUTES = frozenset({"to_bytes", "from_bytes", "to_frame", "to_dict", "from_dict"})
+GENERATED_ATTRIBUTES = frozenset(
+    {"to_bytes", "from_bytes", "to_frame", "to_dict", "from_dict", "from_checked", "measure_payload"}
+)
 
 
 #: Names that generated modules and headers give to things of their own.

@@ -147,6 +147,8 @@ class Scalar:
     minimum: int
     maximum: int
     default: int = 0
+    #: The caller has to choose: no default is written, and 0 is not legal.
+    required: bool = False
     scaling: Scaling | None = None
     unit: str = ""
     meaning: Enum | Flags | Literal["bool"] | None = None
@@ -264,6 +266,8 @@ class Blob:
     text: bool
     length: Length
     default: bytes = b""
+    #: The caller has to choose: none is written, and empty is not legal.
+    required: bool = False
 
     #: Bytes of one item.
     item_size: int = field(default=1, init=False)
@@ -276,6 +280,8 @@ class Array:
     item: Scalar
     length: Length
     default: tuple[int, ...] = ()
+    #: The caller has to choose: none is written, and empty is not legal.
+    required: bool = False
 
     @property
     def item_size(self) -> int:

@@ -7,7 +7,9 @@ number when unknown), flags an integer, scaled values numbers in the unit with a
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
@@ -17,6 +19,10 @@ from qlinkgen.model.message import Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
 
 Native = int | bool | float | Decimal | bytes | str | list[int]
+
+
+_WHOLE = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|0[bB][01]+|[0-9]+)")
+_DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 class BadValue(ValueError):
@@ -43,7 +49,7 @@ def raw_from_native(value: Value, native: Native) -> int:
     scalar = value.type
     assert isinstance(scalar, Scalar)
     if isinstance(native, bytes | str | list) or (isinstance(native, float) and not math.isfinite(native)):
-        raise BadValue(f"{value.name}: {native!r} is not a number")
+        raise BadValue(f"{value.name}: {_shown(native)} is not a number")
     if isinstance(native, Decimal) and not native.is_finite():
         raise BadValue(f"{value.name}: {native} is not a number")
     exact = Fraction(native)
@@ -75,8 +81,9 @@ def to_json(value: Value, native: Native) -> Any:
 def from_json(value: Value, given: Any) -> Native:
     """A JSON value (or text of a command line) as the native one.
 
-    Accepts what :func:`to_json` gives, and enum numbers, flag names as a list, numbers in text (0x too).
-    Raises BadValue; ranges are left to the encoder.
+    Accepts what :func:`to_json` gives, and enum numbers, flag names as a list, numbers in text (0x and 0b
+    too). Raises BadValue; ranges are left to the encoder and
+    to :func:`check_items`.
     """
     kind = value.type
     if isinstance(kind, Blob):
@@ -97,48 +104,94 @@ def from_json(value: Value, given: Any) -> Native:
     )
 
 
+def check_items(value: Value, native: Native) -> None:
+    """Whether a list has a legal number of items, each in its range. Raises BadValue."""
+    kind = value.type
+    if not isinstance(kind, Array) or not isinstance(native, list):
+        return
+    number, low, high = len(native), kind.length.minimum, kind.length.maximum
+    if not low <= number <= high:
+        limit = f"at most {high}" if number > high else f"at least {low}"
+        raise BadValue(f"{value.name}: {number} item{'' if number == 1 else 's'}; {limit}")
+    low, high = kind.item.minimum, kind.item.maximum
+    for index, item in enumerate(native):
+        if not low <= item <= high:
+            raise BadValue(f"{value.name}[{index}]: {item} is out of range {low}..{high}")
+
+
+def whole_number(text: str) -> int | None:
+    """A whole number written decimal, 0x or 0b; None if it is none."""
+    if not _WHOLE.fullmatch(text):
+        return None
+    plain = text.lstrip("+-").lower()
+    number = int(plain, {"0x": 16, "0b": 2}.get(plain[:2], 10))
+    return -number if text.startswith("-") else number
+
+
+def _shown(given: Any) -> str:
+    """What was given, as JSON has it."""
+    if isinstance(given, str):
+        return f"'{given}'"
+    if isinstance(given, Decimal):
+        return str(given)
+    if isinstance(given, list | tuple):
+        return f"[{', '.join(map(_shown, given))}]"
+    if isinstance(given, Mapping):
+        return f"{{{', '.join(f'{_shown(name)}: {_shown(each)}' for name, each in given.items())}}}"
+    return given.hex() if isinstance(given, bytes) else json.dumps(given)
+
+
 def _blob(name: str, kind: Blob, given: Any) -> bytes | str:
     if not isinstance(given, str):
-        raise BadValue(
-            f"{name}: {given!r} is not text; write {'the characters' if kind.text else 'hex digits'}"
-        )
+        fix = "the characters" if kind.text else "hex digits"
+        raise BadValue(f"{name}: {_shown(given)} is not text; write {fix}")
     if kind.text:
         return given
     try:
-        return bytes.fromhex(given)
+        return bytes.fromhex(given[2:] if given[:2].lower() == "0x" else given)
     except ValueError:
         raise BadValue(f"{name}: '{given}' is not a byte string; write pairs of hex digits") from None
 
 
 def _listed(name: str, given: Any) -> Sequence[Any]:
     if isinstance(given, str):
-        return [item for item in given.replace(",", " ").strip("[]").split() if item]
+        return _split(name, given)
     if isinstance(given, Sequence):
         return given
-    raise BadValue(f"{name}: {given!r} is not a list; write numbers with commas between them")
+    raise BadValue(f"{name}: {_shown(given)} is not a list; write numbers with commas between them")
+
+
+def _split(name: str, given: str) -> list[str]:
+    """The items of `1,2`, `1 2`, `[1, 2]` or `["a", "b"]`."""
+    text = given.strip()
+    if text.startswith("["):
+        if not text.endswith("]"):
+            raise BadValue(f"{name}: '{given}' begins with [ and does not end with ]")
+        text = text[1:-1]
+    groups = [group.split() for group in text.split(",")] if text.strip() else []
+    if not all(groups):
+        raise BadValue(f"{name}: '{given}' has an empty item; write a value on both sides of each comma")
+    items = [item for group in groups for item in group]
+    return [item[1:-1] if len(item) > 1 and item[0] == item[-1] == '"' else item for item in items]
 
 
 def _whole(name: str, given: Any) -> int:
-    if isinstance(given, str):
-        try:
-            return int(given, 0)
-        except ValueError:
-            raise BadValue(f"{name}: '{given}' is not a whole number") from None
-    if isinstance(given, bool) or not isinstance(given, int):
-        raise BadValue(f"{name}: {given!r} is not a whole number")
-    return given
+    number = whole_number(given) if isinstance(given, str) else given
+    if isinstance(number, bool) or not isinstance(number, int):
+        raise BadValue(f"{name}: {_shown(given)} is not a whole number")
+    return number
 
 
 def _number(name: str, given: Any, *, exact: bool) -> int | float | Decimal:
-    try:
-        if isinstance(given, str):
-            number = Decimal(int(given, 0)) if given.lower().startswith(("0x", "-0x")) else Decimal(given)
-            return number if exact else float(number)
-    except ArithmeticError:
-        raise BadValue(f"{name}: '{given}' is not a number") from None
-    if isinstance(given, bool) or not isinstance(given, int | float | Decimal):
-        raise BadValue(f"{name}: {given!r} is not a number")
-    return float(given) if isinstance(given, Decimal) and not exact else given
+    number = given
+    if isinstance(given, str):
+        whole = whole_number(given)
+        number = (
+            Decimal(whole) if whole is not None else Decimal(given) if _DECIMAL.fullmatch(given) else None
+        )
+    if isinstance(number, bool) or not isinstance(number, int | float | Decimal):
+        raise BadValue(f"{name}: {_shown(given)} is not a number")
+    return float(number) if isinstance(number, Decimal) and not exact else number
 
 
 def _bool(name: str, given: Any) -> bool:
@@ -146,22 +199,20 @@ def _bool(name: str, given: Any) -> bool:
     key = given.lower() if isinstance(given, str) else given
     if isinstance(key, str | int) and key in known:
         return known[key]
-    raise BadValue(f"{name}: {given!r} is neither true nor false")
+    raise BadValue(f"{name}: {_shown(given)} is neither true nor false")
 
 
-def _named_or_number(name: str, given: str, names: Mapping[str, int]) -> int:
-    try:
-        return int(given, 0)
-    except ValueError:
-        raise BadValue(f"{name}: '{given}' is unknown; one of {', '.join(names)}, or a number") from None
+def _named_or_number(name: str, given: Any, names: Mapping[str, int]) -> int:
+    number = whole_number(given) if isinstance(given, str) else given
+    if isinstance(number, bool) or not isinstance(number, int):
+        raise BadValue(f"{name}: {_shown(given)} is unknown; one of {', '.join(names)}, or a number")
+    return number
 
 
 def _flags(name: str, flags: Flags, given: Any) -> int:
     bits = {member.name: 1 << member.value for member in flags.members}
     total = 0
-    for item in _listed(name, given.replace("|", " ") if isinstance(given, str) else given):
-        if isinstance(item, str) and item in bits:
-            total |= bits[item]
-        else:
-            total |= _named_or_number(name, str(item), bits)
+    for item in _listed(name, given.replace("|", ",") if isinstance(given, str) else given):
+        known = isinstance(item, str) and item in bits
+        total |= bits[item] if known else _named_or_number(name, item, bits)
     return total

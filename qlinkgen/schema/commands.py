@@ -31,8 +31,8 @@ def build_bus(file: SchemaFile) -> Bus:
     )
 
 
-def _allowance(time: Duration) -> Allowance:
-    return Allowance(time.byte_times, time.seconds)
+def _allowance(time: Duration | None) -> Allowance:
+    return Allowance(time.byte_times, time.seconds) if time else Allowance()
 
 
 class CommandBuilder:

@@ -55,7 +55,8 @@ def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, site: Site) ->
         return None
     default = _blob_default(spec, text, length, site)
     fill = b" " if text.base == "text" else b"\0"
-    return Blob(text.base == "text", length, default.ljust(length.minimum, fill))
+    required = spec.default is None and length.minimum > 0
+    return Blob(text.base == "text", length, default.ljust(length.minimum, fill), required)
 
 
 def _blob_default(spec: FieldSpec, text: TypeText, length: Length, site: Site) -> bytes:
@@ -83,7 +84,8 @@ def build_array(item: Scalar, spec: FieldSpec, text: TypeText, payload_max: int,
     if length is None:
         return None
     default = _array_default(spec, item, length, site)
-    return Array(item, length, default + (0,) * (length.minimum - len(default)))
+    required = spec.default is None and length.minimum > 0
+    return Array(item, length, default + (0,) * (length.minimum - len(default)), required)
 
 
 def _array_default(spec: FieldSpec, item: Scalar, length: Length, site: Site) -> tuple[int, ...]:

@@ -233,7 +233,9 @@ class BusSpec(_Mapping):
     bits_per_byte: Annotated[StrictInt, Field(ge=1, le=16)] = Field(
         default=10, description="Bits on the line for a byte: start, data, parity and stop bits"
     )
-    response_within: Time = Field(description="Time that a slave may take to answer")
+    response_within: Time | None = Field(
+        default=None, description="Time that a slave may take to answer, where one is stated"
+    )
 
 
 class AttributeSpec(_Mapping):

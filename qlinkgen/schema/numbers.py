@@ -108,7 +108,8 @@ def _step_hint(scaling: Scaling | None) -> str:
 def defaulted(scalar: Scalar, value: Written | None, key: str, site: Site) -> Scalar:
     """A scalar with the default or constant that is written for it; without one, the number nearest to 0."""
     if value is None:
-        return replace(scalar, default=min(max(0, scalar.minimum), scalar.maximum))
+        nearest = min(max(0, scalar.minimum), scalar.maximum)
+        return replace(scalar, default=nearest, required=nearest != 0)
     raw = _raw(scalar, value, key, site)
     if raw is None:
         return scalar

@@ -22,7 +22,7 @@ from qlinkgen.schema.source import Path
 #: Required keys whose absence should not keep the rest of their mapping from being checked.
 _STAND_INS: dict[str, Any] = {
     "qlinkgen": 1, "protocol": {}, "name": "unnamed", "revision": "", "source": "",
-    "frame": {}, "bus": {}, "kind": "host", "response_within": "0 bytes",
+    "frame": {}, "bus": {}, "kind": "host",
     "type": "u8", "id": 0, "fields": {}, "at": 0,
 }  # fmt: skip
 #: More rounds than mappings can be nested in one another.
