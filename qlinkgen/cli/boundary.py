@@ -59,7 +59,7 @@ def _invoke(cli: click.Command) -> int:
         return _complain(error.text, error.code)
     except SchemaError as error:
         click.echo(str(error), err=True)
-        unreadable = all(fault.rule == "file-unreadable" for fault in error.faults)
+        unreadable = any(fault.rule == "file-unreadable" for fault in error.faults)
         return USAGE if unreadable else WRONG
     except QlinkgenError as error:
         return _complain(str(error), WRONG)

@@ -10,7 +10,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import did_you_mean
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import BadValue, from_json, to_json
+from qlinkgen.model.values import BadValue, check_items, from_json, to_json
 
 
 def load_codec(protocol: Protocol) -> ModuleType:
@@ -26,8 +26,13 @@ def build(codec: ModuleType, message: Message, given: Mapping[str, Any], address
     for name in given:
         if name not in values:
             raise Failure(_no_field(message, name, list(values)))
+    if missing := [name for name, value in values.items() if value.required and name not in given]:
+        fix = " ".join(f"{name}=VALUE" for name in missing)
+        raise Failure(f"{message.name}: {', '.join(missing)} must be given, there is no default; add {fix}")
     try:
         natives = {name: from_json(values[name], each) for name, each in given.items()}
+        for name, native in natives.items():
+            check_items(values[name], native)
     except BadValue as error:
         raise Failure(f"{message.name}: {error}") from None
     try:

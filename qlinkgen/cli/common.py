@@ -4,24 +4,47 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
+import string
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 from typing import IO
 
 import click
 
 from qlinkgen.cli.boundary import Failure
+from qlinkgen.errors import SchemaError
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 
-HEX_DIGITS = frozenset(b"0123456789abcdefABCDEF")
+
+def find_schema(name: str) -> Path:
+    """The file of a shipped schema's name, or of a path."""
+    from qlinkgen.schema import find  # noqa: PLC0415  # pydantic takes a while
+
+    try:
+        return find(name)
+    except SchemaError as error:
+        raise Failure(f"there is no schema '{name}'; {error.faults[0].hint}") from None
 
 
 def load_protocol(name: str, crc: str | None = None) -> Protocol:
     """A protocol by shipped name or path. Raises SchemaError."""
-    from qlinkgen.schema import find, load  # noqa: PLC0415  # pydantic takes a while
+    from qlinkgen.schema import load  # noqa: PLC0415  # pydantic takes a while
 
-    return load(find(name), crc=crc)
+    path = find_schema(name)
+    protocol = load(path)
+    if crc is None:
+        return protocol
+    try:
+        return load(path, crc=crc)
+    except SchemaError as error:
+        # The schema is right without it, so the fault is the option's.
+        fault = error.faults[0]
+        raise Failure(
+            f"--set crc={crc}: {fault.message}" + (f"; {fault.hint}" if fault.hint else "")
+        ) from None
 
 
 def find_message(protocol: Protocol, name: str) -> Message:
@@ -62,14 +85,15 @@ def warn_unconfirmed(protocol: Protocol, message: Message) -> None:
 
 
 def parse_hex(text: str, what: str = "HEX") -> bytes:
-    """Bytes of hex text; white space is ignored, a 0x in front is allowed."""
-    packed = "".join(text.split())
-    packed = packed[2:] if packed[:2].lower() == "0x" else packed
-    for index, digit in enumerate(packed):
-        if ord(digit) not in HEX_DIGITS:
-            raise Failure(
-                f"{what}: '{digit}' at digit {index + 1} is no hex digit; write bytes as pairs of 0-9 and a-f"
-            )
+    """Bytes of hex text; white space is ignored, a 0x in front of each word too."""
+    packed = ""
+    for word in re.finditer(r"\S+", text):
+        start = word.start() + (2 if word[0][:2].lower() == "0x" else 0)
+        for index in range(start, word.end()):
+            if text[index] not in string.hexdigits:
+                fix = "write bytes as pairs of 0-9 and a-f"
+                raise Failure(f"{what}: '{text[index]}' at character {index + 1} is no hex digit; {fix}")
+        packed += text[start : word.end()]
     if len(packed) % 2:
         raise Failure(f"{what}: {len(packed)} hex digits; a byte has two, so their number must be even")
     return bytes.fromhex(packed)

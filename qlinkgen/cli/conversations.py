@@ -3,12 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
 from qlinkgen.cli.streams import Bad, Event, OneWay
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.sizes import max_frame_size
+
+
+@dataclass(frozen=True, slots=True)
+class OutOfRange:
+    """A request with an illegal value: no message object can hold it, but it is answered all the same."""
+
+    NAME: str
+    ID: int
+    payload: bytes
+
+    def to_bytes(self) -> bytes:
+        """What the check value of the answer covers."""
+        return self.payload
 
 
 class Conversation:
@@ -22,7 +36,7 @@ class Conversation:
         self._protocol = protocol
         self._codec = codec
         self._requests = OneWay(codec, "request")
-        self._ids = {message.id for message in protocol.received("request")}
+        self._names = {message.id: message.name for message in protocol.received("request")}
         self._offset = 0
         self._asked: Any = None
         self._waiting = bytearray()
@@ -48,7 +62,7 @@ class Conversation:
             asked, self._asked = self._asked, None
             if size and len(self._waiting) >= size:
                 found = decode_answer(self._codec, bytes(self._waiting[:size]), asked, self._offset)
-                if self._is_answer(found):
+                if self._is_answer(found, asked):
                     self._take(size)
                     yield found
 
@@ -60,14 +74,23 @@ class Conversation:
 
     def _request(self, byte: bytes) -> Iterator[Event]:
         for event in self._requests.feed(byte):
-            self._asked = None if isinstance(event, Bad) else event
+            self._asked = self._out_of_range(event) if isinstance(event, Bad) else event
             yield event
 
-    def _is_answer(self, found: Event) -> bool:
-        """A check value fits, or it says that the command is unknown and nothing else can be meant."""
-        if not isinstance(found, Bad):
+    def _out_of_range(self, bad: Bad) -> OutOfRange | None:
+        if bad.kind != "range" or bad.raw[0] not in self._names:
+            return None
+        return OutOfRange(self._names[bad.raw[0]], bad.raw[0], bad.raw[1:])
+
+    def _is_answer(self, found: Event, asked: Any) -> bool:
+        """A check value fits, or nothing else can be meant.
+
+        That is an answer saying that the command is unknown, and whatever follows a request that the device
+        may have refused for its value.
+        """
+        if not isinstance(found, Bad) or found.kind == "range":
             return True
-        return found.kind == "range" or (found.kind == "illegal" and found.raw[0] not in self._ids)
+        return found.raw[0] not in self._names and (found.kind == "illegal" or isinstance(asked, OutOfRange))
 
 
 class Answers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from io import BufferedReader
@@ -12,7 +13,7 @@ import click
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import fields, load_codec
-from qlinkgen.cli.common import HEX_DIGITS, crc_option, load_protocol, parse_hex, warn, warn_unconfirmed
+from qlinkgen.cli.common import crc_option, load_protocol, parse_hex, warn, warn_unconfirmed
 from qlinkgen.cli.conversations import Answers, Conversation
 from qlinkgen.cli.encode import asked
 from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
@@ -21,6 +22,9 @@ from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
 
 CHUNK = 65536
+_COMMENT = re.compile(rb"#[^\n]*")
+_PREFIX = re.compile(rb"(?<![0-9a-fA-F])0[xX]")
+_NO_DIGIT = re.compile(rb"[^0-9a-fA-F\s]")
 
 
 @click.command("decode")
@@ -40,11 +44,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     raw: bool,
     crc: str | None,
 ) -> int:
-    r"""Print every frame of a stream as a JSON object; bytes between frames are passed over.
+    """Print every frame of a stream as a JSON object; bytes between frames are passed over.
 
-    - (or nothing) reads hex text from standard input as it comes, white space ignored. A bad frame is an
-    object {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad frame, or none at
-    all.
+    - (or nothing) reads hex text from standard input as it comes; white space, 0x, and comments from # to the
+    end of the line are ignored. A bad frame is an object
+    {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad frame, or none at all.
 
     Nothing in most frames says whether it is a request or a response. Without --direction, what fits only one
     of them is that; what fits both is the response if it directly follows a request of the same command and
@@ -56,7 +60,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen decode qlink --direction response - < capture.txt
     qlinkgen decode trio --raw < /dev/ttyUSB0
     qlinkgen decode mc1231a --direction response --request 4a 0012d687d6e3
-    """
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
     chunks = _input(hex_, raw=raw)
     loaded = load_protocol(protocol, crc)
     codec = load_codec(loaded)
@@ -99,19 +103,36 @@ def _read_raw() -> Iterator[bytes]:
 
 
 def _read_hex() -> Iterator[bytes]:
-    """Bytes as soon as both their digits are there; a chunk may end between them."""
-    digits, seen = b"", 0
+    """Bytes as soon as both their digits are there; a chunk may end anywhere.
+
+    What stands before a wrong character is handed out before the error.
+    """
+    digit, comment, line = b"", False, 1
     for chunk in _read_raw():
-        digits += b"".join(chunk.split())
-        for index, digit in enumerate(digits):
-            if digit not in HEX_DIGITS:
-                at = seen + index + 1
-                raise Failure(f"standard input: {chr(digit)!r} at digit {at} is no hex digit")
+        begun = line
+        line += chunk.count(b"\n")
+        text = _COMMENT.sub(b"", b"#" + chunk if comment else chunk)
+        comment = b"#" in chunk[chunk.rfind(b"\n") + 1 :] or (comment and b"\n" not in chunk)
+        text = _PREFIX.sub(b"", digit + text)
+        wrong = _NO_DIGIT.search(text)
+        digits = b"".join(text[: wrong.start() if wrong else None].split())
         whole = len(digits) & ~1
         yield bytes.fromhex(digits[:whole].decode("ascii"))
-        digits, seen = digits[whole:], seen + whole
-    if digits:
-        raise Failure(f"standard input: an odd number of hex digits ({seen + 1}); a byte has two")
+        if wrong:
+            at = begun + text.count(b"\n", 0, wrong.start())
+            raise Failure(
+                f"standard input, line {at}: {_character(wrong[0])} is no hex digit; comments begin with #"
+            )
+        digit = digits[whole:]
+    if digit:
+        raise Failure(
+            f"standard input: the number of hex digits is odd; '{digit.decode()}' stands alone at its end"
+        )
+
+
+def _character(byte: bytes) -> str:
+    shown = byte.decode("ascii", "replace")
+    return f"'{shown}'" if byte.isascii() and shown.isprintable() else f"byte {byte.hex()}"
 
 
 class _Printer:
@@ -123,11 +144,11 @@ class _Printer:
         self._warned: set[str] = set()
 
     def show(self, events: Iterable[Event], size: int = 0) -> None:
-        """Print events; whoever reads along in a pipe sees each at once."""
+        """Print events; whoever reads along in a pipe sees what has come at once."""
         self._bytes += size
         for event in events:
             sys.stdout.write(f"{jsonlines.line(self._record(event))}\n")
-            sys.stdout.flush()
+        sys.stdout.flush()
 
     def result(self) -> int:
         """The exit code."""
@@ -151,8 +172,9 @@ def message_record(protocol: Protocol, found: Any) -> dict[str, Any]:
     """A message as decode prints it."""
     message = protocol.by_name[found.NAME]
     record: dict[str, Any] = {"message": message.name}
-    if protocol.address_name and message.addresses:
-        record[protocol.address_name] = getattr(found, protocol.address_name)
+    name = protocol.address_name
+    if name and message.addresses:
+        record[name] = getattr(found, name)
     record["fields"] = fields(message, found)
     return record
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -21,45 +23,59 @@ from qlinkgen.cli.describe import addresses_text
 from qlinkgen.model.frame import PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import whole_number
 
 
 @click.command("encode")
 @click.argument("protocol")
-@click.argument("message")
+@click.argument("message", required=False)
 @click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
 @click.option(
-    "--node", "--address", "address", metavar="N", help="Whom the frame is for or from; 0x numbers too."
+    "--node",
+    "--address",
+    "addresses",
+    metavar="N",
+    multiple=True,
+    help="Whom the frame is for or from; 0x numbers too.",
 )
 @click.option(
-    "--json", "object_", metavar="OBJECT", help='Values as JSON: \'{"counter": 1, "segments": [1, 2]}\'.'
+    "--json",
+    "object_",
+    metavar="OBJECT",
+    help='Values as JSON: \'{"counter": 1, "segments": [1, 2]}\', or a whole object that decode printed.',
 )
 @click.option("--request", "request", metavar="HEX", help="Packets: the request that a response answers.")
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
-    message: str,
+    message: str | None,
     assignments: tuple[str, ...],
-    address: str | None,
+    addresses: tuple[str, ...],
     object_: str | None,
     request: str | None,
     crc: str | None,
 ) -> None:
-    r"""Print the wire bytes of a message as lower-case hex: length, checksum and stuffing are filled in.
+    """Print the wire bytes of a message as lower-case hex: length, checksum and stuffing are filled in.
 
-    A field that is not given has its default; FIELD=VALUE wins over --json. Bytes are hex, lists have
-    commas, enums are their name or number, flags a number or names with | between them, numbers may be 0x,
-    scaled values are in the unit.
+    A field that is not given has its default, if there is one; FIELD=VALUE wins over --json. An object that
+    decode printed names its message and address too: then MESSAGE may be left out, and --node wins.
+
+    Bytes are hex, lists have commas, enums are their name or number, flags a number or names with | between
+    them, numbers may be 0x or 0b, scaled values are in the unit.
 
     \b
     qlinkgen encode qlink motion --node 3 counter=1 outputs=0x0F segments=100,200
     qlinkgen encode qlink motion.response --node 3 position=-5 motor_status='running|position_valid'
     qlinkgen encode trio direct_variable_transfer --address 2 number=7 value=-0.25
     qlinkgen encode mc1231a get_pos.response --request 4a value=1234567
-    """
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
-    found = find_message(loaded, message)
-    given = {} if object_ is None else jsonlines.parse_object(object_, "--json")
-    given.update(_assigned(text) for text in assignments)
+    if message and "=" in message:
+        assignments, message = (message, *assignments), None
+    record = _record(loaded, {} if object_ is None else jsonlines.parse_object(object_, "--json"))
+    found = _message(loaded, message, record.message)
+    given = {**record.fields, **_assigned(assignments)}
+    address = _one(addresses) if addresses else record.address
     warn_unconfirmed(loaded, found)
     codec = load_codec(loaded)
     built = build(codec, found, given, _address(loaded, found, address))
@@ -69,11 +85,52 @@ def command(  # noqa: PLR0917  # click passes them by name
         raise Failure(str(error)) from None
 
 
-def _assigned(text: str) -> tuple[str, str]:
-    name, mark, value = text.partition("=")
-    if not mark or not name:
-        raise Failure(f"'{text}' is no FIELD=VALUE; write for example counter=1")
-    return name, value
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """What --json says: fields alone, or the whole object that decode prints."""
+
+    fields: Mapping[str, Any]
+    message: str | None = None
+    address: str | None = None
+
+
+def _record(protocol: Protocol, given: Mapping[str, Any]) -> _Record:
+    known = {"message", "fields", "node", "address", protocol.address_name}
+    message, fields = given.get("message"), given.get("fields")
+    if not (isinstance(message, str) and isinstance(fields, Mapping) and set(given) <= known):
+        return _Record(given)
+    addresses = [given[name] for name in given if name not in ("message", "fields")]
+    return _Record(fields, message, _one(tuple(map(str, addresses))) if addresses else None)
+
+
+def _message(protocol: Protocol, name: str | None, recorded: str | None) -> Message:
+    wanted = name or recorded
+    if wanted is None:
+        raise click.UsageError("Missing argument 'MESSAGE'.", click.get_current_context())
+    found = find_message(protocol, wanted)
+    if recorded is not None and find_message(protocol, recorded) is not found:
+        raise Failure(
+            f"--json: the object is a {recorded}, not a {found.name}; name that, or leave out MESSAGE"
+        )
+    return found
+
+
+def _one(addresses: tuple[str, ...]) -> str:
+    if len(addresses) > 1:
+        raise Failure(f"the address is given twice, {' and '.join(addresses)}; keep one --node or --address")
+    return addresses[0]
+
+
+def _assigned(texts: Iterable[str]) -> dict[str, str]:
+    given: dict[str, str] = {}
+    for text in texts:
+        name, mark, value = text.partition("=")
+        if not mark or not name:
+            raise Failure(f"'{text}' is no FIELD=VALUE; write for example counter=1")
+        if name in given:
+            raise Failure(f"{name} is given twice, {given[name]} and {value}; keep one")
+        given[name] = value
+    return given
 
 
 def _address(protocol: Protocol, message: Message, given: str | None) -> dict[str, int]:
@@ -84,19 +141,35 @@ def _address(protocol: Protocol, message: Message, given: str | None) -> dict[st
         return {}
     if given is None:
         return {name: _only_address(message, name)}
-    try:
-        return {name: int(given, 0)}
-    except ValueError:
-        raise Failure(
-            f"--{name} {given}: not a whole number; {addresses_text(message)} can be given"
-        ) from None
+    address = whole_number(given)
+    if address is None:
+        allowed = addresses_text(message)
+        raise Failure(f"{_option(name)} {given}: not a whole number; {allowed} can be given")
+    _check_broadcast(protocol, message, address, _option(name))
+    return {name: address}
+
+
+def _check_broadcast(protocol: Protocol, message: Message, address: int, option: str) -> None:
+    """Refuse a broadcast that may not be, and an address where there is only the broadcast."""
+    broadcast = protocol.bus.broadcast
+    if broadcast is None or any(first <= address <= last for first, last in message.addresses):
+        return
+    if message.addresses == ((broadcast, broadcast),):
+        raise Failure(f"{message.command} can only be broadcast; leave out {option}")
+    if address == broadcast:
+        raise Failure(f"{message.command} cannot be broadcast; {option} {addresses_text(message)}")
+
+
+def _option(name: str) -> str:
+    return "--node" if name == "node" else "--address"
 
 
 def _only_address(message: Message, name: str) -> int:
     (first, last), *others = message.addresses
     if others or first != last:
         raise Failure(
-            f"{message.name} does not say for whom; give --{name} N with N in {addresses_text(message)}"
+            f"{message.name} does not say for whom; "
+            f"give {_option(name)} N with N in {addresses_text(message)}"
         )
     return first
 

@@ -29,7 +29,7 @@ from qlinkgen.model.protocol import Protocol
 def command(
     protocol: str, hex_: tuple[str, ...], direction: Direction | None, request: str | None, crc: str | None
 ) -> int:
-    r"""Say what every byte of one frame is. If something is wrong: the rule that broke, and the likely cause.
+    """Say what every byte of one frame is. If something is wrong: the rule that broke, and the likely cause.
 
     For a checksum that does not fit, the other algorithms of the catalogue, byte orders and coverages are
     tried. Exit code 1 if anything is wrong.
@@ -37,7 +37,7 @@ def command(
     \b
     qlinkgen explain qlink a5a50783 01a500ffa500e305
     qlinkgen explain mc1231a 4a 0012d687d6e3
-    """
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
     data = parse_hex(" ".join(hex_))
     if not data:

@@ -26,6 +26,8 @@ class _Reader:
         self._anatomy = Anatomy()
         self._parts: dict[str, Sequence[Byte]] = {}
         self._wire: dict[str, bytes] = {}
+        #: No preamble was found: what is taken for the length may be anything.
+        self._astray = False
 
     def read(self, data: bytes) -> Anatomy:
         body = self._preamble(data)
@@ -35,7 +37,7 @@ class _Reader:
         message = self._message()
         self._payload(message)
         self._addressed(message)
-        self._checksum()
+        self._checksum(sure=not unstuffer.faulty)
         unstuffer.finish()
         self._title(message)
         return self._anatomy
@@ -48,6 +50,7 @@ class _Reader:
         self._wire[self._frame.parts[0].name] = preamble  # also where it was lost: a checksum may cover it
         start = data.find(preamble)
         if start < 0:
+            self._astray = True
             anatomy.wrong(
                 f"there is no preamble {preamble.hex(' ')}",
                 "the capture began late, or a byte of the preamble was lost",
@@ -112,6 +115,8 @@ class _Reader:
     def _length(self, unstuffer: Unstuffer) -> None:
         part, length = self._frame.part("length"), self._value("length")
         missing = unstuffer.missing
+        if self._astray:
+            return
         if part is None or length is None:
             if missing:
                 self._anatomy.wrong(
@@ -190,7 +195,7 @@ class _Reader:
                 f"{self._protocol.address_name} is {address}; {message.name} has {allowed}", cause
             )
 
-    def _checksum(self) -> None:
+    def _checksum(self, *, sure: bool) -> None:
         part = self._frame.part("checksum")
         if part is None or part.checksum is None:
             return
@@ -205,6 +210,9 @@ class _Reader:
         width = (checksum.algorithm.width + 3) // 4
         if received == expected:
             self._anatomy.row(data, part.name, f"0x{received:0{width}X}, right")
+            return
+        if not sure:
+            self._anatomy.row(data, part.name, f"0x{received:0{width}X}, not checked")
             return
         self._anatomy.row(
             data, part.name, f"0x{received:0{width}X}, computed 0x{expected:0{width}X}", wrong=True

@@ -13,7 +13,7 @@ import click
 from qlinkgen._resources import schemas_dir
 from qlinkgen.backends.base import Options
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, did_you_mean, on_terminal, warn
+from qlinkgen.cli.common import crc_option, did_you_mean, load_protocol, on_terminal, warn
 from qlinkgen.cli.drift import Change, Folder
 from qlinkgen.cli.manifest import schema_of
 from qlinkgen.cli.targets import TARGETS, reference_outputs
@@ -54,7 +54,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     only: tuple[str, ...],
     list_outputs: bool,
 ) -> int:
-    r"""Write what is made of the SCHEMAs, by default of all that come with qlinkgen.
+    """Write what is made of the SCHEMAs, by default of all that come with qlinkgen.
 
     Only files that change are written, and files that nothing makes any more are removed. In the repository
     of qlinkgen, a run without SCHEMA and -o also writes the parts of docs/ that are made from the code.
@@ -64,7 +64,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen generate bus.yaml --target c    one header
     qlinkgen generate --check                for CI: 1 and a diff if anything is out of date
     qlinkgen generate qlink --set crc=crc-16/xmodem --role slave --only motion
-    """
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
     from qlinkgen.schema import shipped  # noqa: PLC0415  # pydantic takes a while
 
     protocols = _load(schemas or shipped(), crc)
@@ -84,13 +84,11 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 def _load(schemas: Sequence[str], crc: str | None) -> dict[str, Protocol]:
     """Every protocol by its schema as given; the faults of all files are reported together."""
-    from qlinkgen.schema import find, load  # noqa: PLC0415  # pydantic takes a while
-
     protocols: dict[str, Protocol] = {}
     faults: list[Fault] = []
     for schema in schemas:
         try:
-            protocols[schema] = load(find(schema), crc=crc)
+            protocols[schema] = load_protocol(schema, crc)
         except SchemaError as error:
             faults += error.faults
     if faults:
@@ -111,10 +109,13 @@ def _kept(only: Sequence[str], protocols: Sequence[Protocol]) -> tuple[str, ...]
     }
     for name in only:
         if name not in known:
-            raise Failure(
-                f"--only {name}: no command or message has this name; {did_you_mean(name, sorted(known))}"
-            )
+            hint = did_you_mean(name, sorted(known)) or f"{_show_hint(protocols)} lists them"
+            raise Failure(f"--only {name}: no command or message has this name; {hint}")
     return tuple(only)
+
+
+def _show_hint(protocols: Sequence[Protocol]) -> str:
+    return f"`qlinkgen show {protocols[0].name if len(protocols) == 1 else 'PROTOCOL'}`"
 
 
 def _fill(

@@ -12,10 +12,19 @@ from qlinkgen.cli.boundary import Failure
 
 def line(found: Any) -> str:
     """An object on one line; a Decimal becomes a number with all its digits."""
+    try:
+        return json.dumps(found)
+    except TypeError:
+        return _exact(found)
+
+
+def _exact(found: Any) -> str:
     if isinstance(found, Mapping):
-        return "{" + ", ".join(f"{json.dumps(str(name))}: {line(each)}" for name, each in found.items()) + "}"
+        return (
+            "{" + ", ".join(f"{json.dumps(str(name))}: {_exact(each)}" for name, each in found.items()) + "}"
+        )
     if isinstance(found, list | tuple):
-        return "[" + ", ".join(map(line, found)) + "]"
+        return "[" + ", ".join(map(_exact, found)) + "]"
     if isinstance(found, Decimal):
         return f"{found:f}"
     return json.dumps(found)

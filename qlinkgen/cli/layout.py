@@ -54,7 +54,8 @@ def _facts(protocol: Protocol, message: Message) -> list[str]:
         facts.append(f"{protocol.address_name} {describe.addresses_text(message)}")
     lines = [", ".join(facts)]
     if (command := protocol.command_of(message)) and message is command.request:
-        answer = f"answered within {describe.time_text(command.response_within) or 'no time'}"
+        within = describe.time_text(command.response_within)
+        answer = f"answered within {within}" if within else "answered"
         answered = answer if command.response else "never answered"
         lines.append(f"{answered}; repeat: {describe.repeat_text(command)}")
     if message.empty_is_default:

@@ -7,8 +7,8 @@ import json
 
 import click
 
-from qlinkgen.cli.boundary import FINE, WRONG
-from qlinkgen.cli.common import on_terminal
+from qlinkgen.cli.boundary import FINE, USAGE, WRONG
+from qlinkgen.cli.common import find_schema, on_terminal
 from qlinkgen.errors import Fault
 
 
@@ -20,7 +20,8 @@ from qlinkgen.errors import Fault
 def command(schemas: tuple[str, ...], form: str) -> int:
     """Check schema files and report every fault of each: file:line:col: error[RULE]: what is wrong; hint.
 
-    Exit code 1 if there is an error; warnings do not count. docs/rules.md explains the rules.
+    Exit code 1 if there is an error, 2 if a file cannot be read; warnings do not count. docs/rules.md
+    explains the rules.
     """
     faults = [fault for schema in schemas for fault in _faults(schema)]
     if form == "json":
@@ -29,17 +30,15 @@ def command(schemas: tuple[str, ...], form: str) -> int:
         for fault in faults:
             click.echo(_coloured(fault) if on_terminal() else str(fault))
         _summary(len(schemas), faults)
+    if any(fault.rule == "file-unreadable" for fault in faults):
+        return USAGE
     return WRONG if any(fault.severity == "error" for fault in faults) else FINE
 
 
 def _faults(schema: str) -> list[Fault]:
-    from qlinkgen.errors import SchemaError  # noqa: PLC0415
-    from qlinkgen.schema import find, lint  # noqa: PLC0415  # pydantic takes a while
+    from qlinkgen.schema import lint  # noqa: PLC0415  # pydantic takes a while
 
-    try:
-        return lint(find(schema))
-    except SchemaError as error:
-        return list(error.faults)
+    return lint(find_schema(schema))
 
 
 def _coloured(fault: Fault) -> str:

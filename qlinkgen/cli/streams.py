@@ -1,7 +1,6 @@
 """Streams of bytes to messages and faults, whatever the protocol and whether or not the direction is known.
 
-Nothing in most frames says whether it is a request or a response. Without a direction both are tried, byte
-by byte:
+Nothing in most frames says whether it is a request or a response. Without a direction both are tried:
 
 * what fits only one direction is that;
 * what fits both is the response if it directly follows a request of the same command and address, else the
@@ -15,6 +14,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, Protocol
 
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
 
@@ -52,6 +52,7 @@ class OneWay:
     def __init__(self, codec: ModuleType, direction: Direction, base: int = 0) -> None:
         """``base`` is the place of the first byte in the whole stream."""
         self._decoder = codec.StreamDecoder() if direction == "message" else codec.StreamDecoder(direction)
+        self._fault = codec.Fault
         self._base = base
 
     def feed(self, data: bytes) -> list[Event]:
@@ -63,13 +64,49 @@ class OneWay:
         return [self._placed(event) for event in self._decoder.finish()]
 
     def _placed(self, event: Event) -> Event:
-        if hasattr(event, "kind") and hasattr(event, "raw"):
-            return Bad(event.kind, event.offset + self._base, bytes(event.raw), event.message)
+        if isinstance(event, self._fault):
+            return _bad(event, self._base)
         return event
 
 
+class InStep:
+    """Both directions of frames that begin and end at the same bytes in either.
+
+    Each direction has an event for each frame and for each fault, so the n-th of one belongs to the n-th of
+    the other, however much is fed at once.
+    """
+
+    def __init__(self, codec: ModuleType) -> None:
+        """Hunt in both directions."""
+        self._requests, self._responses = codec.StreamDecoder("request"), codec.StreamDecoder("response")
+        self._fault: type[Any] = codec.Fault
+        self._asked: tuple[str, object] | None = None
+
+    def feed(self, data: bytes) -> Iterator[Event]:
+        """Take bytes."""
+        return self._merged(self._requests.feed(data), self._responses.feed(data))
+
+    def finish(self) -> Iterator[Event]:
+        """The end of the stream."""
+        return self._merged(self._requests.finish(), self._responses.finish())
+
+    def _merged(self, requests: Iterable[Event], responses: Iterable[Event]) -> Iterator[Event]:
+        # Most frames fit one direction alone: the other's fault is thrown away without a look at it.
+        fault = self._fault
+        for request, response in zip(requests, responses, strict=True):
+            asked, self._asked = self._asked, None
+            if isinstance(request, fault):
+                refused = isinstance(response, fault)
+                yield _further(_bad(request), _bad(response)) if refused else response
+            elif asked and not isinstance(response, fault) and asked == _transaction(response):
+                yield response
+            else:
+                self._asked = _transaction(request)
+                yield request
+
+
 class EitherWay:
-    """Frames of both directions on one line."""
+    """Both directions of frames whose size only their message tells: they may end at different bytes."""
 
     def __init__(self, codec: ModuleType) -> None:
         """Hunt in both directions."""
@@ -97,18 +134,18 @@ class EitherWay:
     def _settle(self, new: dict[Direction, list[Event]]) -> Iterator[Event]:
         for way, events in new.items():
             self._held[way] += events
-        delivered = [way for way, events in new.items() if events and not isinstance(events[-1], Bad)]
+        delivered = [way for way, events in new.items() if _last_message(events)]
         if delivered:
             chosen = delivered[0] if len(delivered) == 1 else self._choose(new)
             yield from self._deliver(chosen, new)
         elif len(self._held["request"]) == len(self._held["response"]):
             pairs = zip(self._held["request"], self._held["response"], strict=True)
-            yield from [max(pair, key=lambda bad: PROGRESS.index(bad.kind)) for pair in pairs]
+            yield from [_further(*pair) for pair in pairs]
             self._held = {"request": [], "response": []}
             self._asked = self._asked if not any(new.values()) else None
 
     def _choose(self, new: dict[Direction, list[Event]]) -> Direction:
-        return "response" if self._asked == _transaction(new["response"][-1]) else "request"
+        return "response" if self._asked == _transaction(_last_message(new["response"])) else "request"
 
     def _deliver(self, way: Direction, new: dict[Direction, list[Event]]) -> list[Event]:
         """One direction has a message: what it saw before is the truth about the bytes before."""
@@ -118,8 +155,20 @@ class EitherWay:
             # The other one reads a longer frame into these bytes; it must not swallow the next one.
             self._ways[other] = OneWay(self._codec, other, self._offset)
         self._held = {"request": [], "response": []}
-        self._asked = _transaction(events[-1]) if way == "request" else None
+        self._asked = _transaction(_last_message(events)) if way == "request" else None
         return events
+
+
+def _bad(fault: Any, base: int = 0) -> Bad:
+    return Bad(fault.kind, fault.offset + base, bytes(fault.raw), fault.message)
+
+
+def _last_message(events: list[Event]) -> Any:
+    return next((event for event in reversed(events) if not isinstance(event, Bad)), None)
+
+
+def _further(request: Bad, response: Bad) -> Bad:
+    return max(request, response, key=lambda bad: PROGRESS.index(bad.kind))
 
 
 def _transaction(message: Any) -> tuple[str, object]:
@@ -134,4 +183,13 @@ def open_stream(protocol: Described, codec: ModuleType, direction: Direction | N
     """The stream for a protocol with frames."""
     if protocol.directions == ("message",):
         return OneWay(codec, "message")
-    return OneWay(codec, direction) if direction else EitherWay(codec)
+    if direction:
+        return OneWay(codec, direction)
+    return InStep(codec) if _ends_alike(protocol.frame) else EitherWay(codec)
+
+
+def _ends_alike(frame: Frame) -> bool:
+    """Where a frame begins and ends does not depend on the direction."""
+    if isinstance(frame, DelimitedFrame):
+        return bool(frame.preamble) and frame.part("length") is not None
+    return isinstance(frame, MarkedFrame)

@@ -19,6 +19,8 @@ class Unstuffer:
         self._recent = b""
         #: Bytes that parts asked for and that were not there.
         self.missing = 0
+        #: An inserted byte is wrong: what follows may be shifted, and a check value over it says nothing.
+        self.faulty = False
         #: A new preamble stands inside the frame: nothing behind it belongs to it.
         self._aborted = False
 
@@ -103,5 +105,6 @@ class Unstuffer:
             self._aborted = True
         else:
             seen = f"{stuffing.after.hex(' ')} at offset {byte.offset} is followed by {follower.value:02x}"
+            self.faulty = True
             cause = "the sender does not stuff, or a byte was lost or changed"
             self._anatomy.wrong(f"{seen}; behind it must be {stuffing.insert:02x}", cause)

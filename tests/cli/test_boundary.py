@@ -26,7 +26,10 @@ def test_version_and_help(qlinkgen: Run) -> None:
         assert result.code == 0
         for name in ("generate", "lint", "show", "encode", "decode", "explain"):
             assert f"\n  {name} " in result.out
-            assert qlinkgen(name, "--help").code == 0
+            shown = qlinkgen(name, "--help")
+            assert shown.code == 0
+            assert "\b" not in shown.out
+            assert "\\b" not in shown.out
 
 
 def test_help_imports_nothing_heavy() -> None:

@@ -138,13 +138,7 @@ def test_links(document: str) -> None:
 def test_the_c_of_the_readme(require_tool: Callable[..., str], qlinkgen: Run, tmp_path: Path) -> None:
     gcc = require_tool("gcc", package="gcc")
     (text,) = [block.text for block in blocks("README.md") if block.kind == "c" and not block.mark]
-    head, rest = text.split("\n", 1)
-    missing = """
-static qlink_slave_t slave;
-void uart_send(const uint8_t *bytes, size_t size);
-void uart_interrupt(uint8_t byte);
-"""
-    (tmp_path / "main.c").write_text(f"{head}\n{missing}{rest}")
+    (tmp_path / "main.c").write_text(text)
     assert qlinkgen("generate", "qlink", "--target", "c", "-o", tmp_path).code == 0
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{tmp_path / 'c'}"]
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror", f"-I{tmp_path / 'c'}"]
     subprocess.run([gcc, *flags, "-c", str(tmp_path / "main.c"), "-o", str(tmp_path / "main.o")], check=True)

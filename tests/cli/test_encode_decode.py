@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import re
 import subprocess
 from decimal import Decimal
 from pathlib import Path
@@ -12,8 +14,23 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from qlinkgen.cli.codec import load_codec
+from qlinkgen.cli.common import load_protocol
+from qlinkgen.cli.streams import EitherWay, open_stream
 from tests.cli.conftest import Run
 from tests.cli.test_boundary import COMMAND, ENVIRONMENT
+
+QLINK = load_codec(load_protocol("qlink"))
+
+#: Frames that fit the request, the response, or both.
+FRAMES = [
+    "a5a504210315e8",
+    "a5a50a2003010f006400c86bb6",
+    "a5a50d20030000fffffffb000300f525",
+    "a5a50d2001000000000000000300019c",
+    "a5a5062003010081a6",
+    "a5a5a50421",
+]
 
 #: Message, arguments, wire bytes; worked out by hand but for the check values.
 GOLDEN = [
@@ -24,6 +41,10 @@ GOLDEN = [
      "a5a50d20030000fffffffb000300f525"),
     ("qlink node_sync counter=9", "a5a505050009"),
     ("qlink node_setup --node 0 node_number=4 t1_delay=0.3 position_type=metronix", "a5a508010004030a02"),
+    ('qlink motion.response --node 3 motor_status=["running","position_valid"]',
+     "a5a50d2003000000000000000300"),
+    ("qlink motion --node 3 counter=0b101", "a5a50620030500"),
+    ("qlink write --node 1 offset=0 data=0xA5a5", "a5a507820100a500a500"),
     ("qlink write --node 1 offset=0 data=A5a5", "a5a507820100a500a500"),
     ("trio keypad_mode --address 2 mode=on_off", "947f90"),
     ("trio keypad_mode --node 2 mode=0x7f", "947f90"),
@@ -179,6 +200,66 @@ def test_output_comes_frame_by_frame(qlinkgen: Run) -> None:
         assert process.wait(10) == 0
 
 
+def test_comments_and_wrong_characters(qlinkgen: Run) -> None:
+    text = b"# motor 3\na5a504210315e8 # zz\n0xa5 0xa5 0421\n0315e8\n"
+    assert len(decoded(qlinkgen, "qlink", "-", stdin=text)) == 2
+    result = qlinkgen("decode", "qlink", "-", stdin=text + b"a5 g5")
+    assert result.code == 2
+    assert len(result.lines) == 2
+    assert "line 5: 'g' is no hex digit" in result.err
+    assert len(decoded(qlinkgen, "qlink", "0xa5a504", "0x210315e8")) == 1
+    assert "'g' at character 8 is no hex digit" in qlinkgen("decode", "qlink", "0xa5", "a5g").err
+
+
+def test_encode_takes_what_decode_prints(qlinkgen: Run, thermo: Path) -> None:
+    for protocol, command in (
+        ("qlink", "motion --node 3 counter=1 segments=1,2"),
+        ("trio", "direct_variable_transfer --address 2 number=7 value=-0.25"),
+        (str(thermo), "set_target --node 3 target=21.5"),
+    ):
+        wire = encoded(qlinkgen, f"{protocol} {command}")
+        line = qlinkgen("decode", protocol, wire).out
+        assert qlinkgen("encode", protocol, "--json", line).out.strip() == wire
+        assert qlinkgen("encode", protocol, command.split()[0], "--json", line).out.strip() == wire
+        other = qlinkgen("encode", protocol, "--node", "5", "--json", line).out.strip()
+        assert other == encoded(qlinkgen, protocol + " " + re.sub(r"--\w+ \d", "--node 5", command))
+
+
+CORRUPTIONS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 40), st.integers(0, 255)), max_size=25)
+
+
+@settings(max_examples=30, deadline=None)
+@given(corruptions=CORRUPTIONS, sizes=st.lists(st.integers(1, 60), min_size=1, max_size=9))
+def test_both_directions_whatever_is_fed_at_once(
+    corruptions: list[tuple[int, int, int]], sizes: list[int]
+) -> None:
+    """Directions tried side by side give what they give when they are asked about each byte."""
+    protocol = load_protocol("qlink")
+    codec = QLINK
+    data = b""
+    for which, at, value in corruptions:
+        frame = bytearray(bytes.fromhex(FRAMES[which]))
+        if at < len(frame):
+            frame[at] = value
+        data += bytes(frame)
+    whole, bytewise, cut = (
+        open_stream(protocol, codec, None),
+        EitherWay(codec),
+        open_stream(protocol, codec, None),
+    )
+    expected = [str(event) for byte in data for event in bytewise.feed(bytes((byte,)))]
+    expected += map(str, bytewise.finish())
+    assert [str(event) for event in (*whole.feed(data), *whole.finish())] == expected
+    found: list[str] = []
+    position = 0
+    for size in itertools.cycle(sizes):
+        if position >= len(data):
+            break
+        found += map(str, cut.feed(data[position : position + size]))
+        position += size
+    assert [*found, *map(str, cut.finish())] == expected
+
+
 def test_marked_frames(qlinkgen: Run) -> None:
     found = decoded(qlinkgen, "trio", "947f90" + "8a", code=1)
     assert found[0] == {"message": "keypad_mode", "address": 2, "fields": {"mode": "on_off"}}
@@ -193,6 +274,15 @@ def test_a_conversation_of_packets(qlinkgen: Run) -> None:
     assert [each["message"] for each in found] == [*names, "get_pos.request", "get_pos.request"]
     assert found[4]["fields"] == {"value": 1234567}
     assert "node" not in found[0]
+
+
+def test_requests_out_of_range_in_a_conversation(qlinkgen: Run) -> None:
+    found = decoded(qlinkgen, "mc1231a", "11fedcba98b985")
+    assert [each["message"] for each in found] == ["set_vel.request", "set_vel.response"]
+    for answer, said in (("800e", "set_pos.response"), ("0000", "illegal"), ("0003", "crc")):
+        found = decoded(qlinkgen, "mc1231a", "107fffffff" + answer + "4a", code=1)
+        kinds = [each.get("message") or each["error"]["kind"] for each in found]
+        assert kinds == ["range", said, "get_pos.request"]
 
 
 def test_one_side_of_packets(qlinkgen: Run) -> None:
@@ -256,6 +346,28 @@ def test_an_own_schema(qlinkgen: Run, thermo: Path) -> None:
             "one of none, jvl_mactalk, metronix, or a number",
         ),
         ("qlink write --node 1 offset=0 data=a", "pairs of hex digits"),
+        ("qlink motion --node 1 counter=1_0", "'1_0' is not a whole number"),
+        ("qlink motion --node 1 counter=\u0663", "is not a whole number"),
+        ("qlink motion --node 1 counter=0o7", "is not a whole number"),
+        ("qlink motion --node 1 counter=1 counter=2", "given twice"),
+        ("qlink motion --node 1 --address 1", "given twice"),
+        ("qlink motion --node 0", "motion cannot be broadcast; --node 1..16"),
+        ("qlink node_sync --node 3", "node_sync can only be broadcast; leave out --node"),
+        ("qlink motion --node 1 segments=1,,2", "empty item"),
+        ("qlink motion --node 1 segments=1,65536", "segments[1]: 65536 is out of range 0..65535"),
+        ("qlink motion --node 1 segments=1,2,3,4,5,6,7,8,9,10,11,12,13", "13 items; at most 12"),
+        ("qlink motor_request --node 1", "motor_data must be given"),
+        ("trio character_transfer --address 1", "characters must be given"),
+        ("qlink", "Missing argument 'MESSAGE'"),
+        ('qlink motion --node 1 --json {"counter":-1.5}', "counter: -1.5 is not"),
+        ('qlink motion --node 1 --json {"counter":null}', "counter: null is not"),
+        ('qlink motion --node 1 --json {"counter":true}', "counter: true is not"),
+        (
+            'qlink node_info --node 1 --json {"message":"motion.request","fields":{}}',
+            "--json: the object is a motion.request, not a node_info.request",
+        ),
+        ("qlink motion --node 1 --set crc=bogus", "--set crc=bogus: no checksum algorithm"),
+        ("qlink motion --node 1 --set crc=crc-32/iso-hdlc", "--set crc=crc-32/iso-hdlc: "),
         ("qlink motion --node 1 --json [1]", "a JSON object is needed"),
         ("qlink motion --node 1 --json {", "no JSON at character"),
         ('qlink motion --node 1 --json {"counter":1,"counter":2}', "stands there twice"),

@@ -187,5 +187,16 @@ def test_other_frames(qlinkgen: Run, schema: str, wire: str, title: str) -> None
 
 def test_empty_and_broken_hex(qlinkgen: Run) -> None:
     assert qlinkgen("explain", "qlink", "").code == 2
-    assert "'z' at digit 3 is no hex digit" in qlinkgen("explain", "qlink", "a5zz").err
+    assert "'z' at character 3 is no hex digit" in qlinkgen("explain", "qlink", "a5zz").err
     assert "3 hex digits; a byte has two" in qlinkgen("explain", "qlink", "a5a").err
+
+
+def test_one_fault_is_not_blamed_twice(qlinkgen: Run) -> None:
+    """Behind a stuffing fault a check value says nothing; without a preamble no length does."""
+    out = qlinkgen("explain", "qlink", "a5a5042103a5ff").out
+    assert "behind it must be 00" in out
+    assert "not checked" in out
+    assert out.count("wrong:") == 1
+    out = qlinkgen("explain", "qlink", "00").out
+    assert "there is no preamble" in out
+    assert out.count("wrong:") == 1

@@ -34,7 +34,11 @@ def test_everything_of_all_protocols(qlinkgen: Run, out: Path) -> None:
         "python/qlinkgen_codecs/trio.py",
         "vectors/qlink.json",
     } <= files(out)
-    assert {"construct/mc1231a.py", "python/qlinkgen_codecs/py.typed", "manifest.json"} <= files(out)
+    assert {
+        "construct/qlinkgen_construct/mc1231a.py",
+        "python/qlinkgen_codecs/py.typed",
+        "manifest.json",
+    } <= files(out)
     assert len(result.lines) == 1
     assert f"0 unchanged in {out}" in result.out
     assert qlinkgen("generate", "-o", out).out.startswith("0 written, ")
@@ -167,12 +171,13 @@ def test_another_crc(qlinkgen: Run, out: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("--set", "crc=crc-16/nonsense"), 1, "unknown-algorithm"),
-        (("--set", "crc=crc-32/iso-hdlc"), 1, "checksum-does-not-fit"),
+        (("--set", "crc=crc-16/nonsense"), 2, "--set crc=crc-16/nonsense: no checksum algorithm"),
+        (("--set", "crc=crc-32/iso-hdlc"), 2, "has 32 bits, crc 16"),
         (("--set", "speed=9600"), 2, "only crc=NAME"),
         (("--set", "crc="), 2, "only crc=NAME"),
         (("--target", "java"), 2, "'java' is not one of"),
         (("--only", "moton"), 2, "did you mean motion"),
+        (("--only", "nope"), 2, "lists them"),
         (("--role", "spy"), 2, "'spy' is not one of"),
         (("qlnk",), 2, "did you mean 'qlink'?"),
         (("nowhere.yaml",), 2, "No such file"),

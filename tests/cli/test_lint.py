@@ -51,7 +51,10 @@ def test_json(qlinkgen: Run, thermo: Path) -> None:
 
 
 def test_a_file_that_is_not_there(qlinkgen: Run) -> None:
-    result = qlinkgen("lint", "nowhere/bus.yaml", "qlnk")
-    assert result.code == 1
+    result = qlinkgen("lint", "nowhere/bus.yaml", "qlink")
+    assert result.code == 2
     assert "nowhere/bus.yaml:1:1: error[file-unreadable]: cannot read it: No such file" in result.out
-    assert "did you mean 'qlink'?" in result.out
+    for command in (("lint",), ("show",), ("generate",)):
+        result = qlinkgen(*command, "qlnk")
+        assert result.code == 2
+        assert result.err == "qlinkgen: error: there is no schema 'qlnk'; did you mean 'qlink'?\n"

@@ -87,3 +87,11 @@ def test_unknown_names(qlinkgen: Run) -> None:
     result = qlinkgen("show", "qlnk")
     assert result.code == 2
     assert "did you mean 'qlink'?" in result.err
+
+
+def test_no_allowance_is_no_time(qlinkgen: Run, thermo: Path) -> None:
+    thermo.write_text(thermo.read_text().replace(", response_within: 5 ms", ""))
+    result = qlinkgen("show", thermo, "set_target")
+    assert result.code == 0, result.err
+    assert "no time" not in result.out
+    assert "answered" in result.out
