@@ -43,7 +43,7 @@ def defaults(name: str, message: Message) -> dict[str, Any]:
     return arguments | ({address: message.default_address} if address and message.addresses else {})
 
 
-def build(name: str, message: Message, **changes: Any) -> Any:
+def build(name: str, message: Message, /, **changes: Any) -> Any:
     """A message object, its defaults changed."""
     return module(name).MESSAGES[message.name](**defaults(name, message) | changes)
 

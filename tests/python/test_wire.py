@@ -213,11 +213,9 @@ def test_answers_are_split_by_what_is_expected() -> None:
 # Every protocol
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", [name for name in EVERY if name != "mc1231a"])
 def test_behind_any_corruption_every_intact_frame_is_delivered(name: str) -> None:
-    """Packets have nothing to find a beginning by, so only their number of events is looked at elsewhere."""
-    if name == "mc1231a":
-        pytest.skip("a bare packet has no mark to begin at")
+    """Bare packets are left out: they have no mark to begin at."""
     random_source, lost = random.Random(name), 0
     for direction in directions(name):
         chosen = [m for m in protocol(name).messages if m.direction in (direction, "message")]
