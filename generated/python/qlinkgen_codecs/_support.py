@@ -1,0 +1,693 @@
+"""What the generated protocol modules share: errors, messages, checksums, receivers.
+
+Copied beside them as it is. Needs the standard library alone, and of it only what is cheap to import: `enum`
+would cost 6 ms, `dataclasses` 30.
+"""
+
+from __future__ import annotations
+
+from binascii import crc_hqx
+from struct import error as struct_error
+
+TYPE_CHECKING = False  # the name is enough for type checkers; importing `typing` costs 5 ms
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any, ClassVar
+
+    #: Checksum of some bytes, beginning with a register.
+    Crc = Callable[[bytes, int], int]
+    #: What a decoder takes.
+    BytesLike = bytes | bytearray | memoryview
+
+
+# Errors -----------------------------------------------------------------------------------------------------
+
+
+class CodecError(ValueError):
+    """Something that cannot be encoded or decoded."""
+
+
+class EncodeError(CodecError):
+    """A message holds a value that cannot be sent.
+
+    Attributes:
+        field: name of the field.
+        value: what it holds.
+    """
+
+    def __init__(self, text: str, field: str = "", value: object = None) -> None:
+        super().__init__(text)
+        self.field = field
+        self.value = value
+
+    def __reduce__(self) -> tuple[type[EncodeError], tuple[str, str, object]]:
+        """Pickle with every attribute."""
+        return type(self), (str(self), self.field, self.value)
+
+
+class DecodeError(CodecError):
+    """Bytes that are no valid message or frame.
+
+    Attributes:
+        kind: crc, stuffing, length, range, unknown, truncated, frame or illegal.
+        field: name of the field that is wrong, "" where it is none.
+        offset: place in `data`.
+        data: the bytes looked at: the payload where a field is wrong, else the frame.
+    """
+
+    def __init__(self, text: str, kind: str, field: str = "", offset: int = 0, data: bytes = b"") -> None:
+        super().__init__(text)
+        self.kind = kind
+        self.field = field
+        self.offset = offset
+        self.data = data
+
+    def __reduce__(self) -> tuple[type[DecodeError], tuple[str, str, str, int, bytes]]:
+        """Pickle with every attribute."""
+        return type(self), (str(self), self.kind, self.field, self.offset, self.data)
+
+
+class OutOfRange(ValueError):
+    """Raised inside an encoder; the caller sees an EncodeError that names the field."""
+
+
+class Misfit(LookupError):
+    """Raised inside a decoder: the bytes do not have the shape of the message."""
+
+
+#: What an encoder meets when a value is of the wrong type or too large.
+REFUSALS = (struct_error, TypeError, ValueError, ArithmeticError, AttributeError, LookupError)
+#: What a decoder meets when bytes are not the message that they seem to be.
+MISFITS = (struct_error, LookupError, CodecError)
+
+
+class Fault:
+    """A bad stretch of a stream.
+
+    Attributes:
+        kind: as in DecodeError.
+        offset: place of its first byte in the stream.
+        raw: its bytes as they came.
+        message: what is wrong, for people.
+    """
+
+    __slots__ = ("kind", "message", "offset", "raw")
+
+    def __init__(self, kind: str, offset: int, raw: bytes, message: str = "") -> None:
+        self.kind = kind
+        self.offset = offset
+        self.raw = raw
+        self.message = message
+
+    def __eq__(self, other: object) -> bool:
+        """Same kind, place and bytes; the wording does not count."""
+        if not isinstance(other, Fault):
+            return NotImplemented
+        return (self.kind, self.offset, self.raw) == (other.kind, other.offset, other.raw)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"Fault({self.kind!r}, offset={self.offset}, raw={self.raw.hex(' ')!r})"
+
+
+class Counters:
+    """What a stream decoder has seen.
+
+    Attributes:
+        frames: messages handed out.
+        faults: faults handed out, by kind.
+        skipped: bytes in no frame and no fault.
+    """
+
+    __slots__ = ("faults", "frames", "skipped")
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self.faults: dict[str, int] = {}
+        self.skipped = 0
+
+    def __repr__(self) -> str:
+        return f"Counters(frames={self.frames}, faults={self.faults}, skipped={self.skipped})"
+
+
+# What a value may be: the cold side of the encoders and decoders --------------------------------------------
+
+
+def shown(value: object) -> str:
+    """A value for an error text, whatever it is."""
+    try:
+        text = repr(value)
+    except ValueError:  # an int of thousands of digits
+        text = "a number of thousands of digits"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+class Rule:
+    """What one field may hold, in words and as a check.
+
+    Attributes:
+        name: name of the field.
+        legal: the rule, for error texts.
+        settable: the field is an attribute of the message.
+    """
+
+    __slots__ = ("legal", "name")
+
+    settable = True
+
+    def __init__(self, name: str, legal: str) -> None:
+        self.name = name
+        self.legal = legal
+
+    def allows(self, value: Any) -> bool:
+        """The value can be sent. May raise any of REFUSALS instead."""
+        raise NotImplementedError
+
+    def complaint(self, value: object) -> str:
+        """What is wrong with a value, "" where nothing is."""
+        try:
+            allowed = self.allows(value)
+        except REFUSALS:
+            allowed = False
+        return "" if allowed else f"{self.name}: {shown(value)} cannot be sent; give {self.legal}"
+
+
+class Whole(Rule):
+    """A whole number between two bounds, in several ranges if more bounds follow."""
+
+    __slots__ = ("ranges",)
+
+    def __init__(self, name: str, low: int, high: int, *more: int, unit: str = "") -> None:
+        bounds = (low, high, *more)
+        self.ranges = tuple(zip(bounds[::2], bounds[1::2], strict=True))
+        words = " or ".join(
+            f"{first}..{last}" if first != last else str(first) for first, last in self.ranges
+        )
+        super().__init__(name, f"a whole number, {words}{unit and ' '}{unit}")
+
+    def allows(self, value: Any) -> bool:
+        """The value is an integer (or has the value of one) in range."""
+        number = value.__index__()
+        return any(first <= number <= last for first, last in self.ranges)
+
+
+class Mask(Rule):
+    """Named bits; the others must be zero."""
+
+    __slots__ = ("mask",)
+
+    def __init__(self, name: str, mask: int) -> None:
+        self.mask = mask
+        super().__init__(name, f"bits of {mask:#x} only")
+
+    def allows(self, value: Any) -> bool:
+        """The value has no other bits."""
+        return bool(value.__index__() & ~self.mask == 0)
+
+
+class Constant(Rule):
+    """A number that is always sent, and must be received as it is."""
+
+    __slots__ = ()
+
+    settable = False
+
+    def __init__(self, name: str, value: int) -> None:
+        super().__init__(name, f"the constant {value:#x}" if value >= 0 else f"the constant {value}")
+
+
+class Count(Rule):
+    """A number that says how long another field is."""
+
+    __slots__ = ()
+
+    settable = False
+
+    def __init__(self, name: str, counted: str) -> None:
+        super().__init__(name, f"the size of {counted}")
+
+
+class Items(Rule):
+    """A list of whole numbers."""
+
+    __slots__ = ("fewest", "item", "most")
+
+    def __init__(self, name: str, fewest: int, most: int, low: int, high: int, *, unit: str = "") -> None:
+        self.fewest = fewest
+        self.most = most
+        self.item = Whole(name, low, high, unit=unit)
+        super().__init__(name, f"a list of {_span(fewest, most)} items, each {self.item.legal}")
+
+    def allows(self, value: Any) -> bool:
+        """The value has so many items, all in range."""
+        return self.fewest <= len(value) <= self.most and all(self.item.allows(item) for item in value)
+
+
+class Octets(Rule):
+    """A byte string."""
+
+    __slots__ = ("fewest", "most")
+
+    def __init__(self, name: str, fewest: int, most: int) -> None:
+        self.fewest = fewest
+        self.most = most
+        super().__init__(name, f"{_span(fewest, most)} bytes")
+
+    def allows(self, value: Any) -> bool:
+        """The value is bytes-like and has so many bytes."""
+        return self.fewest <= memoryview(value).nbytes <= self.most
+
+
+class Text(Octets):
+    """Text of seven-bit characters."""
+
+    __slots__ = ()
+
+    def __init__(self, name: str, fewest: int, most: int) -> None:
+        super().__init__(name, fewest, most)
+        self.legal = f"text of {_span(fewest, most)} seven-bit characters"
+
+    def allows(self, value: Any) -> bool:
+        """The value is text and has so many characters."""
+        return isinstance(value, str) and value.isascii() and self.fewest <= len(value) <= self.most
+
+
+def _span(fewest: int, most: int) -> str:
+    return str(most) if fewest == most else f"{fewest}..{most}"
+
+
+class Steps(Rule):
+    """A value that is sent in whole steps: value = (raw * factor + bias) / divisor, raw in low..high."""
+
+    __slots__ = ("bias", "ceiling", "divisor", "factor", "floor", "high", "low")
+
+    def __init__(
+        self,
+        name: str,
+        low: int,
+        high: int,
+        *,
+        factor: int = 1,
+        bias: int = 0,
+        divisor: int = 1,
+        unit: str = "",
+    ) -> None:
+        self.low, self.high = low, high
+        self.factor, self.bias, self.divisor = factor, bias, divisor
+        first, last = sorted((low * factor + bias, high * factor + bias))
+        # Whole numbers outside of all that rounds to a legal step.
+        self.floor = (first - abs(factor)) // divisor
+        self.ceiling = -((-last - abs(factor)) // divisor)
+        bounds = sorted((self.value(low), self.value(high)))
+        super().__init__(name, f"a number, {bounds[0]}..{bounds[1]}{unit and ' '}{unit}")
+
+    def value(self, raw: int) -> Any:
+        """The value that a number on the wire stands for, correctly rounded."""
+        value = raw * self.factor + self.bias
+        return value if self.divisor == 1 else value / self.divisor
+
+    def raw(self, value: Any) -> int:
+        """The nearest step, computed exactly; a tie goes to the even one."""
+        # The bounds come first: they keep infinity, NaN and 1E+999999 from being spelt out.
+        if not self.floor <= value <= self.ceiling or _too_fine(value):
+            raise OutOfRange
+        top, bottom = value.as_integer_ratio()
+        raw = _nearest(top * self.divisor - self.bias * bottom, bottom * self.factor)
+        if not self.low <= raw <= self.high:
+            raise OutOfRange
+        return raw
+
+    def allows(self, value: Any) -> bool:
+        """The value has a nearest step, and that is in range."""
+        self.raw(value)
+        return True
+
+
+class DecimalSteps(Steps):
+    """Steps of a value that a float cannot hold: a Decimal loses nothing."""
+
+    __slots__ = ()
+
+    def value(self, raw: int) -> Any:
+        """The value that a number on the wire stands for, exactly."""
+        from decimal import Context, Decimal  # noqa: PLC0415  # only protocols with such values pay for it
+
+        return Context(prec=100).divide(Decimal(raw * self.factor + self.bias), Decimal(self.divisor))
+
+
+def _too_fine(value: Any) -> bool:
+    """A Decimal like 1E-999999, whose exact ratio would fill the memory."""
+    return hasattr(value, "as_tuple") and bool(value.as_tuple().exponent < -400)
+
+
+def _nearest(dividend: int, divisor: int) -> int:
+    if divisor < 0:
+        dividend, divisor = -dividend, -divisor
+    quotient, remainder = divmod(dividend, divisor)
+    return quotient + (2 * remainder > divisor or (2 * remainder == divisor and quotient & 1))
+
+
+# Messages ---------------------------------------------------------------------------------------------------
+
+
+class BaseMessage:
+    """A message of any protocol.
+
+    Attributes:
+        NAME: name in the schema, like motion.request.
+        ID: number of the message in the frame.
+        MIN_SIZE: fewest payload bytes.
+        MAX_SIZE: most payload bytes.
+        MAX_WIRE_SIZE: most bytes on the wire, frame and stuffing included.
+        FIELDS: names of the fields, in wire order.
+        RULES: what each field may hold.
+    """
+
+    __slots__ = ()
+
+    NAME: ClassVar[str] = ""
+    ID: ClassVar[int] = 0
+    MIN_SIZE: ClassVar[int] = 0
+    MAX_SIZE: ClassVar[int] = 0
+    MAX_WIRE_SIZE: ClassVar[int] = 0
+    FIELDS: ClassVar[tuple[str, ...]] = ()
+    RULES: ClassVar[tuple[Rule, ...]] = ()
+    #: Name of the address, "" where the frame has none.
+    ADDRESS: ClassVar[str] = ""
+
+    def to_bytes(self) -> bytes:
+        """The payload alone. Raises EncodeError."""
+        raise NotImplementedError
+
+    def _attributes(self) -> tuple[str, ...]:
+        return (self.ADDRESS, *self.FIELDS) if self.ADDRESS else self.FIELDS
+
+    def __eq__(self, other: object) -> bool:
+        """Same message, same values."""
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in self._attributes())
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={getattr(self, name, None)!r}" for name in self._attributes())
+        return f"{type(self).__name__}({values})"
+
+
+def refused(message: BaseMessage) -> EncodeError:
+    """The error that names the field which cannot be sent; asked for only after an encoder has failed."""
+    for rule in message.RULES:
+        if rule.settable:
+            value = getattr(message, rule.name, None)
+            if complaint := rule.complaint(value):
+                return EncodeError(f"{message.NAME}: {complaint}", rule.name, value)
+    return EncodeError(f"{message.NAME}: cannot be sent: {shown(message)}")
+
+
+def wrong_size(message: type[BaseMessage], payload: bytes) -> DecodeError:
+    """The error for a payload of a size that the message cannot have."""
+    legal = _span(message.MIN_SIZE, message.MAX_SIZE)
+    if message.MIN_SIZE <= len(payload) <= message.MAX_SIZE:
+        text = f"{message.NAME}: {len(payload)} data bytes do not agree with its counts or items"
+    else:
+        text = f"{message.NAME}: {len(payload)} data bytes; it has {legal}"
+    return DecodeError(text, "length", data=payload)
+
+
+def illegal(message: type[BaseMessage], name: str, seen: object, offset: int, payload: bytes) -> DecodeError:
+    """The error for a field that holds what it must not; a negative offset counts from the end."""
+    legal = next((rule.legal for rule in message.RULES if rule.name == name), "something else")
+    text = f"{message.NAME}: {name}: {shown(seen)} was received; legal is {legal}"
+    return DecodeError(text, "range", name, offset if offset >= 0 else len(payload) + offset, payload)
+
+
+def as_bytes(data: BytesLike) -> bytes:
+    """Any bytes-like object as bytes. Raises TypeError for everything else (numbers and text too)."""
+    return data if type(data) is bytes else bytes(memoryview(data))
+
+
+class OpenEnum(int):
+    """A named number. Decoding keeps a number without a name as a plain int."""
+
+    #: Members by number.
+    members: ClassVar[dict[int, Any]]
+
+    def __init_subclass__(cls) -> None:
+        """Turn the numbers in the class body into members."""
+        cls.members = {}
+        for name in cls.__annotations__:
+            member = cls(getattr(cls, name))
+            cls.members[int(member)] = member
+            setattr(cls, name, member)
+
+    @property
+    def name(self) -> str:
+        """Name of the member as it stands in the class, "" where it has none."""
+        return next((name for name in type(self).__annotations__ if getattr(type(self), name) == self), "")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}.{self.name}" if self.name else f"{type(self).__name__}({int(self)})"
+
+
+def named(number: int) -> Any:
+    """A number in the body of an OpenEnum: the class makes a member of it."""
+    return number
+
+
+class Command:
+    """A transaction: who is asked what, what answers and when, and what may be repeated.
+
+    Attributes:
+        name: name in the schema.
+        id: number of request and response in the frame.
+        request: class of the request.
+        response: class of the response, None where nothing answers.
+        addressing: node, broadcast, either, answered_broadcast or none.
+        response_byte_times: time that the slave may take, in times of one byte on the line ...
+        response_seconds: ... plus seconds.
+        repeat_safe: the request may be sent again when no answer came.
+        repeat_counter: field that tells the slave a repeat from a new request, "" where there is none.
+        in_flight: requests that may be under way at once.
+        section: section of the source document.
+        confirmed: False where the source is weak: check at the device before trusting it.
+        attributes: what this protocol alone says of its commands.
+    """
+
+    __slots__ = (
+        "addressing", "attributes", "confirmed", "id", "in_flight", "name", "repeat_counter", "repeat_safe",
+        "request", "response", "response_byte_times", "response_seconds", "section",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        name: str,
+        id: int,  # noqa: A002  # the name that the schema gives it
+        request: type[Any],
+        response: type[Any] | None,
+        *,
+        addressing: str = "none",
+        response_byte_times: float = 0,
+        response_seconds: float = 0,
+        repeat_safe: bool = False,
+        repeat_counter: str = "",
+        in_flight: int = 1,
+        section: str = "",
+        confirmed: bool = True,
+        attributes: Mapping[str, str | int | bool] | None = None,
+    ) -> None:
+        self.name = name
+        self.id = id
+        self.request = request
+        self.response = response
+        self.addressing = addressing
+        self.response_byte_times = response_byte_times
+        self.response_seconds = response_seconds
+        self.repeat_safe = repeat_safe
+        self.repeat_counter = repeat_counter
+        self.in_flight = in_flight
+        self.section = section
+        self.confirmed = confirmed
+        self.attributes = attributes or {}
+
+    def __repr__(self) -> str:
+        return f"Command({self.name!r}, {self.id:#04x})"
+
+
+# Checksums --------------------------------------------------------------------------------------------------
+
+#: The 16-bit algorithms of the CRC catalogue: names, then poly, init, refin, refout, xorout.
+CATALOGUE: tuple[tuple[str, int, int, bool, bool, int], ...] = (
+    ("crc-16/arc arc crc-16 crc-16/lha crc-ibm", 0x8005, 0x0000, True, True, 0x0000),
+    ("crc-16/cdma2000", 0xC867, 0xFFFF, False, False, 0x0000),
+    ("crc-16/cms", 0x8005, 0xFFFF, False, False, 0x0000),
+    ("crc-16/dds-110", 0x8005, 0x800D, False, False, 0x0000),
+    ("crc-16/dect-r r-crc-16", 0x0589, 0x0000, False, False, 0x0001),
+    ("crc-16/dect-x x-crc-16", 0x0589, 0x0000, False, False, 0x0000),
+    ("crc-16/dnp", 0x3D65, 0x0000, True, True, 0xFFFF),
+    ("crc-16/en-13757", 0x3D65, 0x0000, False, False, 0xFFFF),
+    (
+        "crc-16/genibus crc-16/darc crc-16/epc crc-16/epc-c1g2 crc-16/i-code",
+        0x1021,
+        0xFFFF,
+        False,
+        False,
+        0xFFFF,
+    ),
+    ("crc-16/gsm", 0x1021, 0x0000, False, False, 0xFFFF),
+    ("crc-16/ibm-3740 crc-16/autosar crc-16/ccitt-false", 0x1021, 0xFFFF, False, False, 0x0000),
+    (
+        "crc-16/ibm-sdlc crc-16/iso-hdlc crc-16/iso-iec-14443-3-b crc-16/x-25 crc-b x-25",
+        0x1021,
+        0xFFFF,
+        True,
+        True,
+        0xFFFF,
+    ),
+    ("crc-16/iso-iec-14443-3-a crc-a", 0x1021, 0xC6C6, True, True, 0x0000),
+    (
+        "crc-16/kermit crc-16/bluetooth crc-16/ccitt crc-16/ccitt-true crc-16/v-41-lsb crc-ccitt kermit",
+        0x1021,
+        0x0000,
+        True,
+        True,
+        0x0000,
+    ),
+    ("crc-16/lj1200", 0x6F63, 0x0000, False, False, 0x0000),
+    ("crc-16/m17", 0x5935, 0xFFFF, False, False, 0x0000),
+    ("crc-16/maxim-dow crc-16/maxim", 0x8005, 0x0000, True, True, 0xFFFF),
+    ("crc-16/mcrf4xx", 0x1021, 0xFFFF, True, True, 0x0000),
+    ("crc-16/modbus modbus", 0x8005, 0xFFFF, True, True, 0x0000),
+    ("crc-16/nrsc-5", 0x080B, 0xFFFF, True, True, 0x0000),
+    ("crc-16/opensafety-a", 0x5935, 0x0000, False, False, 0x0000),
+    ("crc-16/opensafety-b", 0x755B, 0x0000, False, False, 0x0000),
+    ("crc-16/profibus crc-16/iec-61158-2", 0x1DCF, 0xFFFF, False, False, 0xFFFF),
+    ("crc-16/riello", 0x1021, 0xB2AA, True, True, 0x0000),
+    ("crc-16/spi-fujitsu crc-16/aug-ccitt", 0x1021, 0x1D0F, False, False, 0x0000),
+    ("crc-16/t10-dif", 0x8BB7, 0x0000, False, False, 0x0000),
+    ("crc-16/teledisk", 0xA097, 0x0000, False, False, 0x0000),
+    ("crc-16/tms37157", 0x1021, 0x89EC, True, True, 0x0000),
+    ("crc-16/umts crc-16/buypass crc-16/verifone", 0x8005, 0x0000, False, False, 0x0000),
+    ("crc-16/usb", 0x8005, 0xFFFF, True, True, 0xFFFF),
+    (
+        "crc-16/xmodem crc-16/acorn crc-16/lte crc-16/v-41-msb xmodem zmodem",
+        0x1021,
+        0x0000,
+        False,
+        False,
+        0x0000,
+    ),
+)
+
+
+class Checksum:
+    """A checksum algorithm, ready for use.
+
+    Attributes:
+        name: name in the catalogue.
+        start: what the register begins with, in the form in which `compute` takes it.
+        compute: checksum of the bytes, beginning with a register.
+    """
+
+    __slots__ = ("compute", "name", "start")
+
+    def __init__(self, name: str, compute: Crc, start: int = 0) -> None:
+        self.name = name
+        self.compute = compute
+        self.start = start
+
+    def verifier(self, size: int, order: Any = "big") -> Crc:
+        """A function over data and its checksum (its last bytes) that gives 0 where the checksum is right."""
+        compute = self.compute
+        if compute is crc_hqx and order == "big":
+            return crc_hqx  # a CRC over itself is 0
+        return lambda data, start: compute(data[:-size], start) ^ int.from_bytes(data[-size:], order)
+
+
+def crc(name: str, *, width: int, poly: int, init: int, refin: bool, refout: bool, xorout: int) -> Checksum:
+    """A CRC by the parameters of the catalogue."""
+    if (width, poly, refin, refout, xorout) == (16, 0x1021, False, False, 0):
+        return Checksum(name, crc_hqx, init)  # the one that the standard library computes, 20 times faster
+    if refin:
+        return Checksum(name, _reflected_crc(width, poly, refout, xorout), _reflect(init, width))
+    spare = max(0, 8 - width)  # a register of less than 8 bits stands at the high end of a byte
+    return Checksum(name, _plain_crc(width + spare, poly << spare, spare, refout, xorout), init << spare)
+
+
+def _plain_crc(width: int, poly: int, spare: int, refout: bool, xorout: int) -> Crc:
+    mask, shift, high = (1 << width) - 1, width - 8, 1 << (width - 1)
+    table = _table(high, lambda value: (value << 1 ^ (poly if value & high else 0)) & mask)
+
+    def compute(data: bytes, register: int) -> int:
+        for byte in data:
+            register = (register << 8 & mask) ^ table[register >> shift ^ byte]
+        register >>= spare
+        return (_reflect(register, width - spare) if refout else register) ^ xorout
+
+    return compute
+
+
+def _reflected_crc(width: int, poly: int, refout: bool, xorout: int) -> Crc:
+    feedback = _reflect(poly, width)
+    table = _table(1, lambda value: value >> 1 ^ (feedback if value & 1 else 0), up=False)
+
+    def compute(data: bytes, register: int) -> int:
+        for byte in data:
+            register = register >> 8 ^ table[(register ^ byte) & 0xFF]
+        return (register if refout else _reflect(register, width)) ^ xorout
+
+    return compute
+
+
+def _table(seed: int, clock: Callable[[int], int], *, up: bool = True) -> list[int]:
+    """What each byte changes in the register; the step is linear, so eight steps give all 256 entries."""
+    table = [0] * 256
+    value, bits = seed, range(8) if up else range(7, -1, -1)
+    for bit in bits:
+        value = clock(value)
+        table[1 << bit] = value
+    for index in range(3, 256):
+        low = index & -index
+        table[index] = table[low] ^ table[index ^ low]
+    return table
+
+
+def _reflect(value: int, width: int) -> int:
+    return int(f"{value:0{width}b}"[::-1], 2)
+
+
+def find_crc(name: str) -> Checksum:
+    """A 16-bit algorithm of the catalogue by name or alias; case and punctuation do not matter.
+
+    Raises:
+        ValueError: there is none of that name.
+    """
+    key = _key(name)
+    for names, *parameters in CATALOGUE:
+        known = names.split()
+        if key in {_key(part) for each in known for part in (each, each.partition("/")[2] or each)}:
+            poly, init, refin, refout, xorout = parameters
+            return crc(
+                known[0],
+                width=16,
+                poly=poly,
+                init=init,
+                refin=bool(refin),
+                refout=bool(refout),
+                xorout=xorout,
+            )
+    choices = ", ".join(row[0].split()[0].partition("/")[2] for row in CATALOGUE)
+    raise ValueError(f"no 16-bit CRC is called {name!r}; there are {choices}")
+
+
+def _key(name: str) -> str:
+    return "".join(filter(str.isalnum, name.lower()))
+
+
+def sum_of(name: str, width: int, *, complement: bool = False) -> Checksum:
+    """The sum of the bytes."""
+    mask = (1 << width) - 1
+    if complement:
+        return Checksum(name, lambda data, start: ~(start + sum(data)) & mask)
+    return Checksum(name, lambda data, start: (start + sum(data)) & mask)
