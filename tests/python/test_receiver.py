@@ -91,3 +91,13 @@ def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObj
             else:
                 expected.append(("fault", event.kind, event.offset))
         assert described(decoder.feed(bytes((byte,)))) == expected, f"byte {at} of {wire.hex(' ')}"
+
+
+def test_a_frame_behind_what_may_be_a_longer_one_comes_out_at_its_last_byte() -> None:
+    """00 10 in front begins a candidate whose count is wrong; the frame in it must not wait."""
+    codec = module("modbus_rtu")
+    frame = bytes.fromhex("010300000001840a")
+    decoder = codec.StreamDecoder("request")
+    events = [decoder.feed(bytes((byte,))) for byte in frame + frame + bytes.fromhex("0010") + frame]
+    assert events[-1]
+    assert events[-1][-1].NAME == "read_holding_registers.request"

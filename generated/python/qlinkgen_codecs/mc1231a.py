@@ -381,7 +381,7 @@ class Message(BaseMessage):
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
-        """The message of a payload. Raises one of MISFITS."""
+        """The message of a payload. Raises one of the misfits."""
         raise NotImplementedError
 
     @classmethod
@@ -434,15 +434,12 @@ class _EmptyRequest(Request):
 
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
-        try:
-            return b""
-        except REFUSALS:
-            raise refused(self) from None
+        return b""
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
-        if len(payload) != 0:
+        if payload:
             raise Misfit
         return message
 
@@ -493,15 +490,12 @@ class _EmptyResponse(Response):
 
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
-        try:
-            return b""
-        except REFUSALS:
-            raise refused(self) from None
+        return b""
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
-        if len(payload) != 0:
+        if payload:
             raise Misfit
         return message
 

@@ -35,6 +35,7 @@ from ._support import (
     REFUSALS,
     refused,
     Steps,
+    UNREADABLE,
     Whole,
     wrong_size,
 )
@@ -42,7 +43,7 @@ from ._support import (
 TYPE_CHECKING = False  # the name is enough for type checkers; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import ClassVar, Final, Literal, Self
+    from typing import Any, ClassVar, Final, Literal, Self
 
     from ._support import BytesLike
 
@@ -211,7 +212,7 @@ class Message(BaseMessage):
 
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
-        """The message in a whole frame without preamble and stuffing. Raises one of MISFITS."""
+        """The message in a whole frame without preamble and stuffing. Raises one of the misfits."""
         raise NotImplementedError
 
 
@@ -735,7 +736,7 @@ class NodeProgramLoadRequest(Message):
         if length != len(body) - 1:
             raise Misfit
         end = 4 + program_data_count
-        message.program_data = body[4 : end]
+        message.program_data = bytes(body[4 : end])
         if not 1 <= node <= 16:
             raise illegal(cls, "node", node, 4, _PREAMBLE + body)
         message.node = node
@@ -903,7 +904,7 @@ class MotorResponsePollResponse(Message):
         if length != len(body) - 1:
             raise Misfit
         end = 4 + motor_data_count
-        message.motor_data = body[4 : end]
+        message.motor_data = bytes(body[4 : end])
         if not 1 <= node <= 16:
             raise illegal(cls, "node", node, 4, _PREAMBLE + body)
         message.node = node
@@ -965,7 +966,7 @@ class MotorRequestRequest(Message):
         if length != len(body) - 1:
             raise Misfit
         end = 3 + motor_data_count
-        message.motor_data = body[3 : end]
+        message.motor_data = bytes(body[3 : end])
         if not 1 <= node <= 16:
             raise illegal(cls, "node", node, 4, _PREAMBLE + body)
         message.node = node
@@ -1420,7 +1421,7 @@ class ReadResponse(Message):
         if length != len(body) - 1:
             raise Misfit
         end = 3 + data_count
-        message.data = body[3 : end]
+        message.data = bytes(body[3 : end])
         if not 1 <= node <= 16:
             raise illegal(cls, "node", node, 4, _PREAMBLE + body)
         message.node = node
@@ -1484,7 +1485,7 @@ class WriteRequest(Message):
         if length != len(body) - 1:
             raise Misfit
         end = 4 + data_count
-        message.data = body[4 : end]
+        message.data = bytes(body[4 : end])
         if not 1 <= node <= 16:
             raise illegal(cls, "node", node, 4, _PREAMBLE + body)
         message.node = node
@@ -1810,7 +1811,7 @@ class LoopBackRequest(Message):
         if length != len(body) - 1:
             raise Misfit
         end = 4 + data_count
-        message.data = body[4 : end]
+        message.data = bytes(body[4 : end])
         if not 1 <= node <= 16:
             raise illegal(cls, "node", node, 4, _PREAMBLE + body)
         message.node = node
@@ -1874,7 +1875,7 @@ class LoopBackResponse(Message):
         if length != len(body) - 1:
             raise Misfit
         end = 4 + data_count
-        message.data = body[4 : end]
+        message.data = bytes(body[4 : end])
         if not 1 <= node <= 16:
             raise illegal(cls, "node", node, 4, _PREAMBLE + body)
         message.node = node
@@ -2187,27 +2188,23 @@ def _decode(wire: BytesLike, known: dict[int, type[Message]]) -> Message:
 
 def decode_request(wire: BytesLike) -> Message:
     """The message of exactly one request frame as it is on the wire. Raises DecodeError."""
-    if type(wire) is bytes:
-        body = wire[2:]
-        if _MARK not in body and not _check(body, _crc_start):
-            try:
-                if wire[0] == _MARK == wire[1]:
-                    return _REQUEST_READERS[body[1]](body)
-            except MISFITS:
-                pass  # said in full below
+    try:
+        body: Any = wire[2:]
+        if _MARK not in body and not _check(body, _crc_start) and wire[0] == _MARK == wire[1]:
+            return _REQUEST_READERS[body[1]](body)
+    except UNREADABLE:
+        pass  # said in full below
     return _decode(wire, _REQUESTS)
 
 
 def decode_response(wire: BytesLike) -> Message:
     """The message of exactly one response frame as it is on the wire. Raises DecodeError."""
-    if type(wire) is bytes:
-        body = wire[2:]
-        if _MARK not in body and not _check(body, _crc_start):
-            try:
-                if wire[0] == _MARK == wire[1]:
-                    return _RESPONSE_READERS[body[1]](body)
-            except MISFITS:
-                pass  # said in full below
+    try:
+        body: Any = wire[2:]
+        if _MARK not in body and not _check(body, _crc_start) and wire[0] == _MARK == wire[1]:
+            return _RESPONSE_READERS[body[1]](body)
+    except UNREADABLE:
+        pass  # said in full below
     return _decode(wire, _RESPONSES)
 
 

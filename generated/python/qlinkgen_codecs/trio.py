@@ -140,7 +140,7 @@ class Message(BaseMessage):
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
-        """The message of a payload, but for its address. Raises one of MISFITS."""
+        """The message of a payload, but for its address. Raises one of the misfits."""
         raise NotImplementedError
 
 
@@ -240,10 +240,10 @@ class DirectVariableTransfer(Message):
             if not 0 <= self.number <= 16383:
                 raise OutOfRange
             return _PACK_DIRECT_VARIABLE_TRANSFER(
-                number_raw & 0x7f, number_raw >> 7 & 0x7f, value_raw >> 32 & 0x7f, value_raw >> 39 & 0x7f,
-                value_raw >> 46 & 0x7f, value_raw >> 53 & 0x7f, value_raw >> 60 & 0x0f, value_raw & 0x7f,
-                value_raw >> 7 & 0x7f, value_raw >> 14 & 0x7f, value_raw >> 21 & 0x7f,
-                value_raw >> 28 & 0x0f,
+                number_raw & 0x7F, number_raw >> 7 & 0x7F, value_raw >> 32 & 0x7F, value_raw >> 39 & 0x7F,
+                value_raw >> 46 & 0x7F, value_raw >> 53 & 0x7F, value_raw >> 60 & 0x0F, value_raw & 0x7F,
+                value_raw >> 7 & 0x7F, value_raw >> 14 & 0x7F, value_raw >> 21 & 0x7F,
+                value_raw >> 28 & 0x0F,
             )
         except REFUSALS:
             raise refused(self) from None
@@ -316,7 +316,7 @@ class KeypadOffset(Message):
             offset_raw = self.offset
             if not 1 <= self.offset <= 15:
                 raise OutOfRange
-            return _PACK_KEYPAD_OFFSET(offset_raw & 0x7f)
+            return _PACK_KEYPAD_OFFSET(offset_raw & 0x7F)
         except REFUSALS:
             raise refused(self) from None
 
@@ -368,7 +368,7 @@ class KeypadMode(Message):
             mode_raw = self.mode
             if not 0 <= self.mode <= 127:
                 raise OutOfRange
-            return _PACK_KEYPAD_MODE(mode_raw & 0x7f)
+            return _PACK_KEYPAD_MODE(mode_raw & 0x7F)
         except REFUSALS:
             raise refused(self) from None
 

@@ -79,6 +79,8 @@ class Misfit(LookupError):
 REFUSALS = (struct_error, TypeError, ValueError, ArithmeticError, AttributeError, LookupError)
 #: What a decoder meets when bytes are not the message that they seem to be.
 MISFITS = (struct_error, LookupError, CodecError)
+#: What it meets beside them where the argument may be anything.
+UNREADABLE = (*MISFITS, TypeError, BufferError, NotImplementedError)
 
 
 class Fault:

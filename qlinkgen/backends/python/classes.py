@@ -46,6 +46,11 @@ class ClassModel:
     body_size: int | None = None
     has_codec: bool = False
 
+    @property
+    def refusable(self) -> bool:
+        """There is a value that the encoder may have to refuse."""
+        return self.encode != ['return b""']
+
 
 def class_name(message: Message) -> str:
     """Name of a message's class."""

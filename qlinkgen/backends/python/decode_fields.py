@@ -166,7 +166,9 @@ class FieldReader(RunReader):
             start = "start"
         else:
             self.lines.append(f"end = {start} + {count}" if start != "0" else f"end = {count}")
-        self.lines.append(f"{target} = {self.place.data}[{start} : end]")
+        taken = f"{self.place.data}[{start} : end]"
+        # What comes straight from the caller may be a memoryview.
+        self.lines.append(f"{target} = bytes({taken})" if self.place.unique else f"{target} = {taken}")
         self._moved = True
 
     def _share(self, each: Field, kind: Blob | Array) -> None:

@@ -76,7 +76,8 @@ class RunReader:
             self._unpack(run)
         elif self._is_last and not self._moved and not self.message.variable:
             # Nothing to unpack: the size is all there is to check.
-            self._misfit(f"len({self.place.data}) != {self.message.max_size + self.place.overhead}")
+            size = self.message.max_size + self.place.overhead
+            self._misfit(f"len({self.place.data}) != {size}" if size else self.place.data)
         self.lines += run.after
         if not self._moved:
             self._fixed_at += run.size

@@ -9,13 +9,6 @@ from qlinkgen.backends.python.frames_other import marked_model, packet_model
 from qlinkgen.model.frame import Checksum, DelimitedFrame, MarkedFrame
 from qlinkgen.model.protocol import Protocol
 
-#: Names of the support module that a module may need, those of its rules apart.
-SUPPORT_NAMES = (
-    "BaseMessage", "MISFITS", "Misfit", "OutOfRange", "REFUSALS", "as_bytes", "illegal", "refused",
-    "wrong_size",
-)  # fmt: skip
-RULES = ("Constant", "Count", "DecimalSteps", "Items", "Mask", "Octets", "Steps", "Text", "Whole")
-
 
 def kind_of(protocol: Protocol, *, unique: bool) -> str:
     """Name of the templates for the protocol's kind of frame."""

@@ -14,12 +14,11 @@ from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.checks import selectable
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel, class_name
 from qlinkgen.backends.python.frames_delimited import is_unique, seal_lines
+from qlinkgen.backends.python.imports import PUBLIC, imports
 from qlinkgen.backends.python.place import Place, in_hex, place_of
 from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
-
-_ERRORS = ("CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
 
 
 def render(protocol: Protocol, options: Options) -> str:
@@ -42,15 +41,16 @@ class Module:
         measured = frames.measured(protocol, unique=self.unique)
         self.builder = ClassBuilder(self.place, protocol, self.messages, measured=measured)
         self.models: list[ClassModel] = []
+        self.tables = self._tables()
 
     def text(self) -> str:
         """The module's text."""
         self.models = self.builder.build()
         body = {"classes": self._classes(self.models), "steps": self.builder.steps, **self._frame()}
-        context = {**self._head(), **self._tables(), **body}
+        context = {**self._head(), **self.tables, **body}
         text = "\n".join([*body["steps"], body["classes"], body["frame"], body["decoder"]])
-        context |= {"structs": self._structs(text), "decimals": "Decimal(" in text, **self._used(text)}
-        context |= {"support": self._support(text), "public": self._public(text)}
+        context |= imports(text, enums=bool(self.tables["enums"]), flags=bool(self.tables["flags"]))
+        context |= {"public": self._public(text)}
         return _tidy(self._place("module.j2", context))
 
     def _place(self, template: str, context: dict[str, Any]) -> str:
@@ -131,35 +131,10 @@ class Module:
 
     # Names
 
-    def _structs(self, text: str) -> str:
-        wanted = [
-            ("Struct", r"\bStruct\("),
-            ("pack", r"(?<![.\w])pack\("),
-            ("unpack_from", r"(?<![.\w])unpack_from\("),
-        ]
-        return ", ".join(name for name, pattern in wanted if re.search(pattern, text))
-
-    def _used(self, text: str) -> dict[str, Any]:
-        tables_used = self._tables()
-        typing = {name for name in ("ClassVar", "Literal", "Self") if re.search(rf"\b{name}\b", text)}
-        typing |= ({"ClassVar"} if tables_used["enums"] else set()) | (
-            {"Final"} if tables_used["flags"] else set()
-        )
-        used = [name for name in ("struct_error", "Callable") if re.search(rf"\b{name}\b", text)]
-        return {"used": used, "typing": ", ".join(sorted(typing))}
-
-    def _support(self, text: str) -> list[str]:
-        names = {name for name in frames.SUPPORT_NAMES if re.search(rf"(?<![.\w]){name}\b(?!\.)", text)}
-        names |= {name for name in frames.RULES if re.search(rf"\b{name}\(", text)}
-        names |= {name for name in ("crc", "sum_of", "find_crc") if f"= {name}(" in text} | set(_ERRORS)
-        if self.constants and self._tables()["enums"]:
-            names |= {"OpenEnum", "named"}
-        return sorted(names, key=str.lower)
-
     def _public(self, text: str) -> list[str]:
         names = [class_name(message) for message in self.messages]
-        names += [row.name for group in ("enums", "flags") for row in self._tables()[group]]
-        names += ["COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_ERRORS]
+        names += [row.name for group in ("enums", "flags") for row in self.tables[group]]
+        names += ["COMMANDS", "MESSAGES", "Message", "StreamDecoder", *PUBLIC]
         names += re.findall(r"^def ([a-z]\w*)", text, re.MULTILINE)
         return sorted(set(names))
 

@@ -142,7 +142,7 @@ def _shifted(source: str, shift: int) -> str:
 
 def _group_out(number: str, chunk: Chunk) -> str:
     return (
-        f"{number} >> {chunk.shift} & {chunk.mask:#04x}" if chunk.shift else f"{number} & {chunk.mask:#04x}"
+        f"{number} >> {chunk.shift} & 0x{chunk.mask:02X}" if chunk.shift else f"{number} & 0x{chunk.mask:02X}"
     )
 
 
