@@ -73,14 +73,15 @@ def _layout(message: Message) -> None:
     for field in message.fields:
         offset = message.offset(field.name)
         place = "behind" if offset is None else offset
-        note = "" if field.confirmed else UNCONFIRMED
+        notes = ["echo"] if field.echo else []
+        notes += [] if field.confirmed else [UNCONFIRMED]
         table.add(
             place,
             field.name,
             describe.size_text(field),
             *_about(field, values.get(field.name)),
             field.section,
-            note,
+            ", ".join(notes),
         )
         if isinstance(field.type, Bits):
             for member in field.type.members:

@@ -22,6 +22,8 @@ class Field:
     doc: str = ""
     section: str = ""
     confirmed: bool = True
+    #: It repeats the field of the same name of the request.
+    echo: bool = False
 
     @property
     def min_size(self) -> int:

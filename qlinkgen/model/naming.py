@@ -19,17 +19,17 @@ C_RESERVED = frozenset(
     """.split()  # noqa: SIM905 - reads better than sixty quoted words
 )
 
-#: Attributes that generated message classes have themselves.
+#: Attributes that generated message classes have themselves, and what their methods call the message.
 GENERATED_ATTRIBUTES = frozenset(
-    {"to_bytes", "from_bytes", "to_frame", "to_dict", "from_dict", "from_checked", "measure_payload"}
+    {"to_bytes", "from_bytes", "to_frame", "to_dict", "from_dict", "from_checked", "measure_payload", "self"}
 )
 
 
 #: Names that generated modules and headers give to things of their own.
 GENERATED_NAMES = frozenset(
     """
-    codec_error command decode_error encode_error error event fault frame master message receiver slave status
-    stream_decoder
+    async_master_calls async_node_calls bus codec_error command decode_error encode_error error event fault
+    frame master master_calls message node_calls receiver slave slave_handlers status stream_decoder
     """.split()  # noqa: SIM905 - as above
 )
 

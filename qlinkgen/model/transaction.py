@@ -54,6 +54,12 @@ class Command:
     #: What this protocol alone says of its commands; names and values are declared in the schema.
     attributes: Mapping[str, str | int | bool] = field(default_factory=lambda: MappingProxyType({}))
 
+    @property
+    def echoes(self) -> tuple[str, ...]:
+        """Values of the response that repeat the value of the same name of the request."""
+        values = self.response.values if self.response else ()
+        return tuple(value.name for value in values if value.field.echo)
+
 
 @dataclass(frozen=True, slots=True)
 class Bus:

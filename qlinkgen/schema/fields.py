@@ -31,7 +31,7 @@ class FieldBuilder:
             kind = self._types.build(spec, (*path, name))
             if kind is not None:
                 doc, confirmed = self._inherited(spec)
-                fields.append(Field(name, kind, doc, spec.section, confirmed))
+                fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
         fields = self._counted(fields, path)
         self._check_open_ends(fields, path)
         return tuple(self._bounded(fields, path))

@@ -145,6 +145,9 @@ class FieldSpec(Fact):
         default=None, description="Field of variable size whose length this one carries"
     )
     counts_in: Literal["items", "bytes"] = Field(default="items", description="What is counted")
+    echo: StrictBool = Field(
+        default=False, description="In a response: repeats the field of the same name of the request"
+    )
     bits: dict[str, Annotated[BitSpec, ShortForm("at", "integer", "string")]] | None = Field(
         default=None, description="Fields inside the integer"
     )

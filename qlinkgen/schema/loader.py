@@ -10,6 +10,7 @@ from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema.addresses import check_addresses
 from qlinkgen.schema.commands import CommandBuilder, build_bus
+from qlinkgen.schema.echoes import check_echoes
 from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.messages import MessageBuilder
@@ -107,6 +108,7 @@ def _build(data: object, report: Reporter, text: str, file_name: str, crc: str |
     messages = MessageBuilder(file, report, fields, frame, bus)
     commands = CommandBuilder(file, report, messages, frame, bus)
     commands.build()
+    check_echoes(file, commands.commands, report)
     types.report_unused()
     check_names(file, commands.messages, report)
     report_unconfirmed(file, report)

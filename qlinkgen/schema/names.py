@@ -115,7 +115,9 @@ class _Checker:
     def attribute(self, name: str, path: Path) -> None:
         self.member(name, path)
         if name in GENERATED_ATTRIBUTES:
-            self._error("reserved-word", path, f"'{name}' is a method of every message", f"use {name}_")
+            self._error(
+                "reserved-word", path, f"'{name}' is a name that every message has itself", f"use {name}_"
+            )
 
     def clashes(self, names: Iterable[tuple[str, str, Path]]) -> None:
         """Report names that become the same: (what it becomes, what it is called in a message, its place)."""

@@ -211,6 +211,11 @@ _ALL = (
         "Write response: {} for an answer without data, response: none for no answer.",
     ),
     Rule(
+        "bad-echo",
+        "An echo stands in a response, and its request has a field of the same name and type.",
+        "By it a master tells the answer to its request from another; nothing else can be repeated.",
+    ),
+    Rule(
         "unknown-attribute",
         "Attributes of commands are declared, with their values.",
         "A misspelt attribute would silently have no effect.",

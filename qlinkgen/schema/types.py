@@ -57,9 +57,10 @@ class TypeBuilder:
         self._chain += 1
         spec, path = self._file.types[name], ("types", name)
         before = len(self._report.faults)
-        if spec.counts is not None:
-            what = "'counts' has no effect on a named type"
-            self._report.error("not-applicable", (*path, "counts"), what, "put it on a field", of_key=True)
+        for key in ("counts", "echo"):
+            if getattr(spec, key):
+                what = f"'{key}' has no effect on a named type"
+                self._report.error("not-applicable", (*path, key), what, "put it on a field", of_key=True)
         if self.build(spec, path, (name,)) is None or len(self._report.faults) > before:
             self._report.taint(path)
         self._chain -= 1

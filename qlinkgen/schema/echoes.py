@@ -1,0 +1,88 @@
+"""Third pass, echoes: fields of a response that repeat a field of the request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from qlinkgen.model.message import Field
+from qlinkgen.model.transaction import Command
+from qlinkgen.model.types import Array, Bits, Blob, FieldType, Length, Scalar
+from qlinkgen.schema.file_model import Fields, SchemaFile
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+_RULE = "bad-echo"
+
+
+def check_echoes(file: SchemaFile, commands: Iterable[Command], report: Reporter) -> None:
+    """Check every echo of a file: it stands in a response, and its request has what it repeats."""
+    for fields, path, what in _unanswering(file):
+        for name, spec in fields.items():
+            if spec.echo:
+                place = (*path, name, "echo")
+                hint = "remove it; a response repeats what its request says"
+                report.error(_RULE, place, f"'echo' has no effect in {what}", hint, of_key=True)
+    for command in commands:
+        paths = [_path(file, command.name, direction) for direction in ("request", "response")]
+        for field in command.response.fields if command.response else ():
+            if field.echo and (fault := _fault(field, command.request.fields)):
+                place = (*paths[1], field.name)
+                report.error(_RULE, (*place, "echo"), *fault, of_key=True, needs=(place, paths[0]))
+
+
+def _unanswering(file: SchemaFile) -> Iterator[tuple[Fields, Path, str]]:
+    """Fields that answer nothing, their place, and what they are fields of."""
+    yield file.defaults.request or {}, ("defaults", "request"), "a request"
+    for name, command in file.commands.items():
+        yield command.request or {}, ("commands", name, "request"), "a request"
+    for name, message in file.messages.items():
+        yield message.fields, ("messages", name, "fields"), "a message that answers nothing"
+
+
+def _path(file: SchemaFile, name: str, direction: str) -> Path:
+    """Where the fields of a command stand."""
+    written = getattr(file.commands[name], direction) is not None
+    return ("commands", name, direction) if written else ("defaults", direction)
+
+
+def _fault(field: Field, request: Iterable[Field]) -> tuple[str, str] | None:
+    """What is wrong with an echo, and what would put it right."""
+    known = {each.name: each for each in request if _settable(each)}
+    asked = known.get(field.name)
+    if not _settable(field):
+        return f"{field.name} is no value: the codec fills it", "remove echo"
+    if asked is None:
+        hint = did_you_mean(field.name, known, f"its fields are {listed(known)}")
+        return f"the request has no field '{field.name}' that could be repeated", hint
+    if not _holds(field.type, asked.type):
+        return f"{field.name} cannot hold every {field.name} of the request", "give both the same type"
+    return None
+
+
+def _settable(field: Field) -> bool:
+    return not isinstance(field.type, Scalar) or field.type.settable
+
+
+def _holds(kind: FieldType, other: FieldType) -> bool:
+    """Both are of the same type, and every value of the other one is in the range of this one."""
+    if isinstance(kind, Blob) and isinstance(other, Blob):
+        return kind.text == other.text and _longer(kind.length, other.length)
+    if isinstance(kind, Array) and isinstance(other, Array):
+        return _holds(kind.item, other.item) and _longer(kind.length, other.length)
+    if isinstance(kind, Bits) and isinstance(other, Bits):
+        pairs = zip(kind.members, other.members, strict=False)
+        same = len(kind.members) == len(other.members)
+        return same and all(a.name == b.name and _holds(a.type, b.type) for a, b in pairs)
+    if isinstance(kind, Scalar) and isinstance(other, Scalar):
+        within = kind.minimum <= other.minimum and other.maximum <= kind.maximum
+        return within and _nature(kind) == _nature(other)
+    return False
+
+
+def _longer(length: Length, other: Length) -> bool:
+    return length.minimum <= other.minimum and other.maximum <= length.maximum
+
+
+def _nature(scalar: Scalar) -> tuple[object, ...]:
+    """What a number is; its bytes may stand in another order."""
+    return scalar.bits, scalar.signed, scalar.scaling, scalar.unit, scalar.meaning
