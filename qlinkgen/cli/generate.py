@@ -124,13 +124,17 @@ def _fill(
     with _progress(len(targets) * len(protocols)) as step:
         for target in dict.fromkeys(targets):
             generate, shared = TARGETS[target].load()
-            folder.want("", "", target, dict(shared))
+            made = False
             for schema, protocol in protocols.items():
                 if not _keeps(protocol, options):
                     continue
                 step(f"{target} {protocol.name}")
                 source = schema_of(protocol, schema, folder.root)
-                folder.want(protocol.name, source, target, dict(generate(protocol, options)))
+                outputs = dict(generate(protocol, options))
+                folder.want(protocol.name, source, target, outputs)
+                made = made or bool(outputs)
+            if made:  # there may be nothing that a package could stand around
+                folder.want("", "", target, dict(shared))
 
 
 def _keeps(protocol: Protocol, options: Options) -> bool:

@@ -49,14 +49,15 @@ def _vectors() -> tuple[Generate, Outputs]:
     return generate, vectors.shared()
 
 
-def _target(name: str, summary: str) -> Target:
-    return Target(name, summary, partial(_plain, name))
+def _target(name: str, summary: str, backend: str = "") -> Target:
+    return Target(name, summary, partial(_plain, backend or name))
 
 
 TARGETS = {
     target.name: target
     for target in (
         _target("python", "typed module, standard library only"),
+        _target("stations", "typed calls of masters and handlers of slaves", "python.stations"),
         _target("c", "self-contained C99 header"),
         _target("construct", "structures for the construct library"),
         Target("vectors", "test vectors as JSON", _vectors),

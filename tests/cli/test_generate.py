@@ -123,6 +123,32 @@ def test_a_deleted_schema_leaves_no_orphan(qlinkgen: Run, out: Path, thermo: Pat
     assert "c/thermo.h: is an orphan" in result.out
 
 
+@pytest.mark.parametrize("name", ["trio", "mc1231a"])
+def test_a_target_may_have_nothing_for_a_protocol(qlinkgen: Run, out: Path, name: str) -> None:
+    result = qlinkgen("generate", name, "--target", "stations", "-o", out)
+    assert (result.code, result.err) == (0, "")
+    assert files(out) == {"manifest.json"}
+
+
+def test_stations_stand_in_a_package_of_their_own(qlinkgen: Run, out: Path) -> None:
+    assert qlinkgen("generate", "qlink", "-o", out).code == 0
+    assert qlinkgen("generate", "trio", "-o", out).code == 0
+    folder = out / "python/qlinkgen_stations"
+    assert files(folder) == {"__init__.py", "py.typed", "qlink.py"}
+    (folder / "qlink.py").write_text("spoilt")
+    result = qlinkgen("generate", "qlink", "-o", out, "--check")
+    assert (result.code, "qlinkgen_stations/qlink.py: differs" in result.out) == (1, True)
+
+
+def test_a_bus_that_loses_its_master_leaves_no_stations(qlinkgen: Run, out: Path, thermo: Path) -> None:
+    assert qlinkgen("generate", thermo, "-o", out).code == 0
+    made = out / "python/qlinkgen_stations/thermo.py"
+    assert made.exists()
+    thermo.write_text(thermo.read_text().replace("kind: master_slave", "kind: ring"))
+    assert qlinkgen("generate", thermo, "-o", out).code == 0
+    assert not made.exists()
+
+
 def test_protocols_and_targets_do_not_disturb_one_another(qlinkgen: Run, out: Path) -> None:
     qlinkgen("generate", "qlink", "--target", "c", "-o", out)
     qlinkgen("generate", "trio", "--target", "vectors", "-o", out)

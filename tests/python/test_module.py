@@ -107,12 +107,26 @@ def test_the_transaction_table_says_what_the_schema_says() -> None:
         assert row.response_byte_times == command.response_within.byte_times
         assert row.response_seconds == pytest.approx(float(command.response_within.seconds))
         assert (row.repeat_safe, row.repeat_counter) == (command.repeat.safe, command.repeat.counter)
+        assert row.echoes == command.echoes
         assert (row.in_flight, row.section, row.confirmed) == (
             command.in_flight,
             command.section,
             command.confirmed,
         )
     assert module("mc1231a").COMMANDS["set_vel"].attributes["double_buffered"] is True
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_the_bus_is_what_the_schema_says(name: str) -> None:
+    bus, line = module(name).BUS, protocol(name).bus
+    assert (bus.kind, bus.broadcast, bus.baud, bus.bits_per_byte) == (
+        line.kind,
+        line.broadcast,
+        line.baud,
+        line.bits_per_byte,
+    )
+    assert (bus.first_node, bus.last_node) == (line.nodes or (None, None))
+    assert repr(bus) == repr(eval(repr(bus), {"Bus": module(name).Bus}))
 
 
 def test_only_keeps_what_is_asked_for() -> None:

@@ -458,6 +458,42 @@ def named(number: int) -> Any:
     return number
 
 
+class Bus:
+    """The line and who is on it, as the schema says.
+
+    Attributes:
+        kind: master_slave, ring or host.
+        first_node: least address of a node, None where frames have no address.
+        last_node: greatest address of a node, None where frames have no address.
+        broadcast: address of all nodes at once, None where there is none.
+        baud: usual speed of the line in bits a second, None where the document names none.
+        bits_per_byte: bits on the line for one byte: start, data, parity and stop bits.
+    """
+
+    __slots__ = ("baud", "bits_per_byte", "broadcast", "first_node", "kind", "last_node")
+
+    def __init__(
+        self,
+        kind: str,
+        *,
+        first_node: int | None = None,
+        last_node: int | None = None,
+        broadcast: int | None = None,
+        baud: int | None = None,
+        bits_per_byte: int = 10,
+    ) -> None:
+        self.kind = kind
+        self.first_node = first_node
+        self.last_node = last_node
+        self.broadcast = broadcast
+        self.baud = baud
+        self.bits_per_byte = bits_per_byte
+
+    def __repr__(self) -> str:
+        names = ("first_node", "last_node", "broadcast", "baud", "bits_per_byte")
+        return f"Bus({self.kind!r}, {', '.join(f'{name}={getattr(self, name)}' for name in names)})"
+
+
 class Command:
     """A transaction: who is asked what, what answers and when, and what may be repeated.
 
@@ -471,6 +507,7 @@ class Command:
         response_seconds: ... plus seconds.
         repeat_safe: the request may be sent again when no answer came.
         repeat_counter: field that tells the slave a repeat from a new request, "" where there is none.
+        echoes: fields of the response that repeat the field of the same name of the request.
         in_flight: requests that may be under way at once.
         section: section of the source document.
         confirmed: False where the source is weak: check at the device before trusting it.
@@ -478,8 +515,8 @@ class Command:
     """
 
     __slots__ = (
-        "addressing", "attributes", "confirmed", "id", "in_flight", "name", "repeat_counter", "repeat_safe",
-        "request", "response", "response_byte_times", "response_seconds", "section",
+        "addressing", "attributes", "confirmed", "echoes", "id", "in_flight", "name", "repeat_counter",
+        "repeat_safe", "request", "response", "response_byte_times", "response_seconds", "section",
     )  # fmt: skip
 
     def __init__(
@@ -494,6 +531,7 @@ class Command:
         response_seconds: float = 0,
         repeat_safe: bool = False,
         repeat_counter: str = "",
+        echoes: tuple[str, ...] = (),
         in_flight: int = 1,
         section: str = "",
         confirmed: bool = True,
@@ -508,6 +546,7 @@ class Command:
         self.response_seconds = response_seconds
         self.repeat_safe = repeat_safe
         self.repeat_counter = repeat_counter
+        self.echoes = echoes
         self.in_flight = in_flight
         self.section = section
         self.confirmed = confirmed

@@ -17,6 +17,7 @@ from struct import error as struct_error
 from ._support import (
     as_bytes,
     BaseMessage,
+    Bus,
     CodecError,
     Command,
     Counters,
@@ -48,6 +49,8 @@ __all__ = [
     "AxisOnRequest",
     "AxisOnResponse",
     "AxisStatus",
+    "BUS",
+    "Bus",
     "COMMANDS",
     "ClrStatusRequest",
     "ClrStatusResponse",
@@ -4258,6 +4261,9 @@ class GetPhaseOffsetResponse(Response):
         message = _new(cls)
         message.value, = _UNPACK_GET_PHASE_OFFSET_RESPONSE(payload)
         return message
+
+#: The line and who is on it.
+BUS = Bus("host", bits_per_byte=10)
 
 #: Every message by its name in the schema.
 MESSAGES: dict[str, type[Message]] = {

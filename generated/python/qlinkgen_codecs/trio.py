@@ -18,6 +18,7 @@ from decimal import Decimal
 from ._support import (
     as_bytes,
     BaseMessage,
+    Bus,
     CodecError,
     Command,
     Counters,
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
     from ._support import BytesLike
 
 __all__ = [
+    "BUS",
+    "Bus",
     "COMMANDS",
     "CharacterTransfer",
     "CodecError",
@@ -381,6 +384,9 @@ class KeypadMode(Message):
             raise illegal(cls, "mode", mode_raw, 0, payload)
         message.mode = KeypadModeEnum.members.get(mode_raw, mode_raw)
         return message
+
+#: The line and who is on it.
+BUS = Bus("ring", first_node=1, last_node=15, bits_per_byte=10)
 
 #: Every message by its name in the schema.
 MESSAGES: dict[str, type[Message]] = {

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-from qlinkgen.backends.python import values
+from qlinkgen.backends.python import docstrings, values
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
 from qlinkgen.backends.python.measure import measure_lines
@@ -24,7 +23,7 @@ SHARED = 4
 #: Names that a module has for itself.
 TAKEN = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
-    OpenEnum BaseMessage Constant Count DecimalSteps Items Mask Misfit Octets OutOfRange Steps Text Whole
+    Bus OpenEnum BaseMessage Constant Count DecimalSteps Items Mask Misfit Octets OutOfRange Steps Text Whole
     Struct Decimal Self Any Callable BytesLike ClassVar Final Literal""".split()  # noqa: SIM905  # reads better than quoted words
 )
 
@@ -210,7 +209,7 @@ class ClassBuilder:
         spans = {end for span in message.addresses for end in span}
         default = f" = {message.default_address}" if len(spans) == 1 else ""
         arguments = [f"{address}: int{default}"] if address else []
-        arguments += [_argument(value, place) for value in message.values]
+        arguments += [values.argument(value, place) for value in message.values]
         body = [f"self.{address} = {address}"] if address else []
         body += [_assignment(value) for value in message.values]
         head = wrapped("def __init__(", ["self", "*", *arguments] if arguments else ["self"], ") -> None:", 4)
@@ -221,51 +220,23 @@ class ClassBuilder:
     def _doc(self, message: Message) -> list[str]:
         title = {"request": "Request", "response": "Response"}.get(message.direction, "Message")
         text = message.doc or message.name
-        lines = _paragraph(_opening(message, title, text))
+        tail = f": {title.lower()}" if message.direction != "message" else ""
+        lines = docstrings.paragraph(docstrings.opening(text, message.section, tail), WIDTH - 8)
         if not message.confirmed:
-            lines += ["", "UNCONFIRMED: the source is weak; check at the device before trusting it."]
+            lines += ["", docstrings.UNCONFIRMED]
         if message.values or message.addresses:
             lines += ["", "Attributes:"]
             if self._place.address and message.addresses:
                 spans = " or ".join(_span(low, high) for low, high in message.addresses)
                 lines.append(f"    {self._place.address}: Address in the frame, {spans}.")
             for value in message.values:
-                lines += _item(f"{value.name}: {values.description(value, self._place)}")
-        lines = [line.replace("\\", "\\\\").replace('"""', "'''") for line in lines]
-        if len(lines) == 1:
-            return [f'"""{lines[0]}"""']
-        return [f'"""{lines[0]}', *lines[1:], '"""']
-
-
-def _opening(message: Message, title: str, text: str) -> str:
-    section = f" (section {message.section})" if message.section[:1].isdigit() else ""
-    if not section and message.section:
-        section = f" ({message.section})"
-    return f"{text.rstrip('.')}{': ' + title.lower() if message.direction != 'message' else ''}{section}."
-
-
-def _paragraph(text: str) -> list[str]:
-    first, _, rest = text.partition(". ")
-    if rest and len(first) < WIDTH - 12:
-        return [f"{first}.", "", *textwrap.wrap(rest, WIDTH - 8)]
-    return textwrap.wrap(text, WIDTH - 8)
-
-
-def _item(text: str) -> list[str]:
-    return textwrap.wrap(text, WIDTH - 4, initial_indent="    ", subsequent_indent="        ")
+                described = f"{value.name}: {values.description(value, self._place)}"
+                lines += docstrings.item(described, WIDTH - 4)
+        return docstrings.quoted(lines)
 
 
 def _span(low: int, high: int) -> str:
     return str(low) if low == high else f"{low}..{high}"
-
-
-def _argument(value: Value, place: Place) -> str:
-    kind = values.annotation(value, place)
-    if value.required:
-        return f"{value.name}: {kind}"
-    if isinstance(value.type, Array):
-        return f"{value.name}: {kind} | None = None"
-    return f"{value.name}: {kind} = {values.default(value, place)}"
 
 
 def _assignment(value: Value) -> str:
@@ -284,7 +255,7 @@ def _bare(each: Field) -> Field:
     kind = each.type
     if isinstance(kind, Bits):
         kind = replace(kind, members=tuple(replace(member, doc="") for member in kind.members))
-    return replace(each, type=kind, doc="", section="", confirmed=True)
+    return replace(each, type=kind, doc="", section="", confirmed=True, echo=False)
 
 
 def _shape_name(message: Message) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 #: Names of the support module that every module passes on.
-PUBLIC = ("CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
+PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
 
 _SUPPORT = (
     "BaseMessage", "MISFITS", "Misfit", "OutOfRange", "REFUSALS", "UNREADABLE", "as_bytes", "illegal",

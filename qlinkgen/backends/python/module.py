@@ -33,7 +33,7 @@ class Module:
         self.protocol = protocol
         self.options = options
         self.templates: jinja2.Environment = environment(__package__)
-        self.messages = _kept(protocol, options)
+        self.messages = kept(protocol, options)
         names = [class_name(message) for message in self.messages]
         self.constants = tables.constant_classes(protocol, names)
         self.unique = is_unique(protocol)
@@ -61,7 +61,7 @@ class Module:
         return {"banner": banner(self.protocol), "doc": textwrap.wrap(doc, 108), "title": self.protocol.title}
 
     def _tables(self) -> dict[str, Any]:
-        kept = {message.name: message for message in self.messages}
+        by_name = {message.name: message for message in self.messages}
         rows = [{"message": message.name, "name": class_name(message)} for message in self.messages]
         used = self._used_constants()
         return {
@@ -72,7 +72,8 @@ class Module:
                 tables.flags_model(f, self.constants[f.name]) for f in self.protocol.flags if f.name in used
             ],
             "messages": rows,
-            "commands": tables.command_rows(self.protocol.commands, kept),
+            "bus": tables.bus(self.protocol.bus),
+            "commands": tables.command_rows(self.protocol.commands, by_name),
         }
 
     def _used_constants(self) -> set[str]:
@@ -134,12 +135,13 @@ class Module:
     def _public(self, text: str) -> list[str]:
         names = [class_name(message) for message in self.messages]
         names += [row.name for group in ("enums", "flags") for row in self.tables[group]]
-        names += ["COMMANDS", "MESSAGES", "Message", "StreamDecoder", *PUBLIC]
+        names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *PUBLIC]
         names += re.findall(r"^def ([a-z]\w*)", text, re.MULTILINE)
         return sorted(set(names))
 
 
-def _kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
+def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
+    """The messages that have a class in the module."""
     only = set(options.only)
     if not only:
         return protocol.messages

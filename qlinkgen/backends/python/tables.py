@@ -12,7 +12,7 @@ from qlinkgen.backends.python.place import in_hex, wrapped
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.transaction import Command
+from qlinkgen.model.transaction import Bus, Command
 from qlinkgen.model.types import Constant, Enum, Flags
 
 
@@ -78,6 +78,15 @@ def _doc(doc: str, section: str, more: str) -> list[str]:
     return [f'"""{wrapped[0]}', *wrapped[1:], '"""']
 
 
+def bus(line: Bus) -> str:
+    """The call that makes the description of the bus; what the schema does not say is left out."""
+    facts = [("broadcast", line.broadcast), ("baud", line.baud), ("bits_per_byte", line.bits_per_byte)]
+    if line.nodes:
+        facts = [("first_node", line.nodes[0]), ("last_node", line.nodes[1]), *facts]
+    given = [f"{name}={value}" for name, value in facts if value is not None]
+    return f'Bus("{line.kind}", {", ".join(given)})'
+
+
 def command_rows(commands: Iterable[Command], kept: Mapping[str, Message]) -> list[str]:
     """The rows of the transaction table, over one line or several."""
     return [_row(command, kept) for command in commands if command.request.name in kept]
@@ -93,10 +102,7 @@ def _row(command: Command, kept: Mapping[str, Message]) -> str:
         arguments.append(f"response_byte_times={_number(within.byte_times)}")
     if within.seconds:
         arguments.append(f"response_seconds={_number(within.seconds)}")
-    if command.repeat.safe:
-        arguments.append("repeat_safe=True")
-    if command.repeat.counter:
-        arguments.append(f'repeat_counter="{command.repeat.counter}"')
+    arguments += _repetition(command)
     if command.in_flight != 1:
         arguments.append(f"in_flight={command.in_flight}")
     if command.section:
@@ -107,6 +113,17 @@ def _row(command: Command, kept: Mapping[str, Message]) -> str:
         pairs = ", ".join(f'"{key}": {_literal(value)}' for key, value in command.attributes.items())
         arguments.append(f"attributes={{{pairs}}}")
     return "\n".join(wrapped(f'"{command.name}": Command(', arguments, "),", 4))
+
+
+def _repetition(command: Command) -> list[str]:
+    """What may be sent again, and what comes back as it was sent."""
+    names = "".join(f'"{name}", ' for name in command.echoes)
+    facts = {
+        "repeat_safe=True": command.repeat.safe,
+        f'repeat_counter="{command.repeat.counter}"': command.repeat.counter,
+        f"echoes=({names.rstrip(' ' if len(command.echoes) == 1 else ', ')})": names,
+    }
+    return [argument for argument, given in facts.items() if given]
 
 
 def _number(value: Fraction) -> str:

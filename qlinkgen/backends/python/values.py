@@ -24,6 +24,16 @@ def annotation(value: Value, place: Place) -> str:
     return {"int": "int", "float": "float", "decimal": "Decimal"}[kind.number]
 
 
+def argument(value: Value, place: Place) -> str:
+    """Parameter of a function that takes the value, with its default where it has one."""
+    kind = annotation(value, place)
+    if value.required:
+        return f"{value.name}: {kind}"
+    if isinstance(value.type, Array):
+        return f"{value.name}: {kind} | None = None"
+    return f"{value.name}: {kind} = {default(value, place)}"
+
+
 def default(value: Value, place: Place) -> str:
     """Expression for the default; that of a list is made anew for each message."""
     kind, native = value.type, default_of(value)

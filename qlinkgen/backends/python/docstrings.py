@@ -1,0 +1,35 @@
+"""Docstrings: texts of the schema, wrapped and quoted."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable
+
+UNCONFIRMED = "UNCONFIRMED: the source is weak; check at the device before trusting it."
+
+
+def opening(text: str, section: str, tail: str = "") -> str:
+    """What something is, a tail behind it, and the section that says so."""
+    where = f" (section {section})" if section[:1].isdigit() else f" ({section})" if section else ""
+    return f"{text.rstrip('.')}{tail}{where}."
+
+
+def paragraph(text: str, width: int) -> list[str]:
+    """A text in lines; the first sentence stands alone if it is short enough for one."""
+    first, _, rest = text.partition(". ")
+    if rest and len(first) < width - 4:
+        return [f"{first}.", "", *textwrap.wrap(rest, width)]
+    return textwrap.wrap(text, width)
+
+
+def item(text: str, width: int) -> list[str]:
+    """An entry of a list of arguments or attributes."""
+    return textwrap.wrap(text, width, initial_indent="    ", subsequent_indent="        ")
+
+
+def quoted(lines: Iterable[str]) -> list[str]:
+    """The lines as a docstring."""
+    safe = [line.replace("\\", "\\\\").replace('"""', "'''") for line in lines]
+    if len(safe) == 1:
+        return [f'"""{safe[0]}"""']
+    return [f'"""{safe[0]}', *safe[1:], '"""']

@@ -1,0 +1,418 @@
+"""Stations: every command can be called and handled, and type checkers know what comes back."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from unittest import mock
+
+import pytest
+
+from qlinkgen.backends.base import Options
+from qlinkgen.backends.python import generate as generate_codec
+from qlinkgen.backends.python import load, shared, stations
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.transaction import Command
+from qlinkgen.schema import loads
+from tests.python.protocols import build, defaults, module, protocol
+
+ROOT = Path(__file__).parents[2]
+BUSES = ("qlink", "modbus_rtu", "dynamixel", "kitchen_sink")
+CALLERS = ("MasterCalls", "NodeCalls", "AsyncMasterCalls", "AsyncNodeCalls")
+EVERY = [(name, command) for name in BUSES for command in protocol(name).commands]
+
+
+def loaded(model: Protocol, codec: ModuleType, options: Options | None = None) -> Any:
+    """The module of stations, compiled in memory beside a codec module in memory."""
+    made = ModuleType(f"stations_of_{model.name}")
+    with mock.patch.dict(sys.modules, {f"qlinkgen_codecs.{model.name}": codec}):
+        exec(compile(stations.render(model, options or Options()), made.__name__, "exec"), made.__dict__)
+    return made
+
+
+def stations_of(name: str) -> Any:
+    return loaded(protocol(name), module(name))
+
+
+def recorder(base: type[Any], node: int) -> tuple[Any, list[tuple[Any, Any]]]:
+    """An object of a class of calls that notes what it is asked, and its notes."""
+    notes: list[tuple[Any, Any]] = []
+
+    def note(request: Any, response: Any = None) -> Any:
+        notes.append((request, response))
+        return response and response.__new__(response)
+
+    async def note_later(request: Any, response: Any = None) -> Any:
+        return note(request, response)
+
+    used = note_later if base.__name__.startswith("Async") else note
+    made = type(
+        "Recorder", (base,), {"ask": staticmethod(used), "tell": staticmethod(used), "number": node}
+    )()
+    return made, notes
+
+
+def result(value: Any) -> Any:
+    return asyncio.run(value) if inspect.iscoroutine(value) else value
+
+
+def arguments_of(name: str, command: Command) -> tuple[int, dict[str, Any]]:
+    """A node's address, and the fields of a request at their defaults."""
+    fields = defaults(name, command.request)
+    fields.pop(protocol(name).address_name or "", None)
+    nodes = protocol(name).bus.nodes
+    assert nodes
+    return nodes[1], fields
+
+
+@pytest.mark.parametrize("caller", CALLERS)
+@pytest.mark.parametrize(("name", "command"), EVERY, ids=lambda value: getattr(value, "name", value))
+def test_every_command_can_be_called(name: str, command: Command, caller: str) -> None:
+    base = getattr(stations_of(name), caller)
+    if "Node" in caller and command.addressing == "broadcast":
+        assert not hasattr(base, command.name)
+        return
+    node, fields = arguments_of(name, command)
+    calls, notes = recorder(base, node)
+    here = [] if "Node" in caller or command.addressing == "broadcast" else [node]
+    answer = result(getattr(calls, command.name)(*here, **fields))
+    address = protocol(name).address_name or ""
+    expected = command.request.default_address if command.addressing == "broadcast" else node
+    response = module(name).MESSAGES[command.response.name] if command.response else None
+    assert notes == [(build(name, command.request, **{address: expected}), response)]
+    assert type(answer) is (response or type(None))
+
+
+@pytest.mark.parametrize("caller", CALLERS)
+@pytest.mark.parametrize("name", BUSES)
+def test_a_method_takes_what_its_request_takes(name: str, caller: str) -> None:
+    made, address = stations_of(name), protocol(name).address_name
+    for command in protocol(name).commands:
+        method = getattr(getattr(made, caller), command.name, None)
+        if method is None:
+            continue
+        request = module(name).MESSAGES[command.request.name]
+        taken = list(inspect.signature(method).parameters.values())[1:]
+        wanted = [p for p in inspect.signature(request).parameters.values() if p.name != address]
+        if "Node" not in caller and command.addressing != "broadcast":
+            first = taken.pop(0)
+            assert (first.name, first.default) == (address, inspect.Parameter.empty)
+        assert taken == wanted, command.name
+        assert inspect.iscoroutinefunction(method) == caller.startswith("Async")
+
+
+def test_docstrings_say_unit_range_section_and_broadcast() -> None:
+    made = stations_of("qlink")
+    text = made.MasterCalls.node_setup.__doc__
+    assert "section" in text
+    assert "0.0..25.5 s in steps of 1/10" in text
+    assert "1..16; or 0 for whatever number it has" in text
+    assert "node:" not in made.NodeCalls.node_setup.__doc__
+    assert "1..16; or 0 for all of them." in made.MasterCalls.node_start.__doc__
+    assert "repeats counter of the request" in made.SlaveHandlers.motion.__doc__
+    for each in (*CALLERS, "SlaveHandlers"):
+        methods = inspect.getmembers(getattr(made, each), inspect.isfunction)
+        assert all(method.__doc__ for name, method in methods if name != "__init__")
+
+
+def test_nobody_answers_a_broadcast() -> None:
+    modbus, codec = stations_of("modbus_rtu"), module("modbus_rtu")
+    for caller in ("MasterCalls", "AsyncMasterCalls"):
+        calls, notes = recorder(getattr(modbus, caller), 1)
+        assert result(calls.write_single_register(0, number=4, value=5)) is None
+        assert notes == [(codec.WriteSingleRegisterRequest(address=0, number=4, value=5), None)]
+        assert result(calls.write_single_register(7, number=4, value=5)) is not None
+    assert "None is returned" in modbus.MasterCalls.write_single_register.__doc__
+
+
+@pytest.mark.parametrize("caller", CALLERS)
+def test_a_runtime_has_to_say_how_requests_are_sent(caller: str) -> None:
+    calls = getattr(stations_of("qlink"), caller)()
+    codec = module("qlink")
+    with pytest.raises(NotImplementedError):
+        result(calls.ask(codec.NodeInfoRequest(node=1), codec.NodeInfoResponse))
+    with pytest.raises(NotImplementedError):
+        result(calls.tell(codec.NodeStartRequest(node=1)))
+
+
+# The slave's side
+
+
+@pytest.mark.parametrize("name", BUSES)
+def test_what_is_not_overridden_is_not_answered(name: str) -> None:
+    slave = stations_of(name).SlaveHandlers(5)
+    assert slave.number == 5
+    for message in protocol(name).messages:
+        assert slave.handle(build(name, message), 1.0) is None
+
+
+@pytest.mark.parametrize("name", BUSES)
+def test_each_request_comes_to_the_method_of_its_command(name: str) -> None:
+    seen: list[tuple[str, Any, float]] = []
+
+    def handler(command: str) -> Callable[..., Any]:
+        def handle(self: Any, request: Any, now: float) -> str:
+            seen.append((command, request, now))
+            return f"answer of {command}"
+
+        return handle
+
+    commands = protocol(name).commands
+    base = stations_of(name).SlaveHandlers
+    slave = type("Slave", (base,), {command.name: handler(command.name) for command in commands})(1)
+    for command in commands:
+        request = build(name, command.request)
+        assert slave.handle(request, 2.5) == f"answer of {command.name}"
+        assert seen.pop() == (command.name, request, 2.5)
+
+
+def test_one_handler_is_replaced_at_a_time() -> None:
+    qlink = module("qlink")
+    base = stations_of("qlink").SlaveHandlers
+
+    class Echoing(base):  # type: ignore[misc, valid-type]
+        def loop_back(self, request: Any, now: float) -> Any:
+            return qlink.LoopBackResponse(node=self.number, offset=request.offset, data=request.data)
+
+    class Counting(Echoing):
+        def loop_back(self, request: Any, now: float) -> Any:
+            request.offset += 1
+            return super().loop_back(request, now)
+
+    request = qlink.LoopBackRequest(node=3, offset=7, data=b"x")
+    assert Echoing(3).handle(request, 0.0) == qlink.LoopBackResponse(node=3, offset=7, data=b"x")
+    assert Counting(3).handle(request, 0.0) == qlink.LoopBackResponse(node=3, offset=8, data=b"x")
+    assert Echoing(3).handle(qlink.NodeInfoRequest(node=3), 0.0) is None
+    replaced = Echoing(3)
+    replaced.node_info = lambda request, now: qlink.NodeInfoResponse(node=9)
+    assert replaced.handle(qlink.NodeInfoRequest(node=3), 0.0) == qlink.NodeInfoResponse(node=9)
+
+
+# What is written, and where
+
+
+@pytest.mark.parametrize("name", ["trio", "mc1231a"])
+def test_buses_without_a_master_have_none(name: str) -> None:
+    assert stations.generate(protocol(name), Options()) == {}
+
+
+def test_a_side_and_commands_can_be_left_out() -> None:
+    model = protocol("qlink")
+
+    def public(**options: Any) -> Any:
+        chosen = Options(**options)
+        return loaded(model, load(model, chosen), chosen)
+
+    assert public(role="master").__all__ == list(CALLERS)
+    assert public(role="slave").__all__ == ["SlaveHandlers"]
+    small = public(only=("motion", "node_info.response"))
+    assert hasattr(small.MasterCalls, "motion")
+    assert not hasattr(small.MasterCalls, "node_info")
+    assert stations.generate(model, Options(only=("node_info.response",))) == {}
+
+
+SMALL = """
+qlinkgen: 1
+protocol: {name: small, revision: "1", source: Made up for a test}
+frame:
+  parts:
+    start: {role: constant, value: 7E}
+    length: {role: length, type: u8, counts: [data]}
+    code: {role: message, type: u8}
+    NODE
+    data: {role: payload, size: 0..9}
+    crc: {role: checksum, type: u8, algorithm: crc-8/smbus, over: [length, code, data]}
+BUS
+COMMANDS
+"""
+
+
+def small(commands: str, *, addressed: bool) -> tuple[Any, Any]:
+    """Codec and stations of a small protocol."""
+    text = SMALL.replace("NODE", "node: {role: address, type: u8}" if addressed else "")
+    text = text.replace(
+        "BUS",
+        "bus: {kind: master_slave, nodes: 1..3}\ndefaults: {addressing: node, repeat: safe}"
+        if addressed
+        else "bus: {kind: master_slave}\ndefaults: {repeat: safe}",
+    )
+    model, faults = loads(text.replace("COMMANDS", commands), "small.yaml")
+    assert model, faults
+    codec = load(model)
+    return codec, loaded(model, codec)
+
+
+def test_without_addresses_there_is_one_slave() -> None:
+    commands = "commands: {go: {id: 1, request: {speed: u8}, response: {}}}"
+    codec, made = small(commands, addressed=False)
+    assert made.__all__ == ["MasterCalls", "AsyncMasterCalls", "SlaveHandlers"]
+    calls, notes = recorder(made.MasterCalls, 0)
+    calls.go(speed=3)
+    assert notes == [(codec.GoRequest(speed=3), codec.GoResponse)]
+
+
+def test_commands_may_have_the_names_of_what_a_class_has_itself() -> None:
+    words = ("ask", "tell", "handle", "number", "bytes", "list", "str")
+    rows = [
+        f"  {word}: {{id: {at}, request: {{x: 'bytes[0..2]'}}, response: {{}}}}"
+        for at, word in enumerate(words)
+    ]
+    codec, made = small("\n".join(["commands:", *rows]), addressed=True)
+    calls, notes = recorder(made.NodeCalls, 2)
+    for word in words:
+        getattr(calls, f"{word}_")(x=b"1")
+        assert notes.pop()[0] == codec.MESSAGES[f"{word}.request"](node=2, x=b"1")
+    assert made.SlaveHandlers(1).handle(codec.HandleRequest(node=1, x=b""), 0.0) is None
+
+
+# Type checkers and other readers of the text
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with codecs and stations of every bus, and a program that uses them."""
+    folder = tmp_path_factory.mktemp("generated")
+    outputs = {**shared(), **stations.shared()}
+    for name in BUSES:
+        outputs.update(generate_codec(protocol(name), Options()))
+        outputs.update(stations.generate(protocol(name), Options()))
+    for path, text in outputs.items():
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, "utf-8")
+    (folder / "python/program.py").write_text(PROGRAM)
+    return folder / "python"
+
+
+PROGRAM = """
+from __future__ import annotations
+
+from typing import TypeVar, assert_type
+
+from qlinkgen_codecs import modbus_rtu as modbus_codec
+from qlinkgen_codecs import qlink as codec
+from qlinkgen_stations import modbus_rtu, qlink
+
+R = TypeVar("R", bound=codec.Message)
+
+
+class Bus(qlink.MasterCalls):
+    def ask(self, request: codec.Message, response: type[R]) -> R:
+        answer = codec.decode_response(request.to_frame())
+        assert isinstance(answer, response)
+        return answer
+
+    def tell(self, request: codec.Message) -> None:
+        request.to_frame()
+
+
+class Node(qlink.NodeCalls):
+    def __init__(self, number: int, bus: Bus) -> None:
+        self.number = number
+        self._bus = bus
+        self._counter = 0
+
+    def ask(self, request: codec.Message, response: type[R]) -> R:
+        return self._bus.ask(request, response)
+
+    def motion(
+        self, *, counter: int | None = None, outputs: int = 0, segments: list[int] | None = None
+    ) -> codec.MotionResponse:
+        self._counter += 1
+        used = self._counter if counter is None else counter
+        return super().motion(counter=used, outputs=outputs, segments=segments)
+
+
+class AsyncNode(qlink.AsyncNodeCalls):
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    async def motion(
+        self, *, counter: int | None = None, outputs: int = 0, segments: list[int] | None = None
+    ) -> codec.MotionResponse:
+        return await super().motion(counter=counter or 0, outputs=outputs, segments=segments)
+
+
+class Slave(qlink.SlaveHandlers):
+    def motion(self, request: codec.MotionRequest, now: float) -> codec.MotionResponse | None:
+        return codec.MotionResponse(node=self.number, counter=request.counter) if now > 1 else None
+
+    def node_start(self, request: codec.NodeStartRequest, now: float) -> None:
+        self.number = request.node
+
+
+def sync(bus: Bus, node: Node, modbus: modbus_rtu.MasterCalls, modbus_node: modbus_rtu.NodeCalls) -> None:
+    assert_type(bus.motion(3), codec.MotionResponse)
+    assert_type(node.motion(), codec.MotionResponse)
+    assert_type(node.node_info().position_type, codec.PositionType | int)
+    assert_type(modbus.write_single_register(1), modbus_codec.WriteSingleRegisterResponse | None)
+    assert_type(modbus_node.write_single_register(), modbus_codec.WriteSingleRegisterResponse)
+    bus.node_sync(counter=1)
+    assert_type(Slave(3).handle(codec.MotionRequest(node=3), 2.0), codec.Message | None)
+
+
+async def asynchronous(bus: qlink.AsyncMasterCalls, node: AsyncNode) -> None:
+    assert_type(await bus.motion(3), codec.MotionResponse)
+    assert_type(await node.motion(counter=None), codec.MotionResponse)
+    await bus.node_start(0)
+"""
+
+
+def run(*command: str, cwd: Path) -> str:
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-4000:]
+    return done.stdout
+
+
+def test_mypy_strict_is_content(written: Path) -> None:
+    config = written / "mypy.ini"
+    config.write_text("[mypy]\nstrict = True\nwarn_unreachable = True\n")
+    run(sys.executable, "-m", "mypy", "--config-file", str(config), "-p", "qlinkgen_stations", cwd=written)
+    run(sys.executable, "-m", "mypy", "--config-file", str(config), "program.py", cwd=written)
+
+
+def test_pyright_strict_is_content(written: Path) -> None:
+    pytest.importorskip("pyright", reason="needs pyright (pip install pyright[nodejs])")
+    (written / "pyrightconfig.json").write_text(
+        '{"typeCheckingMode": "strict", "include": ["qlinkgen_stations", "program.py"]}'
+    )
+    run(sys.executable, "-m", "pyright", "--pythonversion", "3.11", cwd=written)
+
+
+def test_a_module_needs_its_codecs_and_nothing_else(written: Path) -> None:
+    code = "old = set(sys.modules); import qlinkgen_stations.qlink; print(*set(sys.modules) - old)"
+    begin = "import sys; sys.path.insert(0, '.'); "
+    new = set(run(sys.executable, "-S", "-E", "-c", begin + code, cwd=written).split())
+    rest = {each for each in new if not each.startswith(("qlinkgen_codecs", "qlinkgen_stations"))}
+    assert rest <= {"__future__", "struct", "_struct", "binascii"}
+
+
+@pytest.mark.parametrize("name", BUSES)
+def test_lines_are_not_too_long_and_nothing_trails(written: Path, name: str) -> None:
+    text = (written / f"qlinkgen_stations/{name}.py").read_text("utf-8")
+    for number, line in enumerate(text.splitlines(), 1):
+        assert line == line.rstrip(), f"{name}:{number}"
+        assert len(line) <= 110, f"{name}:{number}: {line}"
+    assert "\n\n\n\n" not in text
+
+
+def test_the_text_does_not_depend_on_the_hash_seed() -> None:
+    code = (
+        "from tests.python.test_stations import *; import hashlib;"
+        "texts = [stations.render(protocol(n), Options()) for n in BUSES];"
+        "print(hashlib.sha256(''.join(texts).encode()).hexdigest())"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    seen = set()
+    for seed in ("0", "4711"):
+        command = [sys.executable, "-c", code]
+        seeded = {**environment, "PYTHONHASHSEED": seed}
+        seen.add(subprocess.run(command, env=seeded, cwd=ROOT, capture_output=True, check=True).stdout)
+    assert len(seen) == 1
