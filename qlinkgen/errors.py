@@ -6,6 +6,20 @@
     * `CodecError`: values and bytes do not fit the description (also a `ValueError`)
         * `EncodeError`: these values cannot be sent
         * `DecodeError`: these bytes are not what the description allows
+    * `LinkError`: a transaction on the wire failed; the bus can be used again
+        * `NoReply`: nothing usable came in time (also a `TimeoutError`)
+        * `BadReply`: something came, but not the answer
+            * `IllegalCommand`: the device does not know the command
+        * `CommandError`: the device knows the command, but it was not valid at that moment
+        * `Collision`: what was sent came back changed, so others were sending too
+        * `LoadError`: a program was not loaded to its end
+    * `PortError`: the port itself failed (also an `OSError`)
+        * `PortMissing`: there is no such port
+        * `PortBusy`: another program has it
+        * `PortLost`: it went away while it was used
+        * `CapabilityMissing`: it cannot do what was asked for
+    * `HexFileError`: an Intel HEX file cannot be sent to a node (also a `ValueError`)
+    * `ExtraMissing`: an optional part of the installation is needed (also an `ImportError`)
 
 The generated modules import nothing from here and have an `EncodeError` and a `DecodeError` of their own.
 """
@@ -14,14 +28,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 __all__ = [
+    "BadReply",
+    "CapabilityMissing",
     "CodecError",
+    "Collision",
+    "CommandError",
     "DecodeError",
     "EncodeError",
+    "ExtraMissing",
     "Fault",
     "GenerationError",
+    "HexFileError",
+    "IllegalCommand",
+    "LinkError",
+    "LoadError",
+    "NoReply",
+    "PortBusy",
+    "PortError",
+    "PortLost",
+    "PortMissing",
     "QlinkgenError",
     "SchemaError",
 ]
@@ -123,3 +151,125 @@ class EncodeError(CodecError):
 
 class DecodeError(CodecError):
     """These bytes are not what the description allows."""
+
+
+class LinkError(QlinkgenError):
+    """A transaction failed on the wire. The port is in order and the bus can be used again.
+
+    Attributes:
+        message: what was asked, what came, and what to look at.
+        node: address that was asked, None where the protocol has none.
+        attempts: how many times the request was sent.
+        elapsed: seconds from the call to the failure.
+        received: the last bytes that came, for a look at them.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        node: int | None = None,
+        attempts: int = 0,
+        elapsed: float = 0.0,
+        received: bytes = b"",
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.node = node
+        self.attempts = attempts
+        self.elapsed = elapsed
+        self.received = received
+
+
+class NoReply(LinkError, TimeoutError):
+    """Nothing usable came in time."""
+
+
+class BadReply(LinkError):
+    """Something came in time, but it was not the answer: damaged, or of another shape."""
+
+
+class IllegalCommand(BadReply):
+    """The device says that it does not know the command."""
+
+
+class CommandError(LinkError):
+    """The device knows the command, but it was not valid at that moment: its change was dropped.
+
+    Attributes:
+        status: the status word that says so.
+    """
+
+    def __init__(self, message: str, *, status: int = 0, **particulars: Any) -> None:
+        super().__init__(message, **particulars)
+        self.status = status
+
+
+class Collision(LinkError):
+    """What was sent came back changed: another station was sending at the same time."""
+
+
+class LoadError(LinkError):
+    """A program was not loaded to its end.
+
+    Attributes:
+        acknowledged: bytes of the program's text that the node has acknowledged.
+        total: bytes of the program's text.
+    """
+
+    def __init__(self, message: str, *, acknowledged: int = 0, total: int = 0, **particulars: Any) -> None:
+        super().__init__(message, **particulars)
+        self.acknowledged = acknowledged
+        self.total = total
+
+
+class PortError(QlinkgenError, OSError):
+    """The port itself failed.
+
+    Attributes:
+        port: name of the port, as the user gave it.
+    """
+
+    def __init__(self, message: str, *, port: str = "") -> None:
+        super().__init__(message)
+        self.port = port
+
+
+class PortMissing(PortError, FileNotFoundError):
+    """There is no such port."""
+
+
+class PortBusy(PortError):
+    """Another program has the port, or this user may not open it."""
+
+
+class PortLost(PortError, ConnectionError):
+    """The port went away while it was used: unplugged, or its other side closed."""
+
+
+class CapabilityMissing(PortError):
+    """The port cannot do what was asked for."""
+
+
+class HexFileError(QlinkgenError, ValueError):
+    """An Intel HEX file cannot be sent to a node. Nothing has been sent.
+
+    Attributes:
+        message: what was seen, the rule, and what to do.
+        file: path of the file as the user gave it.
+        line: line counted from 1, 0 where the file as a whole is meant.
+    """
+
+    def __init__(self, message: str, *, file: str = "", line: int = 0) -> None:
+        super().__init__(message)
+        self.message = message
+        self.file = file
+        self.line = line
+
+    def __str__(self) -> str:
+        """Return `file:line: message`."""
+        return ":".join([*filter(None, (self.file, str(self.line or ""))), f" {self.message}"]).lstrip()
+
+
+class ExtraMissing(QlinkgenError, ImportError):
+    """Something needs a package that only an extra of this one installs."""

@@ -1,0 +1,34 @@
+"""The engines of the wire: no input or output, no clock, no thread.
+
+Bytes and times come in as arguments, bytes and events go out; so they run under any driver, and on a
+simulated clock.
+"""
+
+from __future__ import annotations
+
+from qlinkgen.link.counters import LinkCounters
+from qlinkgen.link.echo import EchoMode
+from qlinkgen.link.events import Event
+from qlinkgen.link.health import HealthPolicy
+from qlinkgen.link.master import MasterEngine, Reply
+from qlinkgen.link.monitor import Monitor
+from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
+from qlinkgen.link.slave import SlaveEngine, Station
+from qlinkgen.link.timing import Timing
+
+__all__ = [
+    "Ask",
+    "EchoMode",
+    "Event",
+    "HealthPolicy",
+    "LinkCounters",
+    "MasterEngine",
+    "Monitor",
+    "Pause",
+    "Procedure",
+    "Reply",
+    "SlaveEngine",
+    "Station",
+    "Tell",
+    "Timing",
+]

@@ -1,0 +1,528 @@
+"""The asking side of a bus: one transaction at a time, with repeats, deadlines and a quiet line between.
+
+The engine does no input or output and knows no clock. A driver does this, with `now` from its own clock::
+
+    engine.start(request, now)
+    while engine.busy:
+        port.write(engine.bytes_to_send(now))
+        ... wait for bytes, at most until engine.next_timer() ...
+        engine.receive(data, now)
+        engine.handle_timer(now)
+    reply = engine.take()
+
+States, and what leads from one to the next:
+
+========  ==========================================  ====================================================
+state     meaning                                     left by
+========  ==========================================  ====================================================
+idle      nothing is asked                            `start` -> guard
+guard     a request waits for a quiet line            quiet: bytes_to_send -> waiting, or idle where nothing
+                                                      answers; not quiet in time: failed -> idle
+probe     two bytes are sent to see if they come      they came or their time is over -> guard
+          back; once, where the echo is "auto"
+waiting   an answer may come until the deadline       the answer -> idle; the deadline -> guard for the next
+                                                      attempt, or failed -> idle after the last
+========  ==========================================  ====================================================
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
+from qlinkgen.link.codec import Codec, address_getter
+from qlinkgen.link.counters import LinkCounters
+from qlinkgen.link.echo import NOISE, PROBE, EchoCanceller, EchoMode
+from qlinkgen.link.events import (
+    Answered,
+    Damaged,
+    EchoBroken,
+    EchoFound,
+    Event,
+    Failed,
+    HealthChanged,
+    Refused,
+    Sent,
+    Stray,
+    TimedOut,
+)
+from qlinkgen.link.health import HealthBook, HealthPolicy
+from qlinkgen.link.timing import Timing, check_attempts
+
+#: Events that are kept for one who does not fetch them after each transaction.
+EVENTS_KEPT = 4096
+#: On a paced line nothing that is complete before the request has left can be its answer. Clocks of the two
+#: sides may differ by some percent.
+EARLY = 0.9
+
+IDLE = "idle"
+GUARD = "guard"
+PROBING = "probe"
+WAITING = "waiting"
+
+
+class Reply(NamedTuple):
+    """The outcome of a transaction that did not fail."""
+
+    #: None where nothing answers.
+    response: Any
+    #: How often the request was sent.
+    attempts: int
+    #: Seconds from the call to the answer.
+    elapsed: float
+    #: When the answer came; where nothing answers, when the request was sent.
+    at: float
+    #: Seconds from sending the last attempt to the answer.
+    response_time: float
+
+
+#: Whether a response is acceptable for a request, where more is known than its shape.
+Accepts = Callable[[Any, Any], bool]
+
+
+class _Plan:
+    """What is known of a command before it is asked: looked up once, not in each transaction."""
+
+    __slots__ = (
+        "accepts", "allowance", "answer_time", "answers_broadcast", "command", "echoes", "response", "tries",
+    )  # fmt: skip
+
+    def __init__(self, command: Any, timing: Timing, accepts: Accepts | None) -> None:
+        self.command = command
+        self.response = command.response
+        self.accepts = accepts
+        self.echoes = command.echoes
+        self.answers_broadcast = command.addressing == "answered_broadcast"
+        self.allowance = timing.gap(command)
+        self.answer_time = timing.deadline(command, 0)
+        self.tries = timing.attempts_of(command)
+
+
+class MasterEngine:
+    """The asking side of one bus.
+
+    Attributes:
+        codec: the generated module of the protocol.
+        timing: every deadline.
+        events: what happened, oldest first; the driver takes them out.
+        verbose: events tell of each request and answer too, not only of what went wrong. Each costs half a
+            microsecond.
+        counters: counts for each node, and under None what belongs to no node.
+        health: state of each node that was asked.
+    """
+
+    def __init__(
+        self,
+        codec: Codec,
+        timing: Timing,
+        *,
+        echo: EchoMode = "none",
+        health: HealthPolicy | None = None,
+        accepts: Mapping[str, Accepts] | None = None,
+    ) -> None:
+        hooks = accepts or {}
+        self.codec = codec
+        self.timing = timing
+        self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+        self.verbose = True
+        self.counters: dict[int | None, LinkCounters] = {None: LinkCounters()}
+        self._bus = codec.BUS
+        self.health = HealthBook(health, nobody=(None, self._bus.broadcast))
+        self._plans = {
+            command.request: _Plan(command, timing, hooks.get(name))
+            for name, command in codec.COMMANDS.items()
+        }
+        self._decoder = codec.StreamDecoder("response")
+        self._address = address_getter(codec)
+        self._echo = EchoCanceller(echo)
+        self._byte_time = timing.byte_time
+        self._quiet = timing.quiet
+        self._quiet_limit = timing.quiet_limit
+        self._paced = timing.paced
+        self._state = IDLE
+        self._outcome: Reply | LinkError | None = None
+        self._request: Any = None
+        self._plan: _Plan = next(iter(self._plans.values()))
+        self._node: int | None = None
+        #: What was asked before, whose answer may still come.
+        self._earlier: tuple[_Plan, int | None] | None = None
+        self._frame = b""
+        self._count = self.counters[None]
+        self._tries = 0
+        self._trial = False
+        self._attempt = 0
+        self._started = 0.0
+        self._sent_at = 0.0
+        self._earliest = 0.0
+        self._deadline = 0.0
+        #: Nothing is sent before: a broadcast is still on the line, or a late answer may come.
+        self._free_at = 0.0
+        self._quiet_at = 0.0
+        self._give_up_at = 0.0
+        self._suspect = False
+        self._received = b""
+        self._break = EchoBroken(0.0, None, b"", b"")
+        #: Kind and bytes of what came in place of an answer.
+        self._wrong: list[tuple[str, bytes]] = []
+        self._probe_until = 0.0
+        self._probe_heard = b""
+
+    # What a driver calls ------------------------------------------------------------------------------------
+
+    @property
+    def busy(self) -> bool:
+        """A transaction is under way."""
+        return self._state is not IDLE
+
+    @property
+    def total(self) -> LinkCounters:
+        """Counts of the whole bus."""
+        whole = LinkCounters.total(self.counters.values())
+        whole.skipped = self._decoder.counters.skipped
+        return whole
+
+    def start(self, request: Any, now: float, *, attempts: int | None = None, trial: bool = False) -> None:
+        """Begin a transaction.
+
+        Args:
+            request: message of the generated module.
+            now: time.
+            attempts: how often it is sent at most; that of the timing unless given. A request that must not
+                be repeated is sent once whatever stands here.
+            trial: ask a node that is offline before its next trial is due; silence is not held against it.
+
+        Raises:
+            EncodeError: of the generated module; the request holds what cannot be sent.
+            TypeError: it is no request of this protocol.
+            ValueError: attempts is not 1 or more.
+            NoReply: the node is offline, and its next trial is not due yet; nothing was sent.
+            RuntimeError: another transaction is under way.
+        """
+        if self._state is not IDLE:
+            raise RuntimeError("a transaction is under way; a bus does one at a time")
+        plan = self._plans.get(type(request))
+        if plan is None:
+            raise TypeError(f"{type(request).__name__} was given; a request of this protocol is needed")
+        tries = plan.tries if attempts is None else self._tries_of(plan, attempts)
+        self._frame = request.to_frame()
+        if self._attempt:
+            self._earlier = self._plan, self._node
+        self._request = request
+        self._plan = plan
+        node = self._node = self._address(request)
+        count = self.counters.get(node)
+        if count is None:
+            count = self.counters[node] = LinkCounters()
+        self._count = count
+        self._started = now
+        self._tries = tries
+        self._attempt = 0
+        self._trial = trial
+        if self.health and not trial and plan.response is not None:  # a stop costs no wait, so it is sent
+            self._look_at_health(now)
+        if self._wrong:
+            self._wrong = []
+        self._received = b""
+        self._outcome = None
+        if self._suspect:
+            self._give_up_at = max(now, self._free_at) + self._quiet_limit
+        self._state = PROBING if self._echo.mode == "auto" else GUARD
+        self._probe_until = 0.0
+
+    def _tries_of(self, plan: _Plan, attempts: int) -> int:
+        check_attempts(attempts)
+        return self.timing.attempts_of(plan.command, attempts)
+
+    def bytes_to_send(self, now: float) -> bytes:
+        """Return what the driver has to write now."""
+        if self._state is WAITING or self._state is IDLE or now < self._free_at:
+            return b""
+        if self._suspect and not self._line_is_quiet(now):
+            return b""
+        if self._state is PROBING:
+            return self._send_probe(now)
+        return self._send(now)
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that came."""
+        if self._suspect:
+            self._quiet_at = max(self._quiet_at, now + self._quiet)
+        if self._probe_until and self._state is PROBING:
+            data = self._without_probe(data, now)
+        if self._echo.active:
+            data = self._without_echo(data, now)
+            if not data:
+                return
+        self._received = data
+        for event in self._decoder.feed(data):
+            self._take_in(event, now)
+
+    def next_timer(self) -> float | None:
+        """Return when the engine has to be called again although nothing came; None: not at all."""
+        state = self._state
+        if state is WAITING:
+            return self._deadline
+        if state is IDLE:
+            return None
+        if state is PROBING and self._probe_until:
+            return self._probe_until
+        due = self._free_at
+        if self._suspect:
+            due = max(due, min(self._quiet_at, self._give_up_at))
+        return due
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+        state = self._state
+        if state is WAITING:
+            if now >= self._deadline:
+                self._timed_out(now)
+        elif state is PROBING and self._probe_until:
+            if now >= self._probe_until:
+                self._probe_answered(found=False, now=now)
+        elif state is not IDLE and self._suspect and not self._line_is_quiet(now) and now >= self._give_up_at:
+            self._fail(BadReply, "the line does not get quiet: someone sends without being asked", now)
+
+    def take(self) -> Reply:
+        """Return what the transaction that has just ended gave.
+
+        Raises:
+            NoReply: no answer came.
+            BadReply: only damaged or wrong answers came.
+            Collision: the request came back changed.
+        """
+        outcome = self._outcome
+        self._outcome = None
+        if isinstance(outcome, LinkError):
+            raise outcome
+        if outcome is None:
+            raise RuntimeError("no transaction has ended")
+        return outcome
+
+    def abort(self, now: float) -> None:
+        """Give up the transaction under way: its answer may still come, and will answer nothing."""
+        if self._state is IDLE:
+            return
+        if self._state is WAITING:  # nobody else may speak while the node still may
+            self._free_at = max(now, self._deadline)
+        self._distrust(max(now, self._free_at))
+        self._state = IDLE
+        self._outcome = None
+
+    # Sending ------------------------------------------------------------------------------------------------
+
+    def _send(self, now: float) -> bytes:
+        frame = self._frame
+        count = self._count
+        self._attempt += 1
+        count.requests += 1
+        if self._attempt > 1:
+            count.repeats += 1
+        if self._echo.mode == "expect" and self._echo.sent(frame):
+            self._echo_missing(self.counters[None], None, now)
+        for fault in self._decoder.finish():
+            self._damaged(fault, now)
+        self._suspect = False
+        if self.verbose:
+            self.events.append(Sent(now, self._node, self._request, self._attempt, frame))
+        plan = self._plan
+        on_wire = len(frame) * self._byte_time
+        self._sent_at = now
+        broadcast = self._node == self._bus.broadcast and self._node is not None
+        if plan.response is None or (broadcast and not plan.answers_broadcast):
+            if self._paced:
+                self._free_at = now + on_wire + plan.allowance
+            self._succeed(None, now)
+            return frame
+        self._earliest = now + EARLY * on_wire if self._paced else now
+        self._deadline = now + on_wire + plan.answer_time
+        self._state = WAITING
+        return frame
+
+    def _line_is_quiet(self, now: float) -> bool:
+        return now >= self._quiet_at
+
+    def _distrust(self, now: float) -> None:
+        """An answer may come that nobody waits for any more: ask for a quiet line before the next request."""
+        self._suspect = True
+        self._quiet_at = now + self._quiet
+        self._give_up_at = now + self._quiet_limit
+
+    # Echo ---------------------------------------------------------------------------------------------------
+
+    def _send_probe(self, now: float) -> bytes:
+        if self._probe_until:
+            return b""
+        self._probe_until = now + self.timing.on_wire(len(PROBE)) + self._quiet
+        self._probe_heard = b""
+        return PROBE
+
+    def _without_probe(self, data: bytes, now: float) -> bytes:
+        """Look for the probe, which may have lost its head, or have noise before it."""
+        heard = self._probe_heard = self._probe_heard + data
+        if heard[:1] == PROBE[:1] or 0 < heard.find(PROBE) <= NOISE:
+            self._probe_answered(found=True, now=now)
+            return data.replace(PROBE, b"", 1)
+        return data
+
+    def _probe_answered(self, *, found: bool, now: float) -> None:
+        self._echo.mode = "expect" if found else "none"
+        self.events.append(EchoFound(now, found))
+        self._state = GUARD
+        if found:  # the rest of the probe may still be to come
+            self._suspect = True
+            self._quiet_at = now + self.timing.on_wire(len(PROBE))
+        self._give_up_at = now + self._quiet_limit
+
+    def _without_echo(self, data: bytes, now: float) -> bytes:
+        echo = self._echo
+        broken, expected = echo.broken, echo.outstanding
+        rest = echo.cancel(data)
+        if echo.broken and not broken:  # told when it is known that the frame itself does not come behind it
+            self._break = EchoBroken(now, self._node, expected, data)
+        return rest
+
+    def _echo_missing(self, count: LinkCounters, node: int | None, now: float) -> None:
+        count.missing_echoes += 1
+        self.events.append(EchoBroken(now, node, self._echo.outstanding, b""))
+
+    # Receiving ----------------------------------------------------------------------------------------------
+
+    def _take_in(self, event: Any, now: float) -> None:
+        plan = self._plan
+        if self._echo.broken and self._is_own(event):
+            return
+        if (
+            self._state is WAITING
+            and type(event) is plan.response
+            and now >= self._earliest
+            and self._answers(plan, event)
+        ):
+            self._succeed(event, now)
+        elif hasattr(event, "to_frame"):
+            self._stray(event, now)
+        else:
+            self._damaged(event, now)
+
+    def _is_own(self, event: Any) -> bool:
+        return self._echo.is_own(event.to_frame() if hasattr(event, "to_frame") else event.raw)
+
+    def _answers(self, plan: _Plan, response: Any) -> bool:
+        """Whether a response of the right type answers the request."""
+        request = self._request
+        for name in plan.echoes:
+            if getattr(response, name) != getattr(request, name):
+                return False
+        if plan.accepts is not None:
+            return plan.accepts(request, response)
+        return self._address(response) == self._node or (
+            plan.answers_broadcast and self._node == self._bus.broadcast
+        )
+
+    def _stray(self, message: Any, now: float) -> None:
+        node = self._address(message)
+        count = self.counters.get(node) or self.counters[None]
+        asked = self._attempt > 0 and self._may_answer(self._plan, self._node, message)
+        late = asked or (self._earlier is not None and self._may_answer(*self._earlier, message))
+        if asked and self._state is WAITING:
+            self._wrong.append((message.NAME, message.to_frame()))
+        count.strays += 1
+        count.late += late
+        self.events.append(Stray(now, message, late))
+
+    def _may_answer(self, plan: _Plan, asked: int | None, message: Any) -> bool:
+        """Whether a message is what a node that was asked would say, if to another attempt."""
+        anybody = plan.answers_broadcast and asked == self._bus.broadcast
+        return type(message) is plan.response and (anybody or self._address(message) == asked)
+
+    def _damaged(self, fault: Any, now: float) -> None:
+        waiting = self._state is WAITING
+        count = self._count if waiting else self.counters[None]
+        count.count_damaged(fault.kind)
+        if waiting:
+            self._wrong.append((fault.kind, fault.raw))
+        self.events.append(Damaged(now, self._node if waiting else None, fault))
+
+    # The end of a transaction -------------------------------------------------------------------------------
+
+    def _succeed(self, response: Any, now: float) -> None:
+        self._state = IDLE
+        elapsed = now - self._started
+        self._outcome = Reply(response, self._attempt, elapsed, now, now - self._sent_at)
+        if response is None:
+            return
+        count = self._count
+        count.answers += 1
+        if self._echo.broken:
+            count.partial_echoes += 1
+            self.events.append(self._break)
+            self._echo.forget()
+        if self._attempt > 1:
+            self._distrust(now)  # the answer to an earlier attempt may be on its way
+        if self._paced and response.to_frame()[-1:] != self._received[-1:]:
+            self._free_at = now + self._byte_time  # the byte that is inserted behind a checksum's end
+        if self.health.answered(self._node):
+            self._tell_health(now)
+        if self.verbose:
+            event = Answered(now, self._node, self._request, response, self._attempt, elapsed)
+            self.events.append(event)
+
+    def _timed_out(self, now: float) -> None:
+        self._count.timeouts += 1
+        if self._echo.broken:
+            self._count.collisions += 1
+            self.events.append(self._break)
+        elif self._echo.active:
+            self._echo_missing(self._count, self._node, now)
+            self._echo.forget()
+        self.events.append(TimedOut(now, self._node, self._request, self._attempt))
+        self._distrust(now)
+        if self._attempt < self._tries:
+            self._state = GUARD
+        elif self._echo.broken:
+            self._fail(Collision, "the request came back changed: another station was sending too", now)
+        elif self._wrong:
+            kinds = ", ".join(sorted({kind for kind, _ in self._wrong}))
+            self._fail(BadReply, f"what came was no answer ({kinds})", now)
+        else:
+            self._fail(NoReply, "no answer", now)
+
+    def _fail(self, error: type[LinkError], reason: str, now: float) -> None:
+        elapsed = now - self._started
+        node = "" if self._node is None else f" to node {self._node}"
+        times = "once" if self._attempt == 1 else f"{self._attempt} times"
+        received = b"".join(raw for _, raw in self._wrong) or self._received
+        self._outcome = error(
+            f"{self._request.NAME}{node}: {reason}; sent {times}, {elapsed * 1e3:.1f} ms",
+            node=self._node,
+            attempts=self._attempt,
+            elapsed=elapsed,
+            received=received[-64:],
+        )
+        self._state = IDLE
+        self._count.failures += 1
+        self.events.append(Failed(now, self._node, self._request, self._outcome))
+        # A line that does not let anybody ask says nothing of the node.
+        if self._attempt and not self._trial and self.health.failed(self._node, now, elapsed + self._quiet):
+            self._tell_health(now)
+
+    def _look_at_health(self, now: float) -> None:
+        """Leave a node alone that is offline, but for its trials."""
+        health = self.health.offline(self._node)
+        if health is None:
+            return
+        if now < health.next_trial:
+            self._count.refused += 1
+            self.events.append(Refused(now, self._node, self._request))
+            raise NoReply(
+                f"{self._request.NAME} to node {self._node}: not sent, since the node has not answered "
+                f"{health.failures} times; it is tried again in {health.next_trial - now:.2f} s",
+                node=self._node,
+            )
+        self._tries = 1
+
+    def _tell_health(self, now: float) -> None:
+        assert self._node is not None
+        self.events.append(HealthChanged(now, self._node, self.health[self._node].state))

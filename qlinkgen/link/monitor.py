@@ -1,0 +1,212 @@
+"""Listening to a bus: who asks whom, what answers, what is repeated, late or damaged. Nothing is ever sent.
+
+Nothing in a frame need tell a request from a response. What does:
+
+1. A frame that answers the request before it, in time, is its response.
+2. Anything else that can be a request is one. The same bytes again, unanswered, are a repeat.
+3. What can only be a response answers the request before it too late, or nothing that was heard.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from qlinkgen.link.codec import Codec, address_of, addresses_that_answer, answers
+from qlinkgen.link.events import Damaged, Stray
+from qlinkgen.link.timing import Timing
+
+
+class Asked(NamedTuple):
+    """The master has sent a request."""
+
+    at: float
+    request: Any
+    #: The request before it was the same and was not answered.
+    repeat: bool
+    frame: bytes
+
+
+class Replied(NamedTuple):
+    """A node has answered."""
+
+    at: float
+    request: Any
+    response: Any
+    #: Seconds from the end of the request to the end of the answer.
+    delay: float
+    #: It came after the deadline.
+    late: bool
+    frame: bytes
+
+
+class Unanswered(NamedTuple):
+    """No answer to a request has come in time."""
+
+    at: float
+    request: Any
+
+
+Heard = Asked | Replied | Unanswered | Stray | Damaged
+
+
+class _Pending:
+    """The last request, and until when it may be answered."""
+
+    __slots__ = ("answered", "at", "command", "deadline", "reported", "request")
+
+    def __init__(self, command: Any, request: Any, at: float, deadline: float) -> None:
+        self.command = command
+        self.request = request
+        self.at = at
+        self.deadline = deadline
+        self.answered = command.response is None
+        self.reported = self.answered
+
+
+class Monitor:
+    """Reads a stream that carries both directions of a bus.
+
+    Bytes are looked at one at a time, at about a microsecond each, so that requests and answers that came in
+    one piece are told apart.
+
+    Attributes:
+        heard: what was heard, oldest first; the caller takes it out.
+        bytes: bytes taken so far.
+    """
+
+    def __init__(
+        self, codec: Codec, timing: Timing, *, accepts: Mapping[str, Callable[[Any, Any], bool]] | None = None
+    ) -> None:
+        """`accepts` are the checks of a `MasterEngine`: what answers, where the shape does not say it all."""
+        self.heard: deque[Heard] = deque()
+        self.bytes = 0
+        self._codec = codec
+        self._timing = timing
+        self._accepts = accepts or {}
+        self._commands = {command.request: command for command in codec.COMMANDS.values()}
+        self._requests = codec.StreamDecoder("request")
+        self._responses = codec.StreamDecoder("response")
+        #: Faults that one of the two decoders has reported, by offset: it may be the wrong one of the two.
+        self._suspected: dict[int, Any] = {}
+        self._pending: _Pending | None = None
+
+    @property
+    def skipped(self) -> int:
+        """Bytes so far in no frame and no damaged one."""
+        skipped: int = min(self._requests.counters.skipped, self._responses.counters.skipped)
+        return skipped
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that were on the line."""
+        self.handle_timer(now)
+        self.bytes += len(data)
+        for byte in data:
+            piece = bytes((byte,))
+            asking = self._requests.feed(piece)
+            answering = self._responses.feed(piece)
+            if asking or answering:
+                self._sort(asking, answering, now)
+
+    def finish(self, now: float) -> None:
+        """The stream has ended."""
+        self._sort(self._requests.finish(), self._responses.finish(), now)
+        if self._pending is not None:
+            self._pending.deadline = min(self._pending.deadline, now)
+            self.handle_timer(now)
+
+    def next_timer(self) -> float | None:
+        """Return when the request that waits is unanswered, None where none waits."""
+        pending = self._pending
+        return None if pending is None or pending.reported else pending.deadline
+
+    def handle_timer(self, now: float) -> None:
+        """Report a request that was not answered in time."""
+        pending = self._pending
+        if pending is not None and not pending.reported and now >= pending.deadline:
+            pending.reported = True
+            self.heard.append(Unanswered(now, pending.request))
+
+    def _sort(self, asking: list[Any], answering: list[Any], now: float) -> None:
+        for fault in (*asking, *answering):
+            if _message_of(fault) is not None:
+                continue
+            if self._suspected.pop(fault.offset, None) is None:
+                self._suspected[fault.offset] = fault
+            else:
+                self.heard.append(Damaged(now, self._node_asked(now), fault))
+        for request, response in _same_frames(asking, answering):
+            if request is not None or response is not None:
+                self._suspected.clear()  # one of the two decoders was the wrong one
+                self._message(request, response, now)
+
+    def _node_asked(self, now: float) -> int | None:
+        pending = self._pending
+        waits = pending is not None and not pending.answered and now < pending.deadline
+        return address_of(pending.request) if pending is not None and waits else None
+
+    def _message(self, request: Any, response: Any, now: float) -> None:
+        # The frame is the same one: each decoder has read it in its own way, or has refused it.
+        pending = self._pending
+        fits = response is not None and pending is not None and self._fits(pending, response)
+        in_time = fits and pending is not None and not pending.answered and now < pending.deadline
+        if in_time or (fits and request is None):
+            assert pending is not None
+            self._replied(pending, response, now, late=not in_time)
+        elif request is not None:
+            self._asked(request, now)
+        else:
+            self.heard.append(Stray(now, response, late=False))
+
+    def _fits(self, pending: _Pending, response: Any) -> bool:
+        if not answers(pending.command, pending.request, response):
+            return False
+        if accepts := self._accepts.get(pending.command.name):
+            return accepts(pending.request, response)
+        return address_of(response) in addresses_that_answer(
+            pending.command, pending.request, self._codec.BUS
+        )
+
+    def _replied(self, pending: _Pending, response: Any, now: float, *, late: bool) -> None:
+        if pending.answered:
+            self.heard.append(Stray(now, response, late=True))
+            return
+        pending.answered = pending.reported = True
+        delay = now - pending.at
+        self.heard.append(Replied(now, pending.request, response, delay, late, response.to_frame()))
+
+    def _asked(self, request: Any, now: float) -> None:
+        command = self._commands.get(type(request))
+        if command is None:  # a message of no command: anybody may send it, and nothing answers
+            self.heard.append(Stray(now, request, late=False))
+            return
+        before = self._pending
+        if before is not None and not before.reported:  # the master has not waited for the deadline
+            self.heard.append(Unanswered(now, before.request))
+        repeat = before is not None and not before.answered and before.request == request
+        nobody = not addresses_that_answer(command, request, self._codec.BUS)
+        self._pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
+        self._pending.answered = self._pending.reported = nobody
+        self.heard.append(Asked(now, request, repeat, request.to_frame()))
+
+
+def _same_frames(asking: list[Any], answering: list[Any]) -> Iterator[tuple[Any, Any]]:
+    """Pair what two decoders made of the same frames; a byte may complete several, where one was hidden."""
+    if len(asking) == len(answering):  # each has taken or refused the same ones
+        yield from zip(map(_message_of, asking), map(_message_of, answering), strict=True)
+        return
+    responses = list(filter(_message_of, answering))
+    frames = [response.to_frame() for response in responses]
+    for request in filter(_message_of, asking):
+        frame = request.to_frame()
+        same = frames.index(frame) if frame in frames else None
+        yield request, None if same is None else responses.pop(same)
+        if same is not None:
+            del frames[same]
+    yield from ((None, response) for response in responses)
+
+
+def _message_of(event: Any) -> Any:
+    """Return a decoder's event if it is a message, None for a fault."""
+    return event if hasattr(event, "to_frame") else None
