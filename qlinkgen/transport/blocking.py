@@ -1,0 +1,102 @@
+"""The blocking driver: calls that return when the answer is there. The precise one of the two."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Generator
+from types import TracebackType
+from typing import Any, Self
+
+from qlinkgen.link.events import Event
+from qlinkgen.link.master import MasterEngine, Reply
+from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Steps
+from qlinkgen.transport.conversation import MasterDriver, conversation
+from qlinkgen.transport.port import Port
+
+
+class BlockingMaster(MasterDriver):
+    """Asks on one bus.
+
+    Any number of threads may use it: a lock of this bus is held for one transaction at a time. Two buses
+    never wait for one another.
+
+    Attributes:
+        engine: deadlines, counters, health.
+        port: where it asks.
+        on_event: called with each event of the engine, in the thread that asked.
+    """
+
+    def __init__(
+        self, engine: MasterEngine, port: Port, *, on_event: Callable[[Event], None] | None = None
+    ) -> None:
+        super().__init__(engine, port, on_event)
+        self._lock = threading.RLock()  # so that on_event may ask in its turn
+
+    def transact(self, request: Any, *, attempts: int | None = None, trial: bool = False) -> Reply:
+        """Ask, and return the answer with the number of attempts and the time that it took.
+
+        Raises:
+            NoReply: no answer came, or the node is offline and not due yet.
+            BadReply: only damaged or wrong answers came.
+            Collision: the request came back changed.
+            PortLost: the port went away.
+            EncodeError: of the generated module; nothing was sent.
+        """
+        port = self.port
+        with self._lock:
+            steps = conversation(self.engine, port, request, attempts, trial=trial)
+            try:
+                timeout = next(steps)
+                while True:
+                    timeout = steps.send(port.read(timeout))
+            except StopIteration as end:
+                reply: Reply = end.value
+                return reply
+            finally:
+                steps.close()
+                self._report()
+
+    def run(self, procedure: Procedure[Outcome], progress: Callable[[Any], None] | None = None) -> Outcome:
+        """Run a procedure to its end; `progress` is called with what it tells on the way."""
+        steps = Steps(procedure)
+        try:
+            while steps.advance():
+                if not self._do(steps) and progress is not None:
+                    progress(steps.wanted.report)
+            return steps.result
+        finally:
+            steps.close()
+
+    def iterate(self, procedure: Procedure[Outcome]) -> Generator[Any, None, Outcome]:
+        """Run a procedure as an iterator over what it tells; it goes on as the iterator is asked for more."""
+        steps = Steps(procedure)
+        try:
+            while steps.advance():
+                if not self._do(steps):
+                    yield steps.wanted.report
+            return steps.result
+        finally:
+            steps.close()
+
+    def _do(self, steps: Steps[Outcome]) -> bool:
+        """Do what a procedure wants; False where it wants to tell something."""
+        step = steps.wanted
+        if isinstance(step, Ask):
+            try:
+                steps.outcome = self.transact(step.request, attempts=step.attempts, trial=step.trial)
+            except FAILURES as error:
+                steps.failure = error
+        elif isinstance(step, Pause):
+            self.port.sleep(step.seconds)
+            steps.outcome = self.port.now()
+        else:
+            return False
+        return True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

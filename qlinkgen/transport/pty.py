@@ -1,0 +1,168 @@
+"""A serial port that any program can open, with us at its other end: a pseudo-terminal.
+
+The kernel gives a pty two ends. The slave end has a device name like /dev/pts/7 and behaves like a serial
+port to who opens it; the master end is `PtyPort`. It is used by simulated nodes, and by tests.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from pathlib import Path
+
+from qlinkgen.errors import CapabilityMissing, PortError
+from qlinkgen.transport.port import Ability, Capabilities
+from qlinkgen.transport.stream import CHUNK, DescriptorChannel, StreamPort, wait
+
+if sys.platform != "win32":
+    import tty
+
+#: Where the kernel keeps the slave ends.
+_SLAVES = Path("/dev/pts")
+
+_CAPABILITIES = Capabilities(
+    exclusive=Ability.YES,
+    low_latency=Ability.YES,
+    rs485=Ability.NO,
+    paced=Ability.NO,
+    latency=0.0,
+    latency_source="a pty hands bytes on at once",
+)
+
+#: Seconds that a full buffer is given before it is emptied; a reader needs microseconds.
+_STALL = 0.05
+
+
+class PtyChannel(DescriptorChannel):
+    """The master end. A line does not wait for listeners: when the buffer is full, what is in it is lost.
+
+    Attributes:
+        dropped: bytes that nobody has read.
+    """
+
+    def __init__(self, master: int, slave: int) -> None:
+        """Take over both descriptors."""
+        super().__init__(master, _STALL)
+        self._master = master
+        self._slave = slave
+        self._closed = False
+        self.dropped = 0
+
+    def _stalled(self, data: memoryview) -> memoryview:
+        waiting = self._throw_away()
+        self.dropped += waiting
+        if waiting or wait(self._master, 0, writable=True):
+            return data
+        self.dropped += len(data)  # a program has stopped the pty, so nothing can be taken out
+        return data[:0]
+
+    def _throw_away(self) -> int:
+        # Our own descriptor of the slave end takes from the same buffer as the reader that is missing.
+        count = 0
+        with contextlib.suppress(BlockingIOError):
+            while data := os.read(self._slave, CHUNK):
+                count += len(data)
+        return count
+
+    def close(self) -> None:
+        """Close both ends."""
+        if not self._closed:
+            self._closed = True
+            os.close(self._slave)
+            os.close(self._master)
+
+
+class PtyPort(StreamPort):
+    """The master end of a new pty. Programs may open and close the slave end as often as they like.
+
+    Attributes:
+        path: device name of the slave end.
+        link: symbolic link to it, if one was asked for; removed when the port is closed.
+    """
+
+    def __init__(self, link: str | os.PathLike[str] | None = None, *, baud: int = 115200) -> None:
+        """See `open_pty`."""
+        if sys.platform == "win32":
+            raise CapabilityMissing(
+                "this system has no pty; use memory_pair() or a pair of virtual COM ports"
+            )
+        try:
+            master, slave = os.openpty()
+        except OSError as error:
+            raise PortError(
+                f"the system gives no pty: {error.strerror}; close some, or raise its limit"
+            ) from error
+        # Our own descriptor of the slave end stays open: without one the master would read EIO whenever no
+        # program has the slave end.
+        self._pty = self._channel = PtyChannel(master, slave)
+        self.path = os.ttyname(slave)
+        self.link: Path | None = None
+        self.name = self.path
+        self.baud = baud
+        self.capabilities = _CAPABILITIES
+        try:
+            tty.setraw(slave)
+            os.set_blocking(master, False)
+            os.set_blocking(slave, False)
+            if link is not None:
+                self.link = _make_link(Path(link), self.path)
+                self.name = str(link)
+        except BaseException:
+            self._channel.close()
+            raise
+
+    @property
+    def dropped(self) -> int:
+        """Bytes that were thrown away because no program has read them in time."""
+        return self._pty.dropped
+
+    def close(self) -> None:
+        """Close both ends and remove the link, unless it leads elsewhere by now."""
+        if self.link is not None:
+            with contextlib.suppress(OSError):
+                if str(self.link.readlink()) == self.path:
+                    self.link.unlink()
+            self.link = None
+        super().close()
+
+
+def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) -> PtyPort:
+    """Open a new pty and return its master end, raw and without echo.
+
+    Args:
+        link: path for a symbolic link to the slave end, so that its name is known beforehand. A link that is
+            there already is replaced if it leads to a pty or nowhere; anything else is left alone.
+        baud: speed that the port says it has; only arithmetic uses it.
+
+    Raises:
+        PortError: the link cannot be made.
+        CapabilityMissing: this system has no ptys.
+    """
+    return PtyPort(link, baud=baud)
+
+
+def _make_link(link: Path, target: str) -> Path:
+    """Put a link in its place in one step, so that there is never a moment without one."""
+    if os.path.lexists(link) and not _replaceable(link):
+        raise PortError(
+            f"{link} is there already and is no link to a pty, so it is left alone; "
+            "remove it, or choose another path",
+            port=str(link),
+        )
+    new = link.with_name(f".{link.name}.{os.urandom(4).hex()}")
+    try:
+        new.symlink_to(target)
+        new.replace(link)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        raise PortError(
+            f"cannot make the link {link}: {error.strerror}; its folder must exist and be writable",
+            port=str(link),
+        ) from error
+    return link.absolute()
+
+
+def _replaceable(link: Path) -> bool:
+    return link.is_symlink() and (not link.exists() or link.resolve().parent == _SLAVES)

@@ -1,0 +1,234 @@
+"""Serial ports of this machine and of the network, opened by pyserial.
+
+Where there is a file descriptor, bytes are read and written through it and pyserial only sets the port up;
+elsewhere (Windows, rfc2217:// and other URLs) pyserial reads and writes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable
+from typing import Any, Literal
+
+from qlinkgen.errors import CapabilityMissing, PortError
+from qlinkgen.transport import settings
+from qlinkgen.transport.adapter import Adapter, look_up
+from qlinkgen.transport.failures import check_url, explain
+from qlinkgen.transport.port import Ability, Capabilities
+from qlinkgen.transport.settings import RS485Settings
+from qlinkgen.transport.stream import CHUNK, SYSTEM_ERRORS, Channel, DescriptorChannel, StreamPort
+
+#: URLs whose descriptor can be read directly; hwgrep:// looks for a device by its description.
+_DIRECT = frozenset({"", "hwgrep", "socket"})
+
+#: pyserial's own timeout, set once: changing it costs 6 us, and on rfc2217:// a round trip.
+_SLICE = 0.01
+
+#: Seconds between looks at a port during the last part of a wait, which is shorter than a slice.
+_LOOK = 0.0002
+
+_PARITIES = {"none": "N", "even": "E", "odd": "O"}
+
+
+class PyserialChannel:
+    """Reads and writes by pyserial, for ports without a descriptor that could be used directly."""
+
+    def __init__(self, serial: Any) -> None:
+        self._serial = serial
+
+    def read(self, timeout: float) -> bytes:
+        """Return what is there, else what comes first."""
+        limit = time.monotonic() + timeout
+        while not self._serial.in_waiting:
+            left = limit - time.monotonic()
+            if left <= 0:
+                return b""
+            if left > _SLICE:
+                if first := bytes(self._serial.read(1)):
+                    return self._with_waiting(first)
+            else:
+                time.sleep(min(left, _LOOK))
+        return self._with_waiting(b"")
+
+    def _with_waiting(self, data: bytes) -> bytes:
+        while len(data) < CHUNK and (size := self._serial.in_waiting):
+            try:
+                data += self._serial.read(min(size, CHUNK - len(data)))
+            except SYSTEM_ERRORS:
+                if data:  # first what has come; the next read fails again
+                    break
+                raise
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Hand over all bytes."""
+        self._serial.write(data)
+
+    def drain(self) -> None:
+        """Wait until all is sent, as far as pyserial knows."""
+        self._serial.flush()
+
+    def fileno(self) -> int | None:
+        """Return None: there is nothing to wait on."""
+        return None
+
+    def close(self) -> None:
+        """Do nothing: the port closes pyserial's object."""
+
+
+class SerialPort(StreamPort):
+    """A serial port: 8 data bits, raw, without flow control, for this program alone.
+
+    Args:
+        name: a device such as /dev/ttyUSB0, /dev/serial/by-id/... or COM3; or a URL of pyserial such as
+            socket://HOST:PORT (bytes as they are) or rfc2217://HOST:PORT (a serial device server).
+        baud: bits a second. On a pty and on socket:// it only serves arithmetic.
+        parity: none, even or odd.
+        stop_bits: 1 or 2.
+        low_latency: ask the driver to hand on received bytes at once. It may refuse; see `capabilities`.
+        rs485: let the driver switch the transceiver's direction; True for its usual settings.
+        direction: called with True before bytes are sent, with False when the last has left and before the
+            port is opened, for a transceiver that the caller switches himself.
+
+    Raises:
+        ValueError: an argument is out of its range.
+        PortMissing: there is no such port, or nobody answers at the URL.
+        PortBusy: another program has it, or this user may not open it.
+        CapabilityMissing: the driver cannot do the baud rate or `rs485`.
+        PortError: it is not a serial port.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        baud: int = 115200,
+        *,
+        parity: Literal["none", "even", "odd"] = "none",
+        stop_bits: Literal[1, 2] = 1,
+        low_latency: bool = True,
+        rs485: bool | RS485Settings | None = None,
+        direction: Callable[[bool], None] | None = None,
+    ) -> None:
+        _check(name, baud, parity, stop_bits)
+        if rs485 and direction is not None:
+            raise ValueError(
+                "rs485 and direction: either the driver or the caller switches, so give one of them"
+            )
+        self.name = name
+        self.baud = baud
+        self._direction = direction
+        if direction is not None:
+            direction(False)
+        self._shut_out: int | None = None
+        self._serial = _open(name, baud, _PARITIES[parity], stop_bits)
+        try:
+            self._channel = self._make_channel()
+            self.capabilities = self._set_up(low_latency=low_latency, rs485=rs485)
+        except PortError:
+            self.close()
+            raise
+        except SYSTEM_ERRORS as error:
+            self.close()
+            raise explain(name, error) from error
+
+    def _make_channel(self) -> Channel:
+        if sys.platform == "win32" or _scheme(self.name) not in _DIRECT:
+            return PyserialChannel(self._serial)
+        # A buffer of 4096 bytes that is full may take its whole length to have room again.
+        return DescriptorChannel(self._serial.fileno(), stall=1 + CHUNK * 10 / self.baud)
+
+    def _set_up(self, *, low_latency: bool, rs485: bool | RS485Settings | None) -> Capabilities:
+        descriptor = self._channel.fileno()
+        if descriptor is None or _scheme(self.name) == "socket":
+            return self._set_up_remote(descriptor, rs485)
+        if rs485:
+            settings.set_rs485(self._serial, self.name, RS485Settings() if rs485 is True else rs485)
+        settings.check_baud(descriptor, self.name, self.baud)
+        settings.make_raw(descriptor)
+        accepted = low_latency and settings.set_low_latency(self._serial)
+        adapter = look_up(descriptor)  # afterwards: low latency changes what it finds
+        if adapter.paced is not Ability.NO:
+            settings.shut_out(descriptor)
+            self._shut_out = descriptor
+        return _capabilities(adapter, accepted=accepted, rs485=settings.rs485_state(descriptor))
+
+    def _set_up_remote(self, descriptor: int | None, rs485: bool | RS485Settings | None) -> Capabilities:
+        if rs485 or self._direction is not None:
+            raise CapabilityMissing(
+                f"{self.name}: a transceiver's direction can be switched at a port of this machine only; "
+                "let the device server or the adapter switch it",
+                port=self.name,
+            )
+        if descriptor is None:
+            return Capabilities(latency_source="the port is reached through pyserial, which does not tell")
+        settings.send_at_once(descriptor)
+        return Capabilities(paced=Ability.NO, latency_source="a network does not tell")
+
+    def write(self, data: bytes) -> None:
+        """See `Port.write`. With `direction` it returns when the last byte has left."""
+        if self._direction is None or self._gone:
+            super().write(data)
+            return
+        self._direction(True)
+        try:
+            super().write(data)
+            self._drain()
+        finally:
+            self._direction(False)
+
+    def _drain(self) -> None:
+        try:
+            self._channel.drain()
+        except SYSTEM_ERRORS as error:
+            raise self._lose(error) from error
+
+    def close(self) -> None:
+        """Give the port back, also one that was lost. Closing twice does no harm."""
+        self._gone = f"{self.name} was closed here; open it again to use it"
+        if self._shut_out is not None:
+            settings.let_in(self._shut_out)
+            self._shut_out = None
+        with contextlib.suppress(*SYSTEM_ERRORS):  # what is gone already needs no closing
+            self._serial.close()
+
+
+def _check(name: object, baud: object, parity: object, stop_bits: object) -> None:
+    if not isinstance(name, str) or not name.strip():
+        raise ValueError(f"name: {name!r} was given; give a device such as /dev/ttyUSB0, or a URL")
+    if not isinstance(baud, int) or not 1 <= baud <= 100_000_000:
+        raise ValueError(f"baud: {baud!r} was given; give bits a second, such as 115200")
+    if parity not in _PARITIES:
+        raise ValueError(f"parity: {parity!r} was given; it is one of {', '.join(_PARITIES)}")
+    if stop_bits not in {1, 2}:
+        raise ValueError(f"stop_bits: {stop_bits!r} was given; it is 1 or 2")
+
+
+def _scheme(name: str) -> str:
+    return name.partition("://")[0].lower() if "://" in name else ""
+
+
+def _open(name: str, baud: int, parity: str, stop_bits: int) -> Any:
+    check_url(name)
+    import serial  # noqa: PLC0415  # takes 9 ms, and simulated ports do without
+
+    options = {"parity": parity, "stopbits": stop_bits, "timeout": _SLICE, "exclusive": True}
+    try:
+        return serial.serial_for_url(name, baud, **options)
+    except (*SYSTEM_ERRORS, ValueError) as error:  # ValueError: a URL that pyserial does not know
+        raise explain(name, error) from error
+
+
+def _capabilities(adapter: Adapter, *, accepted: bool, rs485: Ability) -> Capabilities:
+    at_once = adapter.latency is not None and adapter.latency <= 0.001
+    refused = Ability.UNKNOWN if adapter.latency is None else Ability.NO
+    return Capabilities(
+        exclusive=Ability.YES,
+        low_latency=Ability.YES if accepted or at_once else refused,
+        rs485=rs485,
+        paced=adapter.paced,
+        latency=adapter.latency,
+        latency_source=adapter.source,
+        driver=adapter.driver,
+    )
