@@ -1,0 +1,1 @@
+"""Behaviour of the protocols beyond their bytes, for both sides of the wire."""

@@ -1,0 +1,29 @@
+"""Q.link on the wire: the master's side, blocking and for asyncio, and the slave's.
+
+`Bus` and `AsyncBus` ask, `VirtualNode` answers. Messages and their errors are in `qlinkgen_codecs.qlink`.
+"""
+
+from __future__ import annotations
+
+from qlinkgen.protocols.qlink.aio import AsyncBus, AsyncNode
+from qlinkgen.protocols.qlink.bus import Bus, Node
+from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
+from qlinkgen.protocols.qlink.motion import MotionProgress
+from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
+from qlinkgen.protocols.qlink.survey import Found, NodeStatus
+from qlinkgen.protocols.qlink.virtual_node import VirtualNode
+
+__all__ = [
+    "AsyncBus",
+    "AsyncNode",
+    "Bus",
+    "Found",
+    "LoadProgress",
+    "LoadReport",
+    "MotionProgress",
+    "Node",
+    "NodeStatus",
+    "SyncReport",
+    "SyncTick",
+    "VirtualNode",
+]

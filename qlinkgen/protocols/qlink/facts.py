@@ -1,0 +1,28 @@
+"""Numbers of the protocol that the procedures need, all read from the generated module."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qlinkgen_codecs import qlink
+
+
+def _bus(name: str) -> int:
+    number = getattr(qlink.BUS, name)
+    if not isinstance(number, int):
+        raise TypeError(f"the schema of Q.link does not say {name}")
+    return number
+
+
+def _most(message: type[Any], field: str) -> int:
+    """Return how many items a field of a message can hold."""
+    return next(int(rule.most) for rule in message.RULES if rule.name == field)
+
+
+BAUD = _bus("baud")
+BROADCAST = _bus("broadcast")
+NODES = range(_bus("first_node"), _bus("last_node") + 1)
+#: Words that one motion can carry.
+WORDS = _most(qlink.MotionRequest, "segments")
+#: Bytes of a program's text that one request can carry.
+PIECE = _most(qlink.NodeProgramLoadRequest, "program_data")

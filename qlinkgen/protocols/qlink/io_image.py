@@ -1,0 +1,88 @@
+"""Inputs and outputs of a virtual node: 24 of each, and the delays from input 1 to output 1 (section 7.1).
+
+Bit 0 is number 1. What the document leaves open, and what this node does:
+
+* Output 1 follows input 1: T1 after it went high, T2 after it went low. Only the last edge counts: a pulse
+  shorter than T1 never reaches output 1. The delay in force when the edge comes holds for it.
+* A master may write output 1 as well. The last one wins; a write does not call off a change on its way.
+* A reset clears the outputs and calls that change off. The inputs are wires and stay.
+"""
+
+from __future__ import annotations
+
+from qlinkgen.protocols.qlink.arguments import whole
+
+#: Inputs of a node, and outputs; section 7.16 has three bytes of each.
+LINES = 24
+ALL = (1 << LINES) - 1
+_BYTES = LINES // 8
+
+
+class IoImage:
+    """24 inputs and 24 outputs. Time comes in as an argument.
+
+    Attributes:
+        outputs: bit 0 is output 1.
+    """
+
+    def __init__(self) -> None:
+        self.outputs = 0
+        self._inputs = 0
+        self._change: tuple[float, int] | None = None
+
+    @property
+    def inputs(self) -> int:
+        """Bit 0 is input 1."""
+        return self._inputs
+
+    def power_up(self, value: int) -> None:
+        """Put levels on the inputs that were there before anything happened: no edge.
+
+        Raises:
+            ValueError: `value` is out of range.
+        """
+        self._inputs = whole("inputs", value, 0, ALL)
+
+    def set_inputs(self, value: int, now: float, t1: float, t2: float) -> None:
+        """Put levels on the inputs.
+
+        Args:
+            value: bit 0 is input 1, 0..0xFFFFFF.
+            now: when, in seconds.
+            t1: seconds until output 1 goes high after input 1 went high.
+            t2: seconds until output 1 goes low after input 1 went low.
+
+        Raises:
+            ValueError: `value` is out of range.
+        """
+        level = whole("inputs", value, 0, ALL) & 1
+        self.advance(now)
+        if level != self._inputs & 1:
+            self._change = (now + (t1 if level else t2), level)
+        self._inputs = value
+        self.advance(now)
+
+    def advance(self, now: float) -> None:
+        """Let output 1 do what has become due."""
+        if self._change is not None and now >= self._change[0]:
+            self.outputs = self.outputs & ~1 | self._change[1]
+            self._change = None
+
+    def write(self, value: int, mask: int = ALL) -> None:
+        """Set the outputs under the mask; the others stay."""
+        self.outputs = (self.outputs & ~mask | value & mask) & ALL
+
+    def clear(self) -> None:
+        """Clear the outputs, and call off a change of output 1 that is on its way."""
+        self.outputs = 0
+        self._change = None
+
+    def read_bytes(self, size: int, offset: int) -> bytes:
+        """Return bytes of the inputs, byte 0 first; 0 for those that are not there (settled question 14)."""
+        return self._inputs.to_bytes(_BYTES, "little")[offset : offset + size].ljust(size, b"\0")
+
+    def write_bytes(self, offset: int, data: bytes) -> None:
+        """Write bytes of the outputs, byte 0 first; those that are not there are ignored."""
+        kept = data[: max(0, _BYTES - offset)]
+        shift = 8 * offset
+        self.write(int.from_bytes(kept, "little") << shift, ((1 << 8 * len(kept)) - 1) << shift)

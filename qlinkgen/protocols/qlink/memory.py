@@ -1,0 +1,100 @@
+"""What a master remembers of its bus from call to call, and the procedures that use it.
+
+Both faces of the bus, blocking and asyncio, stand on this one.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping
+from os import PathLike
+
+from qlinkgen.link.echo import EchoMode
+from qlinkgen.link.health import HealthPolicy
+from qlinkgen.link.master import MasterEngine
+from qlinkgen.link.procedure import Procedure
+from qlinkgen.protocols.qlink import loading, motion, pacing
+from qlinkgen.protocols.qlink.arguments import positive, whole
+from qlinkgen.protocols.qlink.hexfile import read_hex
+from qlinkgen.protocols.qlink.matching import ACCEPTS
+from qlinkgen.transport.conversation import timing_of
+from qlinkgen.transport.port import Port
+from qlinkgen_codecs import qlink
+
+#: Syncs of one run: more than a bus can send in its life.
+MOST_SYNCS = 1 << 62
+
+
+def make_engine(
+    port: Port, *, attempts: int, echo: EchoMode, health: HealthPolicy | None, slack: float | None
+) -> MasterEngine:
+    """Return the engine of a Q.link master on a port."""
+    timing = timing_of(qlink, port, slack=slack, attempts=attempts)
+    return MasterEngine(qlink, timing, echo=echo, health=health, accepts=ACCEPTS)
+
+
+class Memory:
+    """Counters of motions and syncs.
+
+    Attributes:
+        motions: state of the motions, by node.
+        syncs: number of the next sync.
+    """
+
+    def __init__(self) -> None:
+        self.motions: defaultdict[int, motion.MotionState] = defaultdict(motion.MotionState)
+        self.syncs = pacing.SyncState()
+
+    def next_sync(self, counter: int | None) -> int:
+        """Return the number for a sync that is sent now."""
+        number = self.syncs.counter if counter is None else whole("counter", counter, 0, 255)
+        self.syncs.counter = (number + 1) & 0xFF
+        return number
+
+    def set_up(self, request: qlink.NodeSetupRequest) -> None:
+        """A node was given a number, or perhaps: nothing is known of who has it, nor of who had it before."""
+        if request.node != request.node_number:
+            self.motions[request.node].unknown()
+            self.motions[request.node_number].unknown()
+
+    def stream(
+        self,
+        words: Mapping[int, Iterable[int]],
+        outputs: int | Mapping[int, int],
+        patience: float,
+        full_pause: float,
+    ) -> Procedure[dict[int, int]]:
+        """Stream words to nodes."""
+        positive("patience", patience, "seconds")
+        positive("full_pause", full_pause, "seconds")
+        each = outputs if isinstance(outputs, Mapping) else dict.fromkeys(words, outputs)
+        return motion.stream(self.motions, words, each, patience=patience, full_pause=full_pause)
+
+    def sync(
+        self, interval: float, count: int | None, stop: Callable[[], bool] | None
+    ) -> Procedure[pacing.SyncReport]:
+        """Send syncs at an interval."""
+        if not positive("interval", interval, "seconds"):
+            raise ValueError(f"interval={interval!r}: give more than 0 seconds")
+        if count is not None:
+            whole("count", count, 0, MOST_SYNCS)
+        return pacing.sync(self.syncs, interval, count=count, stop=stop or (lambda: False))
+
+    @staticmethod
+    def complete(
+        node: int, motor_data: bytes, poll_interval: float, timeout: float
+    ) -> Procedure[qlink.MotorResponsePollResponse]:
+        """Send a motor request and wait for its result."""
+        positive("poll_interval", poll_interval, "seconds")
+        positive("timeout", timeout, "seconds")
+        request = qlink.MotorRequestRequest(node=node, motor_data=motor_data)
+        return pacing.complete(request, poll_interval=poll_interval, timeout=timeout)
+
+    @staticmethod
+    def load(
+        node: int, program: str | PathLike[str] | bytes, piece: int, patience: float
+    ) -> Procedure[loading.LoadReport]:
+        """Load a file, or a text that has been checked already."""
+        positive("patience", patience, "seconds")
+        text = program if isinstance(program, bytes) else read_hex(program).text
+        return loading.load(node, text, piece=piece, patience=patience)

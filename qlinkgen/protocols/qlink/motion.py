@@ -1,0 +1,252 @@
+"""Motions, each taken by its node exactly once and in order (section 7.10).
+
+The counter of a motion tells the node a repeat from a new one. A master that has just been started does not
+know the counter of the last motion a node has taken; if it sent words under the same number, the node would
+take them for a repeat and drop them, and the outputs as well. So a motion without words goes before the first
+one to a node: whatever the node makes of it, the next number is a new one.
+
+When no answer came, the words may be queued or not. They stay `pending`, and are sent again under the same
+number before any others, so that they are queued once whichever it was. Clearing the FIFO and resetting the
+node drop them, as the node does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
+
+from qlinkgen.errors import LinkError
+from qlinkgen.link.master import Reply
+from qlinkgen.link.procedure import FAILURES, Ask, Pause, Procedure, Tell
+from qlinkgen.protocols.qlink.facts import WORDS
+from qlinkgen_codecs import qlink
+
+
+@dataclass(slots=True)
+class MotionState:
+    """What a master knows of the motions of one node.
+
+    Attributes:
+        counter: number of the next motion, 0..255.
+        known: the node does not mistake that number for a repeat.
+        pending: motion that was sent and not answered.
+        streaming: a stream has the node, so nobody else may move it.
+    """
+
+    counter: int = 0
+    known: bool = False
+    pending: qlink.MotionRequest | None = None
+    streaming: bool = False
+
+    @property
+    def ready(self) -> bool:
+        """A motion can be sent without looking back."""
+        return self.known and self.pending is None and not self.streaming
+
+    def begin(self, request: qlink.MotionRequest) -> bool:
+        """A motion is about to be sent; returns whether it is the first time."""
+        fresh = self.pending is None
+        self.pending = request
+        return fresh
+
+    def settled(self, request: qlink.MotionRequest) -> None:
+        """The node has taken it."""
+        self.pending = None
+        self.counter = (request.counter + 1) & 0xFF
+        self.known = True
+
+    def failed(self, error: Exception, *, fresh: bool) -> None:
+        """It was not answered: it stays pending, unless it cannot have been on the line."""
+        unsent = isinstance(error, (TypeError, ValueError)) or (
+            isinstance(error, LinkError) and not error.attempts
+        )
+        if fresh and unsent:
+            self.pending = None
+
+    def drop(self) -> None:
+        """What is pending is not sent again, and neither is its number: a late answer to it means nothing."""
+        if self.pending is not None:
+            self.counter = (self.pending.counter + 1) & 0xFF
+            self.pending = None
+
+    def forget(self) -> None:
+        """The node has dropped what it had, and takes the next motion whatever its number."""
+        self.drop()
+        self.known = True
+
+    def unknown(self) -> None:
+        """Another node may have this number now."""
+        self.drop()
+        self.known = False
+
+
+def move(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
+    """Hand a motion to a node; the counter in the request is replaced by the right one.
+
+    Raises:
+        RuntimeError: a stream has the node.
+        LinkError: no answer came; the motion is pending.
+    """
+    if state.streaming:
+        raise RuntimeError(
+            f"node {request.node} is being streamed to; motions in between would mix the paths"
+        )
+    return (yield from _move(state, request))
+
+
+def _move(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
+    if state.pending is not None:
+        yield from _settle(state, state.pending)
+    if not state.known:
+        yield from _settle(state, qlink.MotionRequest(node=request.node, outputs=request.outputs))
+    request.counter = state.counter
+    return (yield from _settle(state, request))
+
+
+def _settle(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
+    """Ask until the node has taken the request, or leave it pending."""
+    fresh = state.begin(request)
+    try:
+        reply: Reply = yield Ask(request)
+    except FAILURES as error:
+        state.failed(error, fresh=fresh)
+        raise
+    state.settled(request)
+    return reply
+
+
+@dataclass(frozen=True, slots=True)
+class MotionProgress:
+    """How far the stream to one node is.
+
+    Attributes:
+        node: the node.
+        queued: words that the node has taken.
+        fifo_space: words that still fit, 0..255.
+        position: motor position, encoder counts.
+        running: the motor runs.
+        answer: everything the node said.
+    """
+
+    node: int
+    queued: int
+    fifo_space: int
+    position: int
+    running: bool
+    answer: qlink.MotionResponse
+
+
+@dataclass(slots=True)
+class _Feed:
+    """Words on their way to one node."""
+
+    node: int
+    words: Iterator[int]
+    outputs: int
+    state: MotionState
+    batch: list[int] = field(default_factory=list)
+    space: int = 0
+    queued: int = 0
+    polled: bool = False
+    exhausted: bool = False
+    silent_since: float | None = None
+    in_doubt: qlink.MotionRequest | None = None
+
+    @property
+    def done(self) -> bool:
+        return self.exhausted and not self.batch and self.polled
+
+    def fill(self) -> None:
+        """Have as many words ready as fit into the node and into one motion."""
+        missing = min(self.space, WORDS) - len(self.batch)
+        if missing > 0 and not self.exhausted:
+            self.batch.extend(islice(self.words, missing))
+            self.exhausted = len(self.batch) < min(self.space, WORDS)
+
+
+def stream(
+    states: Mapping[int, MotionState],
+    words: Mapping[int, Iterable[int]],
+    outputs: Mapping[int, int],
+    *,
+    patience: float,
+    full_pause: float,
+) -> Procedure[dict[int, int]]:
+    """Hand words to one node or to several in turn, never more than fit; tells MotionProgress.
+
+    Args:
+        states: what is known of each node.
+        words: path words for each node, 0..65535; taken from the iterables only as they are needed.
+        outputs: outputs 1-8 of each node, kept with every motion.
+        patience: seconds that a node may stay silent before the stream fails.
+        full_pause: seconds to wait when no FIFO has room.
+
+    Returns the words taken, by node.
+
+    Raises:
+        LinkError: a node has been silent for longer; its last words are pending.
+    """
+    for node in words:
+        if states[node].streaming:
+            raise RuntimeError(f"node {node} is being streamed to already")
+    feeds = [_Feed(node, iter(each), outputs.get(node, 0), states[node]) for node, each in words.items()]
+    try:
+        for feed in feeds:
+            feed.state.streaming = True
+        while waiting := [feed for feed in feeds if not feed.done]:
+            moved = False
+            for feed in waiting:
+                moved |= yield from _feed_once(feed, patience)
+            if not moved:
+                yield Pause(full_pause)
+    finally:
+        for feed in feeds:
+            feed.state.streaming = False
+    return {feed.node: feed.queued for feed in feeds}
+
+
+def _feed_once(feed: _Feed, patience: float) -> Procedure[bool]:
+    """One motion to one node; returns whether it has taken words or was found to have room."""
+    if feed.in_doubt is not None and feed.in_doubt is not feed.state.pending:  # dropped by a clear
+        del feed.batch[: len(feed.in_doubt.segments)]
+        feed.in_doubt = None
+    feed.fill()
+    request = feed.in_doubt or qlink.MotionRequest(
+        node=feed.node, outputs=feed.outputs, segments=feed.batch[: feed.space]
+    )
+    try:
+        if feed.in_doubt is None:
+            reply = yield from _move(feed.state, request)
+        else:
+            reply = yield from _settle(feed.state, request)
+    except LinkError as error:
+        feed.in_doubt = request if feed.state.pending is request else None
+        yield from _bear(feed, error, patience)
+        return False
+    feed.in_doubt = None
+    feed.silent_since = None
+    taken = len(request.segments)
+    feed.queued += taken
+    del feed.batch[:taken]
+    answer: qlink.MotionResponse = reply.response
+    found_room = answer.fifo_space > feed.space - taken
+    feed.space = answer.fifo_space
+    feed.polled = True
+    yield Tell(_progress(feed, answer))
+    return bool(taken) or found_room
+
+
+def _progress(feed: _Feed, answer: qlink.MotionResponse) -> MotionProgress:
+    running = bool(answer.motor_status & qlink.MotorStatus.RUNNING)
+    return MotionProgress(feed.node, feed.queued, answer.fifo_space, answer.position, running, answer)
+
+
+def _bear(feed: _Feed, error: LinkError, patience: float) -> Procedure[None]:
+    """Let a node be silent for a while: its words are kept, and the others go on."""
+    now: Any = yield Pause(0)
+    if feed.silent_since is None:
+        feed.silent_since = now - error.elapsed
+    if now - feed.silent_since >= patience:
+        raise error

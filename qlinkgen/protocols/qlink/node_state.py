@@ -1,0 +1,189 @@
+"""State of a virtual node, and its way through time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from math import isfinite
+
+from qlinkgen.protocols.qlink.arguments import known, positive, whole
+from qlinkgen.protocols.qlink.hex_image import HexImage
+from qlinkgen.protocols.qlink.io_image import ALL, IoImage
+from qlinkgen.protocols.qlink.motor import MotorRequests, echo
+from qlinkgen.protocols.qlink.path_fifo import PathFifo, signed_word
+from qlinkgen.protocols.qlink.program_store import ProgramStore
+from qlinkgen.protocols.qlink.statistics import NodeStatistics, PathRecord
+from qlinkgen_codecs import qlink
+from qlinkgen_codecs.qlink import PositionType
+
+#: Seconds that a time may lie before the one told last: threads and drivers look at the clock in any order.
+_DISORDER = 1.0
+_KNOWN_TYPES = (PositionType.JVL_MACTALK, PositionType.METRONIX)
+
+
+class NodeState:
+    """What a virtual node is, without its commands.
+
+    Times are seconds of any clock, the same one for all calls of a node. An earlier time than the one before
+    counts as that one, up to a second. A node has no lock: one thread at a time.
+
+    Attributes:
+        number: node number that it answers to, 1..16; node_setup changes it.
+        t1_delay: seconds from input 1 going high to output 1 going high.
+        t2_delay: seconds from input 1 going low to output 1 going low.
+        position_type: how it asks its motor for the position.
+        version: major and minor number of the firmware.
+        product_id: product, 0..65535.
+        serial_number: 0..4294967295.
+        unsupported: commands that it does not answer.
+        io: inputs and outputs.
+        path: FIFO and motor.
+        motor: requests passed through to the motor.
+        store: program loader.
+        statistics: what it has counted.
+        record: every path word queued and when it came, None unless asked for.
+        now: latest time that it was told, None before the first.
+    """
+
+    def __init__(
+        self,
+        number: int = 1,
+        *,
+        capacity: int = 48,
+        rate: float = 1000.0,
+        displacement: Callable[[int], int] = signed_word,
+        started: bool = False,
+        t1_delay: float = 1.0,
+        t2_delay: float = 1.0,
+        position_type: PositionType | int = PositionType.NONE,
+        version: tuple[int, int] = (1, 0),
+        product_id: int = 0,
+        serial_number: int = 0,
+        motor: Callable[[bytes], bytes] = echo,
+        motor_seconds: float = 0.05,
+        check_program: bool = True,
+        unsupported: Iterable[str] = (),
+        record: bool = False,
+    ) -> None:
+        """Make a node as it is after power-up.
+
+        Args:
+            number: node number, 1..16.
+            capacity: path words that its FIFO holds, 0..255.
+            rate: path words a second that its motor consumes; 0 for one that never moves.
+            displacement: gives how far a path word moves the motor, in encoder counts.
+            started: whether it consumes path words without a node_start, after a reset too.
+            t1_delay: as in node_setup, 0..25.5 s.
+            t2_delay: as in node_setup, 0..25.5 s.
+            position_type: as in node_setup.
+            version: major and minor number of the firmware, 0..255 each.
+            product_id: product, 0..65535.
+            serial_number: 0..4294967295.
+            motor: gives what the motor answers to a motor_request, 0..25 bytes.
+            motor_seconds: time until a motor_request is completed.
+            check_program: whether it stops acknowledging a program load that is no Intel HEX.
+            unsupported: names of commands that it does not answer.
+            record: whether to keep every path word.
+
+        Raises:
+            ValueError: one of them is out of range, or names no command.
+        """
+        self.number = whole("number", number, 1, 16)
+        self.t1_delay = positive("t1_delay", t1_delay, "s", 25.5)
+        self.t2_delay = positive("t2_delay", t2_delay, "s", 25.5)
+        self.position_type = whole("position_type", position_type, 0, 255)
+        self.version = (whole("version[0]", version[0], 0, 255), whole("version[1]", version[1], 0, 255))
+        self.product_id = whole("product_id", product_id, 0, 0xFFFF)
+        self.serial_number = whole("serial_number", serial_number, 0, 0xFFFF_FFFF)
+        self.unsupported = known("unsupported", unsupported, qlink.COMMANDS)
+        self.statistics = NodeStatistics()
+        self.io = IoImage()
+        self.path = PathFifo(capacity, rate, displacement, started=started)
+        self.motor = MotorRequests(motor, motor_seconds)
+        self.store = ProgramStore(self.statistics, check=check_program)
+        self.record = PathRecord() if record else None
+        self.now: float | None = None
+        self._started = started
+
+    @property
+    def inputs(self) -> int:
+        """The 24 inputs, bit 0 is input 1.
+
+        Setting them happens at the latest time that the node was told. Before the first, it sets the levels
+        at power-up, and input 1 has not gone high.
+        """
+        return self.io.inputs
+
+    @inputs.setter
+    def inputs(self, value: int) -> None:
+        if self.now is None:
+            self.io.power_up(value)
+        else:
+            self.set_inputs(value, self.now)
+
+    def set_inputs(self, value: int, now: float) -> None:
+        """Put levels on the inputs.
+
+        Args:
+            value: bit 0 is input 1, 0..0xFFFFFF.
+            now: when, in seconds.
+
+        Raises:
+            ValueError: `value` is out of range, or `now` far behind the time that was told last.
+        """
+        self.io.set_inputs(value, self.advance(now), self.t1_delay, self.t2_delay)
+
+    @property
+    def outputs(self) -> int:
+        """The 24 outputs, bit 0 is output 1, as they are at the latest time that the node was told."""
+        return self.io.outputs
+
+    @outputs.setter
+    def outputs(self, value: int) -> None:
+        self.io.write(whole("outputs", value, 0, ALL))
+
+    @property
+    def position(self) -> int:
+        """Where the motor is, whether or not the node tells it."""
+        return self.path.position
+
+    @property
+    def position_valid(self) -> bool:
+        """Whether the node knows the position: its position type is one that the document names."""
+        return self.position_type in _KNOWN_TYPES
+
+    @property
+    def running(self) -> bool:
+        """Whether the motor is moving along the path."""
+        return self.path.running
+
+    @property
+    def program(self) -> HexImage | None:
+        """The loaded program, from its end record on."""
+        return self.store.image
+
+    def advance(self, now: float) -> float:
+        """Let happen what happens until `now`. Returns the time that counts.
+
+        Raises:
+            ValueError: `now` is no time, or more than a second before the one told last.
+        """
+        if self.now is not None and now <= self.now:
+            if self.now - now > _DISORDER:
+                raise ValueError(
+                    f"now={now!r} after {self.now!r}: time goes forward; "
+                    "take all times of a node from one clock"
+                )
+            return self.now
+        if not isfinite(now):
+            raise ValueError(f"now={now!r}: give seconds, a finite number")
+        self.now = now
+        self.io.advance(now)
+        self.path.advance(now)
+        return now
+
+    def reset(self) -> None:
+        """Be as after power-up, but for what a reset keeps."""
+        self.path.clear()
+        self.path.started = self._started
+        self.io.clear()
+        self.motor.forget()
