@@ -1,0 +1,66 @@
+"""A node of any protocol where one master asks and nodes answer: it knows the schema and nothing more."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from qlinkgen.link.codec import Codec
+
+#: What a rule of a generated module is called, to its smallest legal value.
+_SMALLEST: Mapping[str, Callable[[Any], Any]] = {
+    "Whole": lambda rule: rule.ranges[0][0],
+    "Mask": lambda rule: 0,  # noqa: ARG005
+    "Items": lambda rule: [rule.item.ranges[0][0]] * rule.fewest,
+    "Octets": lambda rule: bytes(rule.fewest),
+    "Text": lambda rule: " " * rule.fewest,
+    "Steps": lambda rule: min(rule.value(rule.low), rule.value(rule.high)),
+    "DecimalSteps": lambda rule: min(rule.value(rule.low), rule.value(rule.high)),
+}
+
+
+class GenericNode:
+    """Answers every command with the defaults of its response.
+
+    Fields that repeat the request do so, and those that a sender has to choose have their smallest legal
+    value. It remembers nothing: what is written to it cannot be read back.
+
+    Attributes:
+        number: address that it answers to; 0 where frames have none.
+        requests: how often it was asked.
+    """
+
+    def __init__(self, codec: Codec, number: int = 0) -> None:
+        """Make a node of a generated module."""
+        self.number = number
+        self.requests = 0
+        self._commands = {command.request: command for command in codec.COMMANDS.values()}
+        self._required = {
+            command.response: required_values(command.response)
+            for command in codec.COMMANDS.values()
+            if command.response is not None
+        }
+
+    def handle(self, request: Any, now: float) -> Any | None:  # noqa: ARG002  # what stations are asked
+        """Return the response to a request; None where the command has none, or where it is no command."""
+        self.requests += 1
+        command = self._commands.get(type(request))
+        if command is None or command.response is None:
+            return None
+        values = dict(self._required[command.response])
+        values.update({name: getattr(request, name) for name in command.echoes})
+        if address := command.response.ADDRESS:
+            values[address] = self.number
+        return command.response(**values)
+
+
+def required_values(message: Any) -> dict[str, Any]:
+    """Return a legal value for each field of a message class that has no default; the address is left out."""
+    rules = {rule.name: rule for rule in message.RULES}
+    parameters = inspect.signature(message).parameters.values()
+    return {
+        each.name: _SMALLEST[type(rules[each.name]).__name__](rules[each.name])
+        for each in parameters
+        if each.kind is each.KEYWORD_ONLY and each.default is each.empty and each.name != message.ADDRESS
+    }
