@@ -17,6 +17,12 @@ COMMANDS = {
     "encode": "Values to wire bytes.",
     "decode": "Wire bytes to values: one JSON object a line.",
     "explain": "Say what every byte of a frame is, and what is wrong with it.",
+    "simulate": "Put simulated nodes on a port of their own, with faults if wanted.",
+    "scan": "Find the nodes of a Q.link bus.",
+    "send": "Send one request on a port; print its answer as decode does.",
+    "load": "Load an Intel HEX file into a Q.link node.",
+    "monitor": "Listen to a bus: who asks, who answers, what is repeated, late or damaged.",
+    "doctor": "Say what a serial port can do, what its latency costs, and what to change.",
 }
 
 
@@ -45,12 +51,13 @@ class LazyGroup(click.Group):
 )
 @click.version_option(qlinkgen.__version__, prog_name="qlinkgen")
 def cli() -> None:
-    """Describe a serial protocol once in YAML: get codecs for Python and C, and look at its bytes.
+    """Describe a serial protocol once in YAML: get codecs for Python and C, look at its bytes, drive its bus.
 
     PROTOCOL is the name of a schema that comes with qlinkgen (qlink, trio, mc1231a) or the path of a .yaml
     file.
 
-    Exit codes: 0 fine, 1 what was checked is wrong (drift, bad frame, faulty schema), 2 wrong usage.
+    Exit codes: 0 fine, 1 what was checked is wrong (drift, bad frame, faulty schema, no answer, no such
+    port), 2 wrong usage.
     """
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import click
@@ -25,12 +26,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import whole_number
 
-
-@click.command("encode")
-@click.argument("protocol")
-@click.argument("message", required=False)
-@click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
-@click.option(
+address_option = click.option(
     "--node",
     "--address",
     "addresses",
@@ -38,12 +34,20 @@ from qlinkgen.model.values import whole_number
     multiple=True,
     help="Whom the frame is for or from; 0x numbers too.",
 )
-@click.option(
+json_option = click.option(
     "--json",
     "object_",
     metavar="OBJECT",
     help='Values as JSON: \'{"counter": 1, "segments": [1, 2]}\', or a whole object that decode printed.',
 )
+
+
+@click.command("encode")
+@click.argument("protocol")
+@click.argument("message", required=False)
+@click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
+@address_option
+@json_option
 @click.option("--request", "request", metavar="HEX", help="Packets: the request that a response answers.")
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
@@ -70,19 +74,30 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen encode mc1231a get_pos.response --request 4a value=1234567
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
-    if message and "=" in message:
-        assignments, message = (message, *assignments), None
-    record = _record(loaded, {} if object_ is None else jsonlines.parse_object(object_, "--json"))
-    found = _message(loaded, message, record.message)
-    given = {**record.fields, **_assigned(assignments)}
-    address = _one(addresses) if addresses else record.address
-    warn_unconfirmed(loaded, found)
-    codec = load_codec(loaded)
-    built = build(codec, found, given, _address(loaded, found, address))
+    codec, found, built = compose(loaded, message, assignments, addresses, object_)
     try:
         click.echo(_frame(loaded, codec, found, built, request).hex())
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
+
+
+def compose(
+    protocol: Protocol,
+    message: str | None,
+    assignments: tuple[str, ...],
+    addresses: tuple[str, ...],
+    object_: str | None,
+) -> tuple[ModuleType, Message, Any]:
+    """The codec, the message that a command line means, and the object with its values."""
+    if message and "=" in message:
+        assignments, message = (message, *assignments), None
+    record = _record(protocol, {} if object_ is None else jsonlines.parse_object(object_, "--json"))
+    found = _message(protocol, message, record.message)
+    given = {**record.fields, **_assigned(assignments)}
+    address = _one(addresses) if addresses else record.address
+    warn_unconfirmed(protocol, found)
+    codec = load_codec(protocol)
+    return codec, found, build(codec, found, given, _address(protocol, found, address))
 
 
 @dataclass(frozen=True, slots=True)

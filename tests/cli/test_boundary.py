@@ -16,7 +16,10 @@ from tests.cli.conftest import Run
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "qlinkgen"]
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+ENVIRONMENT = {
+    **os.environ,
+    "PYTHONPATH": os.pathsep.join([str(REPOSITORY), str(REPOSITORY / "generated" / "python")]),
+}
 
 
 def test_version_and_help(qlinkgen: Run) -> None:

@@ -1,0 +1,142 @@
+"""``qlinkgen doctor``: what a port can do, what it costs a transaction, and what to change."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from enum import Enum
+from typing import Any
+
+import click
+
+from qlinkgen.cli.boundary import FINE, WRONG
+from qlinkgen.cli.common import on_terminal
+from qlinkgen.cli.diagnosis import Advice, Cost, Echo, advise, cost, probe
+from qlinkgen.cli.tables import Table
+from qlinkgen.cli.wire_options import open_line
+from qlinkgen.transport.conversation import ASSUMED_LATENCY, WAKE_UP
+from qlinkgen.transport.port import Ability, Capabilities, Port
+
+_MEANINGS = {
+    "exclusive": {
+        Ability.YES: "other programs are kept out while it is open here",
+        Ability.NO: "other programs may send in between",
+        Ability.UNKNOWN: "the far end decides whether others may send in between",
+    },
+    "low_latency": {
+        Ability.YES: "received bytes are handed on at once",
+        Ability.NO: "received bytes are collected first",
+        Ability.UNKNOWN: "nothing tells whether received bytes are collected first",
+    },
+    "rs485": {
+        Ability.YES: "the driver switches the transceiver",
+        Ability.NO: "the adapter itself has to switch a transceiver",
+        Ability.UNKNOWN: "the far end has to switch a transceiver",
+    },
+    "paced": {
+        Ability.YES: "bytes take their time on a line",
+        Ability.NO: "bytes arrive at once, at any baud rate",
+        Ability.UNKNOWN: "nothing tells whether bytes take their time",
+    },
+}
+
+
+@click.command("doctor")
+@click.argument("port")
+@click.option(
+    "--baud",
+    type=click.IntRange(1, 100_000_000),
+    default=115200,
+    show_default=True,
+    metavar="N",
+    help="Speed to open it with.",
+)
+@click.option(
+    "--probe", "probing", is_flag=True, help="Send one byte 00, nothing to Q.link, and listen for it."
+)
+@click.option("--json", "as_json", is_flag=True, help="One object instead of text.")
+def command(port: str, baud: int, probing: bool, as_json: bool) -> int:
+    """Open PORT and say what it can do, what its latency does to a transaction, and what to change.
+
+    PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. Nothing is sent unless
+    --probe asks for it.
+
+    Exit code 1 if a line says fix, or if the port is missing, busy or lost.
+    """
+    with open_line(port, baud) as opened:
+        echo = probe(opened) if probing else None
+        advice = advise(opened, port, echo)
+        show = _show_json if as_json else _show_text
+        show(opened, cost(opened), echo, advice)
+    return WRONG if any(each.kind == "fix" for each in advice) else FINE
+
+
+def _show_json(port: Port, total: Cost, echo: Echo | None, advice: list[Advice]) -> None:
+    found = {key: _plain(value) for key, value in asdict(port.capabilities).items()}
+    answer = {
+        "port": port.name,
+        "baud": port.baud,
+        **found,
+        "transaction": asdict(total),
+        "echo": None if echo is None else asdict(echo),
+        "advice": [asdict(each) for each in advice],
+    }
+    click.echo(json.dumps(answer, indent=2))
+
+
+def _plain(value: Any) -> Any:
+    return value.value if isinstance(value, Enum) else value
+
+
+def _show_text(port: Port, total: Cost, echo: Echo | None, advice: list[Advice]) -> None:
+    _abilities(port, echo).show()
+    _terms(port, total).show()
+    for each in advice:
+        colour = {"fix": "yellow", "note": "cyan"}[each.kind]
+        kind = click.style(each.kind, fg=colour, bold=True) if on_terminal() else each.kind
+        click.echo(f"{kind}: {each.text}")
+
+
+def _abilities(port: Port, echo: Echo | None) -> Table:
+    found = port.capabilities
+    table = Table(["what", "found", "meaning"], f"{port.name} at {port.baud} baud")
+    table.add("driver", found.driver or "unknown", "")
+    for key, meanings in _MEANINGS.items():
+        ability: Ability = getattr(found, key)
+        table.add(key.replace("_", " "), ability, meanings[ability])
+    table.add("latency", _latency(found), found.latency_source)
+    if echo is not None:
+        table.add("local echo", *_echo(echo))
+    return table
+
+
+def _latency(found: Capabilities) -> str:
+    return "unknown" if found.latency is None else _time(found.latency)
+
+
+def _echo(echo: Echo) -> tuple[str, str]:
+    if echo.heard is None:
+        return "unknown", f"others were sending: {echo.received[:32]}"
+    if not echo.heard:
+        return "no", "the port does not hear what it sends"
+    return "yes", f"the port hears what it sends, after {_time(echo.seconds or 0.0)}"
+
+
+def _terms(port: Port, total: Cost) -> Table:
+    latency = port.capabilities.latency
+    held = (
+        f"an unknown latency, taken as {_time(ASSUMED_LATENCY)}"
+        if latency is None
+        else f"{_time(latency)} of latency"
+    )
+    table = Table(["term", "time", "why"], f"One {total.command} of Q.link", right=frozenset({"time"}))
+    size = f"{total.longest} bytes, request and answer at their longest"
+    table.add("on the wire", _time(total.on_wire), size)
+    table.add("allowance", _time(total.allowance), "three byte times, in which a node begins to answer")
+    table.add("host slack", _time(total.host_slack), f"{held}, and {_time(WAKE_UP)} to wake this program")
+    table.add("deadline", _time(total.deadline), "their sum: no answer until then, and it is asked again")
+    return table
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds * 1e6:.0f} us" if seconds < 0.001 else f"{seconds * 1000:.2f} ms"

@@ -1,0 +1,142 @@
+"""``qlinkgen load``: a program into a Q.link node."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+
+import click
+
+from qlinkgen.cli.boundary import INTERRUPTED, USAGE, WRONG, Failure
+from qlinkgen.cli.common import crc_option, on_terminal
+from qlinkgen.cli.wire_options import (
+    attempts_option,
+    baud_option,
+    counted,
+    echo_option,
+    open_line,
+    qlink_node,
+    seconds,
+    select_crc,
+    slack_option,
+)
+from qlinkgen.errors import HexFileError, PortLost
+from qlinkgen.link.echo import EchoMode
+from qlinkgen.protocols.qlink import Bus, LoadProgress
+from qlinkgen.protocols.qlink.facts import BAUD
+from qlinkgen.protocols.qlink.hexfile import read_hex
+
+Show = Callable[[LoadProgress], None]
+
+#: Lines of progress where there is no terminal for a bar.
+LINES = 10
+
+
+@click.command("load")
+@click.argument("port")
+@click.argument("file", metavar="FILE.hex", type=click.Path())
+@click.option("--node", required=True, callback=qlink_node, metavar="N", help="Node to load, 1..16.")
+@click.option(
+    "--patience",
+    default="5",
+    show_default=True,
+    callback=seconds,
+    metavar="SECONDS",
+    help="How long each piece is tried.",
+)
+@baud_option
+@attempts_option
+@slack_option
+@echo_option
+@crc_option
+def command(  # noqa: PLR0917  # click passes them by name
+    port: str,
+    file: str,
+    node: int,
+    patience: float,
+    baud: int | None,
+    attempts: int,
+    slack: float | None,
+    echo: EchoMode | None,
+    crc: str | None,
+) -> None:
+    """Load an Intel HEX file into a node of a Q.link bus.
+
+    The file is checked before a byte is sent: records, checksums, overlaps, end. A piece whose answer is lost
+    is sent again, and the node does not store it twice. A load that ends early leaves a part of the program
+    in the node, and begins from the start the next time.
+
+    Exit code 1 if the file is wrong, a piece is not acknowledged, or the port is missing, busy or lost.
+
+    \b
+    qlinkgen load /dev/ttyUSB0 --node 3 program.hex
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    text = _text(file)
+    select_crc(crc)
+    with open_line(port, baud or BAUD) as opened:
+        bus = Bus(opened, attempts=attempts, echo=echo or "auto", health=None, slack=slack)
+        with _told(node, len(text)) as show:
+            report = bus.load(node, text, patience=patience, progress=show)
+    pieces, repeats = counted(report.pieces, "piece"), counted(report.repeats, "repeat")
+    click.echo(f"node {node}: {report.size} bytes in {pieces}, {repeats}, {report.seconds:.2f} s")
+
+
+def _text(file: str) -> bytes:
+    try:
+        return read_hex(file).text
+    except HexFileError as error:
+        if isinstance(error.__cause__, OSError):
+            raise Failure(str(error), USAGE) from None
+        raise
+
+
+@contextlib.contextmanager
+def _told(node: int, total: int) -> Iterator[Show]:
+    """Show how far a load is; where it ends early, say how far it was."""
+    last = LoadProgress(0, total)
+    bar = _bar if on_terminal(sys.stderr) else _lines
+
+    def rest() -> str:
+        return (
+            f"node {node} has acknowledged {last.acknowledged} of {total} bytes and holds a part of the "
+            "program; load it again, from the start"
+        )
+
+    try:
+        with bar(node, total) as show:
+
+            def note(progress: LoadProgress) -> None:
+                nonlocal last
+                last = progress
+                show(progress)
+
+            yield note
+    except KeyboardInterrupt:
+        raise Failure(f"interrupted: {rest()}", INTERRUPTED) from None
+    except PortLost as error:
+        raise Failure(f"{error}; {rest()}", WRONG) from None
+
+
+@contextlib.contextmanager
+def _bar(node: int, total: int) -> Iterator[Show]:
+    from rich.console import Console  # noqa: PLC0415  # only a terminal needs it
+    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
+
+    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        task = progress.add_task(f"node {node}", total=total)
+        yield lambda told: progress.update(task, completed=told.acknowledged)
+
+
+@contextlib.contextmanager
+def _lines(node: int, total: int) -> Iterator[Show]:
+    shown = 0
+
+    def show(told: LoadProgress) -> None:
+        nonlocal shown
+        if told.acknowledged * LINES // total > shown:
+            shown = told.acknowledged * LINES // total
+            click.echo(f"node {node}: {told.acknowledged} of {total} bytes", err=True)
+
+    yield show

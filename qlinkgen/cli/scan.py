@@ -1,0 +1,123 @@
+"""``qlinkgen scan``: who is on a Q.link bus."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import click
+
+from qlinkgen.cli import jsonlines
+from qlinkgen.cli.boundary import FINE, WRONG
+from qlinkgen.cli.common import crc_option, on_terminal, warn
+from qlinkgen.cli.tables import Table
+from qlinkgen.cli.wire_options import (
+    baud_option,
+    echo_option,
+    open_line,
+    parse_nodes,
+    select_crc,
+    slack_option,
+)
+from qlinkgen.link.echo import EchoMode
+from qlinkgen.link.events import Sent
+from qlinkgen.protocols.qlink import Bus, Found
+from qlinkgen.protocols.qlink.facts import BAUD, NODES
+from qlinkgen_codecs.qlink import PositionType
+
+
+@click.command("scan")
+@click.argument("port")
+@click.option(
+    "--nodes", default="1-16", show_default=True, metavar="LIST", help="Whom to ask: 3, 1-16 or 1,3,5-7."
+)
+@click.option("--json", "as_json", is_flag=True, help="One object a line instead of a table.")
+@baud_option
+@slack_option
+@echo_option
+@crc_option
+def command(  # noqa: PLR0917  # click passes them by name
+    port: str,
+    nodes: str,
+    as_json: bool,
+    baud: int | None,
+    slack: float | None,
+    echo: EchoMode | None,
+    crc: str | None,
+) -> int:
+    """Ask every node of a Q.link bus who it is, and print those that answer.
+
+    Who is silent is asked again after all others, and at last for an echo: not every node supports node_info.
+    The time is that from the question to the answer.
+
+    Exit code 1 if no node answers, or if the port is missing, busy or lost.
+
+    \b
+    qlinkgen scan /dev/ttyUSB0
+    qlinkgen scan /dev/ttyUSB0 --nodes 1-4 --json
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    numbers = parse_nodes(nodes, NODES[0], NODES[-1])
+    select_crc(crc)
+    with open_line(port, baud or BAUD) as opened:
+        bus = Bus(opened, echo=echo or "auto", health=None, slack=slack)
+        with _progress() as show:
+            bus.on_event = lambda event: show(event.node) if isinstance(event, Sent) else None
+            found = bus.scan(numbers)
+    if not found:
+        warn(f"no node answers on {port}; check power, wiring and --baud, and `qlinkgen doctor {port}`")
+        return WRONG
+    if as_json:
+        click.echo("\n".join(jsonlines.line(_record(each)) for each in found))
+    else:
+        _table(found).show()
+    return FINE
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[int | None], None]]:
+    """Show on a terminal who is being asked."""
+    if not on_terminal(sys.stderr):
+        yield lambda _: None
+        return
+    from rich.console import Console  # noqa: PLC0415  # only a terminal needs it
+
+    with Console(stderr=True).status("looking for nodes") as status:
+        yield lambda node: status.update(f"looking for nodes: {node}")
+
+
+def _record(found: Found) -> dict[str, Any]:
+    info = found.info
+    return {
+        "node": found.node,
+        "version": info and _version(info),
+        "product_id": info and info.product_id,
+        "serial_number": info and info.serial_number,
+        "t1_delay": info and info.t1_delay,
+        "t2_delay": info and info.t2_delay,
+        "position_type": info and _position_type(info.position_type),
+        "seconds": round(found.seconds, 6),
+    }
+
+
+def _version(info: Any) -> str:
+    return f"{info.version_major}.{info.version_minor}"
+
+
+def _position_type(value: int) -> str | int:
+    return PositionType(value).name.lower() or value
+
+
+def _table(found: list[Found]) -> Table:
+    table = Table(
+        ["node", "version", "product", "serial", "answer time", "note"],
+        right=frozenset({"node", "version", "product", "serial", "answer time"}),
+    )
+    for each in found:
+        time, info = f"{each.seconds * 1000:.2f} ms", each.info
+        if info is None:
+            table.add(each.node, None, None, None, time, "does not support node_info")
+        else:
+            table.add(each.node, _version(info), info.product_id, info.serial_number, time, None)
+    return table

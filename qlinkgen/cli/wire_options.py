@@ -1,0 +1,187 @@
+"""What the commands on a port share: their options, which protocols and nodes they take, opening the port."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple, cast
+
+import click
+
+from qlinkgen._resources import schemas_dir
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.common import find_schema
+from qlinkgen.link.echo import PROBE, EchoMode
+from qlinkgen.link.master import Accepts
+from qlinkgen.model.frame import DelimitedFrame, PacketFrame
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import whole_number
+from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.port import Port
+
+_KINDS = {
+    "master_slave": "has answers that only make sense beside their request",
+    "ring": "is a ring",
+    "host": "has one host and one device",
+}
+
+
+def seconds(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:  # noqa: ARG001
+    """A finite number of seconds, 0 or more; a callback of click."""
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0 <= number < math.inf:
+        raise Failure(f"{parameter.opts[-1]} {text}: no number of seconds; give 0 or more, such as 0.05")
+    return number
+
+
+baud_option = click.option(
+    "--baud",
+    type=click.IntRange(1, 100_000_000),
+    metavar="N",
+    help="Speed of the line; that of the schema unless given.",
+)
+attempts_option = click.option(
+    "--attempts",
+    type=click.IntRange(1, 1000),
+    default=3,
+    show_default=True,
+    metavar="N",
+    help="How often a request is sent at most, all tries counted.",
+)
+slack_option = click.option(
+    "--slack",
+    callback=seconds,
+    metavar="SECONDS",
+    help="Time that this computer and the adapter may add to an answer; what the port says unless given.",
+)
+echo_option = click.option(
+    "--echo",
+    type=click.Choice(["auto", "expect", "none"]),
+    help="Whether the adapter hands back what is sent; auto finds out with two bytes 00, and is the default "
+    "where frames begin with a preamble.",
+)
+
+
+class Line(NamedTuple):
+    """How bytes are framed on the line."""
+
+    parity: Any = "none"
+    stop_bits: Any = 1
+
+
+parity_option = click.option(
+    "--parity",
+    type=click.Choice(["none", "even", "odd"]),
+    default="none",
+    show_default=True,
+    help="Parity bit.",
+)
+stop_bits_option = click.option(
+    "--stop-bits",
+    type=click.Choice(["1", "2"]),
+    default="1",
+    show_default=True,
+    help="Stop bits.",
+)
+
+
+def line_of(parity: str, stop_bits: str) -> Line:
+    """The options of a byte, as a port takes them."""
+    return Line(parity, int(stop_bits))
+
+
+def open_line(name: str, baud: int, line: Line = Line()) -> Port:  # noqa: B008  # immutable
+    """Open a port. Raises PortError, and Failure for a name that can be none."""
+    try:
+        return open_port(name, baud=baud, parity=line.parity, stop_bits=line.stop_bits)
+    except ValueError as error:
+        raise Failure(str(error)) from None
+
+
+def speed(protocol: Protocol, given: int | None) -> int:
+    """The speed of the line: what was given, else that of the schema."""
+    baud = given or protocol.bus.baud
+    if baud is None:
+        raise Failure(f"the schema of {protocol.name} names no usual speed; give --baud N")
+    return baud
+
+
+def check_master_slave(protocol: Protocol, command: str) -> None:
+    """Refuse a protocol that is not of the kind where one master asks and nodes answer."""
+    if protocol.bus.kind == "master_slave" and not isinstance(protocol.frame, PacketFrame):
+        return
+    raise Failure(
+        f"{protocol.name} {_KINDS[protocol.bus.kind]}; `qlinkgen {command}` works with protocols where one "
+        "master asks and nodes answer (bus kind master_slave): qlink, or a schema of your own"
+    )
+
+
+def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
+    """What was given; else a search, unless its bytes could be taken for the beginning of a frame."""
+    if given is not None:
+        return cast(EchoMode, given)
+    searched = isinstance(protocol.frame, DelimitedFrame) and protocol.frame.preamble
+    return "auto" if searched and not searched.startswith(PROBE[:1]) else "none"
+
+
+def counted(number: int, what: str) -> str:
+    """``1 request``, ``2 requests``."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def is_qlink(name: str) -> bool:
+    """Whether a PROTOCOL is the Q.link that ships, so that what was written for it alone can be used."""
+    return name == "qlink" or find_schema(name).resolve() == (schemas_dir() / "qlink.yaml").resolve()
+
+
+def matching(name: str) -> Mapping[str, Accepts] | None:
+    """What is known of the answers of a PROTOCOL beyond their shape."""
+    if not is_qlink(name):
+        return None
+    from qlinkgen.protocols.qlink.matching import ACCEPTS  # noqa: PLC0415  # for Q.link alone
+
+    return ACCEPTS
+
+
+def select_crc(crc: str | None) -> None:
+    """Make the shipped Q.link use another checksum, if one is wanted."""
+    if crc is None:
+        return
+    from qlinkgen_codecs import qlink  # noqa: PLC0415  # not every command on a port is for Q.link
+
+    try:
+        qlink.select_crc(crc)
+    except ValueError as error:
+        raise Failure(f"--set crc={crc}: {error}") from None
+
+
+def parse_nodes(text: str, first: int, last: int) -> list[int]:
+    """Node numbers of a text such as 3, 1-16 or 1,3,5-7; in rising order."""
+    nodes: list[int] = []
+    for part in text.split(","):
+        low, dash, high = (piece.strip() for piece in part.partition("-"))
+        begin, end = whole_number(low), whole_number(high) if dash else whole_number(low)
+        if begin is None or end is None:
+            raise Failure(
+                f"--nodes {text}: '{part.strip()}' is no node; write for example 3, 1-16 or 1,3,5-7"
+            )
+        if not first <= begin <= end <= last:
+            fix = f"nodes are {first}..{last}" if begin <= end else f"write {end}-{begin}"
+            raise Failure(f"--nodes {text}: {part.strip()} cannot be; {fix}")
+        if double := set(nodes) & set(range(begin, end + 1)):
+            raise Failure(f"--nodes {text}: node {min(double)} stands there twice; name each once")
+        nodes += range(begin, end + 1)
+    return sorted(nodes)
+
+
+def qlink_node(context: click.Context, parameter: click.Parameter, text: str) -> int:  # noqa: ARG001
+    """The node number of ``--node`` on Q.link; a callback of click."""
+    node = whole_number(text)
+    if node is None or not 1 <= node <= 16:
+        raise Failure(f"--node {text}: no node; nodes are 1..16")
+    return node

@@ -1,0 +1,163 @@
+"""`qlinkgen load`: a program arrives whole, once, or the message says how much of it has."""
+
+from __future__ import annotations
+
+import re
+import signal
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.protocols.qlink import VirtualNode
+from qlinkgen.protocols.qlink.hexfile import read_hex
+from qlinkgen.sim import FaultPlan
+from qlinkgen_codecs import qlink
+from tests.cli.conftest import Run
+from tests.cli.wire import CALM, PATIENCE, bus, call, end, on_terminal, started, wait_for
+
+
+def record(address: int, kind: int, data: bytes) -> str:
+    body = bytes([len(data), *address.to_bytes(2, "big"), kind]) + data
+    return f":{(body + bytes([-sum(body) & 0xFF])).hex().upper()}\n"
+
+
+def size(program: Path) -> int:
+    return len(read_hex(program).text)
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Path:
+    """A program of 1 KiB."""
+    file = tmp_path / "program.hex"
+    rows = [record(16 * row, 0, bytes([row % 256] * 16)) for row in range(64)]
+    file.write_text("".join([*rows, record(0, 1, b"")]))
+    return file
+
+
+def test_a_program_arrives(program: Path) -> None:
+    node = VirtualNode(3)
+    with bus(node) as running:
+        done = call("load", running.path, "--node", "3", program, *CALM)
+    text = read_hex(program).text
+    assert done.returncode == 0
+    pieces = -(-len(text) // 25)
+    assert re.fullmatch(
+        rf"node 3: {len(text)} bytes in {pieces} pieces, 0 repeats, \d+\.\d\d s\n", done.stdout
+    )
+    lines = done.stderr.splitlines()
+    assert len(lines) == 10
+    assert lines[-1] == f"node 3: {len(text)} of {len(text)} bytes"
+    assert node.program is not None
+    assert node.program.segments == read_hex(program).segments
+
+
+def test_lost_answers_are_repeats(program: Path, qlinkgen: Run) -> None:
+    node = VirtualNode(3)
+    with bus(node, faults=FaultPlan(drop=0.2, seed=4)) as running:
+        result = qlinkgen("load", running.path, "--node", "3", program, "--slack", "0.05", "--patience", "60")
+    assert result.code == 0
+    found = re.search(r" (\d+) repeats?,", result.out)
+    assert found
+    assert int(found[1]) > 0
+    assert node.program is not None
+    assert node.program.segments == read_hex(program).segments
+
+
+def test_a_silent_node(program: Path, qlinkgen: Run) -> None:
+    with bus(VirtualNode(3)) as running:
+        result = qlinkgen(
+            "load", running.path, "--node", "4", program, "--slack", "0.01", "--patience", "0.1"
+        )
+    assert (result.code, result.out) == (1, "")
+    assert f"node 4: 0 of {size(program)} bytes were acknowledged" in result.err
+
+
+class Stubborn(VirtualNode):
+    """Takes some pieces and no more."""
+
+    def node_program_load(
+        self, request: qlink.NodeProgramLoadRequest, now: float
+    ) -> qlink.NodeProgramLoadResponse | None:
+        if request.counter >= 4:
+            return None
+        return super().node_program_load(request, now)
+
+
+def test_ctrl_c_in_the_middle(program: Path) -> None:
+    node = Stubborn(3)
+    with bus(node) as running:
+        command = ("load", running.path, "--node", "3", program, "--slack", "0.2", "--patience", "1000")
+        with started(*command) as process:
+            wait_for(lambda: node.statistics.requests > 6)
+            code, out, err = end(process, signal.SIGINT)
+        assert (code, out) == (130, "")
+        assert f"interrupted: node 3 has acknowledged 100 of {size(program)} bytes and holds a part" in err
+        assert "load it again, from the start" in err
+        assert "Traceback" not in err
+        done = call("send", running.path, "qlink", "motor_position", "--node", "3", *CALM)
+        assert done.returncode == 0
+
+
+def test_a_port_that_is_lost_in_the_middle(program: Path) -> None:
+    node = Stubborn(3)
+    with bus(node) as running:
+        command = ("load", running.path, "--node", "3", program, "--slack", "0.2", "--patience", "1000")
+        with started(*command) as process:
+            wait_for(lambda: node.statistics.requests > 6)
+            running.close()
+            out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out) == (1, b"")
+    assert f"{running.path} was lost".encode() in err
+    assert f"node 3 has acknowledged 100 of {size(program)} bytes and holds a part".encode() in err
+
+
+def test_a_bar_on_a_terminal(program: Path) -> None:
+    with bus(VirtualNode(3)) as running:
+        code, out, shown = on_terminal("load", running.path, "--node", "3", program, *CALM)
+    assert code == 0
+    assert "node 3" in shown
+    assert "\x1b[" in shown
+    assert out.startswith(f"node 3: {size(program)} bytes in ")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "empty"),
+        (":0100000001FD\n:00000001FF\n", "checksum FD, must be FE"),
+        (":0100000001FE\n", "no end record; a program ends in :00000001FF"),
+        ("no hex\n", "a record begins with ':'"),
+    ],
+)
+def test_a_wrong_file_is_found_before_the_port_is_opened(
+    qlinkgen: Run, tmp_path: Path, text: str, words: str
+) -> None:
+    file = tmp_path / "wrong.hex"
+    file.write_text(text)
+    result = qlinkgen("load", "/dev/not-there", "--node", "3", file)
+    assert (result.code, result.out) == (1, "")
+    assert words in result.err
+    assert str(file) in result.err
+    assert "there is no port" not in result.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (("--node", "17"), 2, "--node 17: no node; nodes are 1..16"),
+        (("--node", "x"), 2, "--node x: no node"),
+        ((), 2, "Missing option '--node'"),
+        (("--node", "3", "--patience", "-1"), 2, "--patience -1: no number of seconds"),
+        (("--node", "3"), 1, "there is no port '/dev/not-there'"),
+    ],
+)
+def test_errors(qlinkgen: Run, program: Path, arguments: tuple[str, ...], code: int, text: str) -> None:
+    result = qlinkgen("load", "/dev/not-there", program, *arguments)
+    assert (result.code, result.out) == (code, "")
+    assert text in result.err
+
+
+def test_a_file_that_is_not_there(qlinkgen: Run, tmp_path: Path) -> None:
+    result = qlinkgen("load", "/dev/not-there", tmp_path / "nothing.hex", "--node", "3")
+    assert result.code == 2
+    assert "nothing.hex: No such file or directory" in result.err

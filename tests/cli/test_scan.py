@@ -1,0 +1,93 @@
+"""`qlinkgen scan`: who is there."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.protocols.qlink import VirtualNode
+from tests.cli.conftest import Run
+from tests.cli.wire import CALM, bus, call, on_terminal, simulated
+
+
+def test_table() -> None:
+    with simulated("qlink", "--nodes", "1,3,16") as (path, _):
+        done = call("scan", path, "--nodes", "1,3,16", *CALM)
+    assert (done.returncode, done.stderr) == (0, "")
+    head, rule, *rows = done.stdout.splitlines()
+    assert head.split("  ")[0] == "node"
+    assert "answer time" in head
+    assert set(rule) == {"-", " "}
+    found = [re.fullmatch(r" *(\d+) +1\.0 +0 +(\d+) +\d+\.\d\d ms", row) for row in rows if row]
+    assert [row and row.groups() for row in found] == [("1", "1001"), ("3", "1003"), ("16", "1016")]
+
+
+def test_json_and_a_node_without_node_info() -> None:
+    mute = VirtualNode(5, unsupported=["node_info"])
+    known = VirtualNode(2, version=(2, 7), product_id=99, serial_number=12345, t1_delay=0.3, position_type=77)
+    with bus(mute, known) as running:
+        done = call("scan", running.path, "--nodes", "2,4-5", "--json", "--slack", "1")
+        table = call("scan", running.path, "--nodes", "5", "--slack", "1")
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    seconds = [each.pop("seconds") for each in found]
+    assert all(0 <= each < 2 for each in seconds)
+    assert found[0] == {
+        "node": 2,
+        "version": "2.7",
+        "product_id": 99,
+        "serial_number": 12345,
+        "t1_delay": 0.3,
+        "t2_delay": 1.0,
+        "position_type": 77,
+    }
+    assert found[1] == {**dict.fromkeys(found[0]), "node": 5}
+    assert "does not support node_info" in table.stdout
+
+
+def test_nobody(qlinkgen: Run) -> None:
+    with bus(VirtualNode(3)) as running:
+        result = qlinkgen("scan", running.path, "--nodes", "1-2", "--slack", "0.05")
+    assert (result.code, result.out) == (1, "")
+    assert f"no node answers on {running.path}; check power, wiring and --baud" in result.err
+
+
+def test_progress_on_a_terminal() -> None:
+    with simulated("qlink", "--nodes", "1-2") as (path, _):
+        code, out, shown = on_terminal("scan", path, "--nodes", "1-2", *CALM)
+    assert code == 0
+    assert "looking for nodes" in shown
+    assert "looking" not in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (("/dev/not-there",), 1, "there is no port '/dev/not-there'"),
+        (("",), 2, "give a device such as /dev/ttyUSB0, or a URL"),
+        (("/dev/null",), 1, "is no serial port"),
+        (("nonsense://x",), 1, "nonsense://x"),
+        (("x", "--nodes", "0-3"), 2, "nodes are 1..16"),
+        (("x", "--slack", "-1"), 2, "--slack -1: no number of seconds"),
+        (("x", "--slack", "nan"), 2, "--slack nan: no number of seconds"),
+        (("x", "--set", "crc=nope"), 2, "no 16-bit CRC is called 'nope'"),
+    ],
+)
+def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str) -> None:
+    result = qlinkgen("scan", *arguments)
+    assert (result.code, result.out) == (code, "")
+    assert text in result.err
+
+
+def test_a_full_disk_leaves_a_usable_bus() -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    with simulated("qlink") as (path, _):
+        with Path("/dev/full").open("wb") as full:
+            done = call("scan", path, "--nodes", "1", *CALM, stdout=full)
+        assert done.returncode == 1
+        assert "No space left on device" in done.stderr
+        assert "Traceback" not in done.stderr
+        assert call("scan", path, "--nodes", "1", *CALM).returncode == 0

@@ -1,0 +1,261 @@
+"""`qlinkgen send`: one transaction, written as for encode and printed as by decode."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.backends.python import load
+from qlinkgen.protocols.qlink import VirtualNode
+from qlinkgen.schema import load as load_schema
+from qlinkgen.sim import Wire
+from qlinkgen.sim.pty_bus import PtyBus
+from qlinkgen.transport import PtyPort, open_port, open_pty
+from qlinkgen_codecs import qlink
+from tests.cli.conftest import Run
+from tests.cli.wire import CALM, PATIENCE, REPOSITORY, bus, call, objects, simulated
+
+SCHEMAS = REPOSITORY / "tests" / "schemas"
+
+
+@pytest.fixture
+def silent() -> Iterator[PtyPort]:
+    """A port at which nobody answers."""
+    with open_pty() as port:
+        yield port
+
+
+def test_as_processes() -> None:
+    with simulated("qlink", "--nodes", "3") as (path, _):
+        done = call("send", path, "qlink", "motion", "--node", "3", "counter=9", "segments=5,6", *CALM)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert objects(done.stdout) == [
+            {
+                "message": "motion.response",
+                "node": 3,
+                "fields": {"counter": 9, "inputs": 0, "position": 0, "motor_status": 2, "fifo_space": 46},
+            }
+        ]
+        started = call("send", path, "qlink", "node_start", "--node", "0")
+        assert (started.returncode, started.stdout, started.stderr) == (0, "", "")
+
+
+def test_the_counter_is_used_as_it_is(qlinkgen: Run) -> None:
+    node = VirtualNode(3, record=True)
+    with bus(node) as running:
+        for counter in (200, 200, 7):
+            arguments = ("motion", "--node", "3", f"counter={counter}", "segments=1")
+            found = json.loads(qlinkgen("send", running.path, "qlink", *arguments, *CALM).out)
+            assert found["fields"]["counter"] == counter
+    assert (node.statistics.motions, node.statistics.duplicates) == (2, 1)
+
+
+def test_every_way_to_say_it(qlinkgen: Run) -> None:
+    with bus() as running:
+        for words in (
+            ("motor_position", "--node", "1"),
+            ("motor_position.request", "--address", "0x01"),
+            ("motor_position", "--json", "{}", "--node", "1"),
+            ("--json", '{"message": "motor_position.request", "node": 1, "fields": {}}'),
+        ):
+            result = qlinkgen("send", running.path, "qlink", *words, *CALM)
+            assert (result.code, result.err) == (0, "")
+            assert json.loads(result.out) == {
+                "message": "motor_position.response",
+                "node": 1,
+                "fields": {"position": 0},
+            }
+
+
+def test_a_renumbered_node_may_answer_with_its_new_number(qlinkgen: Run) -> None:
+    node = VirtualNode(3)
+    with bus(node) as running:
+        result = qlinkgen("send", running.path, "qlink", "node_setup", "--node", "3", "node_number=9", *CALM)
+    assert json.loads(result.out)["node"] == 9
+    assert node.number == 9
+
+
+def test_no_answer(qlinkgen: Run, silent: PtyPort) -> None:
+    request = ("qlink", "motor_position", "--node", "4", "--slack", "0.05", "--echo", "none")
+    result = qlinkgen("send", silent.path, *request)
+    assert (result.code, result.out) == (1, "")
+    assert "motor_position.request to node 4: no answer; sent 3 times" in result.err
+    frame = qlink.MotorPositionRequest(node=4).to_frame()
+    assert silent.read(0) == 3 * frame
+    result = qlinkgen("send", silent.path, *request, "--attempts", "1")
+    assert "sent once" in result.err
+    assert silent.read(0) == frame
+
+
+def test_what_must_not_be_repeated_is_sent_once(qlinkgen: Run, silent: PtyPort) -> None:
+    request = ("motor_request", "--node", "4", "motor_data=01", "--slack", "0.05", "--echo", "none")
+    assert qlinkgen("send", silent.path, "qlink", *request, "--attempts", "5").code == 1
+    assert silent.read(0) == qlink.MotorRequestRequest(node=4, motor_data=b"\x01").to_frame()
+
+
+class Reciter:
+    """A station that has one answer to everything."""
+
+    def __init__(self, answer: bytes) -> None:
+        self._answer = answer
+        self._due = False
+
+    def receive(self, data: bytes, now: float) -> None:
+        self._due = True
+
+    def bytes_to_send(self, now: float) -> bytes:
+        answer, self._due = self._answer if self._due else b"", False
+        return answer
+
+    def next_timer(self) -> float | None:
+        return 0.0 if self._due else None
+
+
+@contextlib.contextmanager
+def reciting(answer: bytes) -> Iterator[str]:
+    wire = Wire(baud=None)
+    wire.attach(Reciter(answer))
+    with PtyBus(wire) as running:
+        yield running.path
+
+
+def test_a_wrong_answer(qlinkgen: Run) -> None:
+    request = (
+        "qlink",
+        "motor_position",
+        "--node",
+        "4",
+        "--slack",
+        "0.3",
+        "--attempts",
+        "1",
+        "--echo",
+        "none",
+    )
+    good = qlink.MotorPositionResponse(node=4, position=1).to_frame()
+    with reciting(good[:-1] + bytes([good[-1] ^ 1])) as path:
+        result = qlinkgen("send", path, *request)
+        assert (result.code, result.out) == (1, "")
+        assert "what came was no answer (crc)" in result.err
+    with reciting(qlink.MotorPositionResponse(node=5, position=1).to_frame()) as path:
+        result = qlinkgen("send", path, *request)
+        assert (result.code, result.out) == (1, "")
+        assert 'is no answer: {"message": "motor_position.response", "node": 5' in result.err
+
+
+def test_a_refusal_of_the_schema_is_shown(qlinkgen: Run) -> None:
+    file = SCHEMAS / "modbus_rtu.yaml"
+    codec = load(load_schema(file))
+    refusal = codec.MESSAGES["read_input_registers_exception"](address=7, code=2)
+
+    with reciting(refusal.to_frame()) as path:
+        request = ("read_input_registers", "--node", "7", "start=1")
+        result = qlinkgen("send", path, file, *request, "--attempts", "1", "--slack", "0.3")
+    assert result.code == 1
+    assert (
+        '"read_input_registers_exception", "address": 7, "fields": {"code": "illegal_data_address"}'
+        in result.err
+    )
+
+
+def test_a_port_that_goes_away(qlinkgen: Run, silent: PtyPort) -> None:
+    def unplug() -> None:
+        silent.read(PATIENCE)
+        silent.close()
+
+    other = threading.Thread(target=unplug)
+    other.start()
+    result = qlinkgen("send", silent.path, "qlink", "motor_position", "--node", "4", *CALM)
+    other.join()
+    assert (result.code, result.out) == (1, "")
+    assert f"{silent.path} was lost" in result.err
+
+
+def test_two_commands_at_one_port(qlinkgen: Run) -> None:
+    with bus() as running, open_port(running.path):
+        done = call("send", running.path, "qlink", "motor_position", "--node", "1")
+        assert (done.returncode, done.stdout) == (1, "")
+        assert f"{running.path} is in use by" in done.stderr
+        assert f"(process {os.getpid()})" in done.stderr
+    with bus() as running:
+        assert call("send", running.path, "qlink", "motor_position", "--node", "1", *CALM).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("qlink", "motion", "--node", "3", "counter=256"), "counter: 256 cannot be sent"),
+        (("qlink", "motion", "--node", "17"), "node: 17 cannot be sent"),
+        (("qlink", "motion"), "does not say for whom"),
+        (("qlink", "motion", "--node", "0"), "motion cannot be broadcast"),
+        (("qlink", "motion", "--node", "3", "nonsense=1"), "motion.request has no field 'nonsense'"),
+        (("qlink", "moition", "--node", "3"), "did you mean motion"),
+        (
+            ("qlink", "motion.response", "--node", "3"),
+            "motion.response is what a node answers; send its request",
+        ),
+        (("qlink",), "Missing argument 'MESSAGE'"),
+        (("qlink", "motor_position", "--node", "3", "--attempts", "0"), "--attempts"),
+        (("qlink", "motor_position", "--node", "3", "--slack", "inf"), "--slack inf: no number of seconds"),
+        (("qlink", "motor_position", "--node", "3", "--baud", "0"), "--baud"),
+        (
+            ("trio", "keypad_mode"),
+            "trio is a ring; `qlinkgen send` works with protocols where one master asks",
+        ),
+        (("mc1231a", "get_pos"), "mc1231a has one host and one device"),
+        ((SCHEMAS / "kitchen_sink.yaml", "hello", "--node", "3"), "hello belongs to no command"),
+        ((SCHEMAS / "modbus_rtu.yaml", "write_single_register_exception", "--node", "3"), "to no command"),
+    ],
+)
+def test_what_cannot_be_sent_is_refused_first(
+    qlinkgen: Run, silent: PtyPort, arguments: tuple[str, ...], text: str
+) -> None:
+    result = qlinkgen("send", silent.path, *arguments)
+    assert (result.code, result.out) == (2, "")
+    assert text in result.err
+    assert silent.read(0) == b""
+
+
+def test_no_port(qlinkgen: Run) -> None:
+    result = qlinkgen("send", "/dev/not-there", "qlink", "motor_position", "--node", "3")
+    assert (result.code, result.out) == (1, "")
+    assert "there is no port '/dev/not-there'" in result.err
+
+
+def test_a_schema_without_a_speed(qlinkgen: Run, thermo: Path, silent: PtyPort) -> None:
+    result = qlinkgen("send", silent.path, thermo, "set_target", "--node", "3")
+    assert result.code == 2
+    assert "the schema of thermo names no usual speed; give --baud N" in result.err
+    with simulated(thermo, "--nodes", "3") as (path, _):
+        result = qlinkgen("send", path, thermo, "get_log", "--node", "3", "first=0", "--baud", "9600", *CALM)
+    assert result.code == 0
+    assert json.loads(result.out)["fields"] == {"samples": [], "heating": False, "level": 0}
+    assert "get_log.request is unconfirmed" in result.err
+
+
+def test_no_search_for_an_echo_without_a_preamble(qlinkgen: Run, silent: PtyPort) -> None:
+    request = ("read_input_registers", "--node", "7", "start=1", "--attempts", "1", "--slack", "0.05")
+    assert qlinkgen("send", silent.path, SCHEMAS / "modbus_rtu.yaml", *request).code == 1
+    assert silent.read(0)[:1] == b"\x07"
+    searching = ("motor_position", "--node", "4", "--attempts", "1", "--slack", "0.05")
+    assert qlinkgen("send", silent.path, "qlink", *searching).code == 1
+    assert silent.read(0)[:4] == b"\0\0\xa5\xa5"
+
+
+def test_a_full_disk_leaves_a_usable_bus() -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    request = ("qlink", "motor_position", "--node", "1", *CALM)
+    with simulated("qlink") as (path, _):
+        with Path("/dev/full").open("wb") as full:
+            done = call("send", path, *request, stdout=full)
+        assert done.returncode == 1
+        assert "No space left on device" in done.stderr
+        assert "Traceback" not in done.stderr
+        assert call("send", path, *request).returncode == 0

@@ -1,0 +1,219 @@
+"""`qlinkgen simulate`: nodes on a port of their own, and how they are stopped."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.protocols.qlink import Bus
+from qlinkgen.transport import open_port
+from qlinkgen_codecs import qlink
+from tests.cli.conftest import Run
+from tests.cli.wire import (
+    CALM,
+    COMMAND,
+    ENVIRONMENT,
+    PATIENCE,
+    REPOSITORY,
+    call,
+    end,
+    objects,
+    read_until,
+    simulated,
+    started,
+)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_the_first_line_and_the_end(tmp_path: Path, number: int) -> None:
+    link = tmp_path / "bus"
+    with started("simulate", "qlink", "--nodes", "1-16", "--link", link) as process:
+        first = read_until(process.stdout, "\n")
+        path = json.loads(first)["port"]
+        assert first == f'{{"port": "{path}"}}\n'
+        assert os.readlink(link) == path  # noqa: PTH115
+        told = read_until(process.stderr, "Ctrl-C")
+        assert told == f"qlinkgen: 16 nodes of qlink on {path}, linked as {link}; Ctrl-C ends it\n"
+        code, out, err = end(process, number)
+    assert (code, out) == (0, "")
+    assert err == "qlinkgen: 0 answers to 0 requests, 0 broadcasts\n"
+    assert not os.path.lexists(link)
+
+
+def test_ends_with_a_shell_that_ignores_ctrl_c(tmp_path: Path) -> None:
+    # A script starts its background programs so that Ctrl-C passes them by.
+    script = 'trap "" INT; "$@" & echo $! >pid; wait $!; exit $?'
+    command = ["bash", "-c", script, "bash", *COMMAND, "simulate", "qlink"]
+    with subprocess.Popen(command, cwd=tmp_path, env=ENVIRONMENT, stdout=-1, stderr=-1, bufsize=0) as shell:
+        try:
+            read_until(shell.stdout, "\n")
+            os.kill(int((tmp_path / "pid").read_text()), signal.SIGINT)
+            _, err = shell.communicate(timeout=PATIENCE)
+        finally:
+            shell.kill()
+    assert shell.returncode == 0
+    assert b"0 answers" in err
+
+
+def test_nodes_behave_as_the_document_says() -> None:
+    with simulated("qlink", "--nodes", "2,4-5") as (path, process):
+        with Bus(open_port(path), slack=10) as bus:
+            assert [bus.node(number).node_info().serial_number for number in (2, 4, 5)] == [1002, 1004, 1005]
+            bus.node(4).motion(segments=[3, 4, 5])
+            assert bus.node(4).motor_position().position == 0
+            bus.node_start(0)
+            while (status := bus.node(4).motion()).fifo_space < 48:
+                pass
+            assert status.position == 12
+        code, _, err = end(process, signal.SIGTERM)
+    assert code == 0
+    assert re.search(r"\n?qlinkgen: (\d+) answers to \1 requests, 1 broadcast\n$", err)
+
+
+def test_faults_are_counted_and_the_seed_decides_them() -> None:
+    seen = []
+    for _ in range(2):
+        options = ("--nodes", "1", "--faults", "drop=0.3,to=master", "--seed", "5")
+        with simulated("qlink", *options) as (path, process):
+            with Bus(open_port(path), slack=0.2, attempts=30, echo="none", health=None) as bus:
+                for _ in range(20):
+                    bus.node(1).motor_position()
+                total = bus.engine.total
+            _, _, err = end(process, signal.SIGTERM)
+        found = re.search(
+            r"(\d+) answers to (\d+) requests, 0 broadcasts, (\d+) faults \(drop (\d+)\); seed 5", err
+        )
+        assert found, err
+        answers, requests, faults, drops = map(int, found.groups())
+        # Who is kept waiting by the machine repeats as well; it does not change which answers are dropped.
+        assert answers <= requests
+        assert faults == drops
+        assert requests == total.requests
+        assert total.repeats >= drops > 0
+        seen.append((requests, drops))
+    if seen[0][0] == seen[1][0]:
+        assert seen[0] == seen[1]
+
+
+def test_baud_paces() -> None:
+    with simulated("qlink", "--baud", "1200") as (path, _), Bus(open_port(path, baud=1200), slack=10) as bus:
+        request = qlink.LoopBackRequest(node=1, data=bytes(20))
+        reply = bus.transact(request)
+    size = len(reply.response.to_frame()) + len(request.to_frame())
+    assert reply.elapsed >= size * 10 / 1200
+
+
+def test_echo() -> None:
+    with simulated("qlink", "--echo") as (path, _), Bus(open_port(path), slack=10) as bus:
+        assert bus.node(1).motor_position().position == 0
+        assert bus.engine._echo.mode == "expect"
+
+
+def test_another_checksum() -> None:
+    with simulated("qlink", "--set", "crc=crc-16/xmodem") as (path, _):
+        request = ("send", path, "qlink", "motor_position", "--node", "1", *CALM)
+        done = call(*request, "--set", "crc=crc-16/xmodem")
+        assert objects(done.stdout) == [
+            {"message": "motor_position.response", "node": 1, "fields": {"position": 0}}
+        ]
+        other = call(*request[:6], "--slack", "0.2")
+        assert other.returncode == 1
+        assert "no answer" in other.stderr
+
+
+@pytest.mark.parametrize(
+    ("schema", "request_", "answer"),
+    [
+        (
+            "modbus_rtu",
+            "write_single_register --node 7 number=3 value=0xBEEF",
+            {"number": 3, "value": 0xBEEF},
+        ),
+        ("modbus_rtu", "read_holding_registers --node 7 start=1 quantity=2", {"registers": [0]}),
+        ("dynamixel", "ping --node 7", {"error": "none", "model": 0, "firmware": 0}),
+    ],
+)
+def test_a_schema_of_the_user(schema: str, request_: str, answer: dict[str, object]) -> None:
+    file = REPOSITORY / "tests" / "schemas" / f"{schema}.yaml"
+    with simulated(file, "--nodes", "7") as (path, _):
+        done = call("send", path, file, *request_.split(), *CALM)
+    assert (done.returncode, done.stderr) == (0, "")
+    (found,) = objects(done.stdout)
+    command, address = request_.partition(" ")[0], "id" if schema == "dynamixel" else "address"
+    assert found == {"message": f"{command}.response", address: 7, "fields": answer}
+
+
+def test_frames_without_addresses(tmp_path: Path, qlinkgen: Run) -> None:
+    file = tmp_path / "probe.yaml"
+    file.write_text(
+        "qlinkgen: 1\n"
+        'protocol: {name: probe, title: Probe, revision: "1", source: Own design}\n'
+        "byteorder: big\n"
+        "frame:\n  parts:\n"
+        "    start: {role: constant, value: 7E}\n"
+        "    number: {role: message, type: u8}\n"
+        "    data: {role: payload, size: 0..4}\n"
+        "    sum: {role: checksum, type: u8, algorithm: sum8, over: [number, data]}\n"
+        "bus: {kind: master_slave, baud: 9600, response_within: 5 ms}\n"
+        "defaults: {repeat: safe}\n"
+        "commands:\n"
+        "  get: {id: 1, doc: Get., request: {}, response: {value: u16}}\n"
+    )
+    assert qlinkgen("lint", file).code == 0
+    refused = qlinkgen("simulate", file, "--nodes", "1")
+    assert refused.code == 2
+    assert "have no address; leave out --nodes 1" in refused.err
+    with simulated(file) as (path, _):
+        done = call("send", path, file, "get", *CALM)
+    assert objects(done.stdout) == [{"message": "get.response", "fields": {"value": 0}}]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("qlink", "--nodes", "0"), "--nodes 0: 0 cannot be; nodes are 1..16"),
+        (("qlink", "--nodes", "1-17"), "--nodes 1-17: 1-17 cannot be; nodes are 1..16"),
+        (("qlink", "--nodes", "3-1"), "write 1-3"),
+        (("qlink", "--nodes", "1-3,2"), "node 2 stands there twice"),
+        (("qlink", "--nodes", "1,"), "'' is no node"),
+        (("qlink", "--nodes", "one"), "'one' is no node; write for example 3, 1-16 or 1,3,5-7"),
+        (("trio",), "trio is a ring; `qlinkgen simulate` works with protocols where one master asks"),
+        (("mc1231a",), "mc1231a has one host and one device"),
+        (("qlink", "--faults", "dorp=1"), "did you mean drop?"),
+        (("qlink", "--faults", "drop=2"), "a chance is a number from 0 to 1"),
+        (("qlink", "--faults", "drop=0.1,seed=1", "--seed", "2"), "seed was given before"),
+        (("qlink", "--baud", "0"), "--baud"),
+        (("qlink", "--set", "crc=crc-99"), "no 16-bit CRC is called 'crc-99'"),
+        (("nothing",), "there is no schema 'nothing'"),
+    ],
+)
+def test_wrong_usage(qlinkgen: Run, arguments: tuple[str, ...], text: str) -> None:
+    result = qlinkgen("simulate", *arguments)
+    assert (result.code, result.out) == (2, "")
+    assert text in result.err
+
+
+def test_a_link_that_cannot_be_made(qlinkgen: Run, tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    result = qlinkgen("simulate", "qlink", "--link", taken)
+    assert (result.code, result.out) == (1, "")
+    assert "is there already and is no link to a pty" in result.err
+    assert taken.read_text() == "mine"
+
+
+def test_nowhere_to_say_the_port(tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    link = tmp_path / "bus"
+    with Path("/dev/full").open("wb") as full:
+        done = call("simulate", "qlink", "--link", link, stdout=full)
+    assert done.returncode == 1
+    assert "No space left on device" in done.stderr
+    assert not os.path.lexists(link)
