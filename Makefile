@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --editable
 TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py generated/python/*/*.py)))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint generate bench clean
+.PHONY: help setup demo test lint generate bench soak clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -23,7 +23,7 @@ setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' to
 	  || { echo "$(PYTHON) cannot make virtual environments; on Debian: apt-get install python3-venv"; exit 1; }
 	@echo "== setting up .venv"
 	@$(PYTHON) -m venv .venv
-	@$(PIP) .
+	@$(PIP) '.[load]'
 	@touch $@
 
 .venv/.dev: .venv/.user
@@ -31,8 +31,9 @@ setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' to
 	@$(PIP) '.[dev]'
 	@touch $@
 
-demo: .venv/.user  ## Encode and decode a message of each protocol in construct, Python and C, side by side
+demo: .venv/.user  ## A message of each protocol in construct, Python and C; then a simulated bus, moved over a pty
 	@$(BIN)/python examples/demo.py
+	@$(BIN)/python examples/bus.py
 
 test: lint  ## Lint, types, layers, drift of the generated files, then every test
 	@echo "== pytest"
@@ -55,6 +56,9 @@ generate: .venv/.user  ## Rewrite generated/ from schemas/
 bench: .venv/.user  ## Measure the generated code beside its peers
 	@$(PIP) '.[bench]'
 	@$(BIN)/python benchmarks/run.py
+
+soak: .venv/.user  ## A million transactions on a bad line, and 50 000 over a pty; writes docs/soak.md (half an hour)
+	@$(BIN)/python benchmarks/soak.py --output docs/soak.md
 
 clean:  ## Remove everything that make and the tools made
 	rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

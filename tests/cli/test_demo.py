@@ -1,4 +1,4 @@
-"""`make demo` shows three outputs that agree."""
+"""`make demo` shows three outputs that agree, and a bus that moves."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tests.cli.test_boundary import ENVIRONMENT
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
-def demo(environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, str(REPOSITORY / "examples" / "demo.py")]
+def demo(environment: dict[str, str], name: str = "demo.py") -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(REPOSITORY / "examples" / name)]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
@@ -29,3 +29,11 @@ def test_without_a_compiler() -> None:
     done = demo({**ENVIRONMENT, "PATH": "/nowhere", "CC": ""})
     assert done.returncode == 2
     assert "apt-get install gcc" in done.stderr
+
+
+def test_the_bus() -> None:
+    done = demo(ENVIRONMENT, "bus.py")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "stands at 720" in done.stdout
+    assert "a5 a5 04 03 03 75 6c" in done.stdout, "the frame that starts node 3"
+    assert "0 timeouts" in done.stdout

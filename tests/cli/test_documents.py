@@ -2,7 +2,9 @@
 
 * ``<!-- file: NAME -->`` in front of a block: the block is that file.
 * ```` ```console ````: lines behind ``$`` are run by bash in one folder, and what follows is their output; a
-  line ``...`` stands for any lines.
+  line ``...`` stands for any lines, and ``…`` in a line for any characters.
+* ``<!-- background: NAME -->`` in front of a console block: its command runs until the document ends, and
+  what stands under it is what it has printed first.
 * ```` ```pycon ````: run as a doctest.
 * ``<!-- excerpt: PATH -->`` in front of a block: it stands in the file of that path, ``...`` where lines are
   left out.
@@ -17,13 +19,24 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.cli.conftest import Run
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-DOCUMENTS = ["README.md", "docs/tutorial.md", "docs/cli.md"]
+DOCUMENTS = [
+    "README.md",
+    "docs/tutorial.md",
+    "docs/cli.md",
+    "docs/quick-start.md",
+    "docs/write-a-slave.md",
+    "docs/stream-motion.md",
+    "docs/load-firmware.md",
+    "docs/own-io.md",
+    "docs/timing.md",
+]
 MARK = r"(?:^<!-- (?P<mark>\w+): (?P<name>\S+) -->\n)?"
 BLOCK = re.compile(MARK + r"^```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -41,9 +54,40 @@ def blocks(document: str) -> list[Block]:
     return [Block(m["kind"], m["text"], m["mark"] or "", m["name"] or "") for m in BLOCK.finditer(text)]
 
 
+class Shell:
+    """Runs commands in one folder; the output is both kinds together."""
+
+    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+        self._options: dict[str, Any] = {
+            "cwd": folder,
+            "env": environment,
+            "stdout": subprocess.PIPE,
+            "stderr": subprocess.STDOUT,
+            "text": True,
+        }
+        self._background: list[subprocess.Popen[str]] = []
+
+    def __call__(self, command: str) -> str:
+        command_line = ["bash", "-c", command]
+        return str(subprocess.run(command_line, check=False, timeout=300, **self._options).stdout)
+
+    def start(self, command: str, lines: int) -> str:
+        """Start a command that goes on; what it prints first."""
+        process = subprocess.Popen(["bash", "-c", f"exec {command}"], **self._options)
+        self._background.append(process)
+        assert process.stdout is not None
+        return "".join(process.stdout.readline() for _ in range(lines))
+
+    def end(self) -> None:
+        """Stop what goes on."""
+        for process in self._background:
+            process.terminate()
+            process.communicate()
+
+
 @pytest.fixture
-def shell(tmp_path: Path) -> Callable[[str], str]:
-    """A function that runs a command in an empty folder; the output, both kinds together."""
+def shell(tmp_path: Path) -> Iterator[Shell]:
+    """An empty folder in which the installed programs are found."""
     programs = tmp_path / "bin"
     programs.mkdir()
     for name, module in (("qlinkgen", "-m qlinkgen"), ("python3", "")):
@@ -54,22 +98,12 @@ def shell(tmp_path: Path) -> Callable[[str], str]:
     environment = {
         **os.environ,
         "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
-        "PYTHONPATH": str(REPOSITORY),
+        "PYTHONPATH": os.pathsep.join([str(REPOSITORY), str(REPOSITORY / "generated" / "python")]),
     }
 
-    def run(command: str) -> str:
-        done = subprocess.run(
-            ["bash", "-c", command],
-            cwd=folder,
-            env=environment,
-            stdout=-1,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-        )
-        return done.stdout
-
-    return run
+    shell = Shell(folder, environment)
+    yield shell
+    shell.end()
 
 
 def sessions(text: str) -> Iterator[tuple[str, str]]:
@@ -84,14 +118,15 @@ def sessions(text: str) -> Iterator[tuple[str, str]]:
 
 def matches(expected: str, found: str) -> bool:
     pattern = "".join(
-        "(?:.*\n)*" if line == "..." else re.escape(line) + "\n" for line in expected.splitlines()
+        "(?:.*\n)*" if line == "..." else re.escape(line).replace("…", ".*") + "\n"
+        for line in expected.splitlines()
     )
     return re.fullmatch(pattern, found) is not None
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_commands_and_files(
-    document: str, shell: Callable[[str], str], tmp_path: Path, require_tool: Callable[..., str]
+    document: str, shell: Shell, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
     if any("gcc" in block.text for block in blocks(document) if block.kind == "console"):
         require_tool("gcc", package="gcc")
@@ -100,17 +135,23 @@ def test_commands_and_files(
             (tmp_path / "work" / block.name).write_text(block.text)
         elif block.kind == "console":
             for command, expected in sessions(block.text):
-                found = shell(command)
+                if block.mark == "background":
+                    found = shell.start(command, expected.count("\n"))
+                else:
+                    found = shell(command)
                 assert matches(expected, found), f"$ {command}\n{found}"
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
-def test_python_sessions(document: str, shell: Callable[[str], str], tmp_path: Path) -> None:
+def test_python_sessions(document: str, shell: Shell, tmp_path: Path) -> None:
     text = "".join(block.text for block in blocks(document) if block.kind == "pycon")
     if text:
         (tmp_path / "work" / "session.txt").write_text(text)
         shell("qlinkgen generate --target python -o .")
-        assert shell("PYTHONPATH=python python3 -m doctest -o NORMALIZE_WHITESPACE session.txt") == ""
+        assert (
+            shell("PYTHONPATH=python:$PYTHONPATH python3 -m doctest -o NORMALIZE_WHITESPACE session.txt")
+            == ""
+        )
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
