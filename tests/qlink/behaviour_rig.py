@@ -1,0 +1,288 @@
+"""A bus to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over a pty, with faults.
+
+A behaviour is written once, for a `Rig`. It uses the bus as a user would, and says by `rig.sure` what a user
+would try again after a LinkError.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import inspect
+import random
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeVar, cast
+
+from qlinkgen.errors import LinkError, PortLost
+from qlinkgen.link import EchoMode, Event, SlaveEngine
+from qlinkgen.protocols.qlink import AsyncBus, AsyncNode, Bus, VirtualNode
+from qlinkgen.sim import Echo, FaultPlan, VirtualPort, Wire
+from qlinkgen.sim.fault_kinds import RateLike
+from qlinkgen.sim.pty_bus import PtyBus
+from qlinkgen.transport import MemoryPort, Port, memory_pair, open_port
+from qlinkgen_codecs import qlink
+
+T = TypeVar("T")
+#: Seconds of host slack: more than the longest answer takes; in real time what a busy machine needs.
+SLACK = {"virtual": 0.012, "memory": 0.1, "pty": 0.1}
+#: An answer so late misses its deadline, and still comes while the line has to be quiet.
+LATE = (0.018, 0.024)
+HIGH = 0.15
+#: Rounds after which a call that fails again and again has failed.
+PATIENCE = 100
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Where a behaviour is tried."""
+
+    name: str
+    face: Literal["blocking", "asyncio"] = "blocking"
+    transport: Literal["virtual", "memory", "pty"] = "virtual"
+    rates: Mapping[str, RateLike] = field(default_factory=dict)
+    echo: EchoMode = "none"
+    partial: float = 0.0
+    changed: float = 0.0
+
+    @property
+    def faulty(self) -> bool:
+        """A call may fail."""
+        return bool(self.rates or self.partial or self.changed)
+
+
+CLEAN = [
+    Setting(f"{face}-{transport}", face, transport)
+    for face in ("blocking", "asyncio")
+    for transport in ("virtual", "memory", "pty")
+]
+FAULTS = [
+    *(Setting(f"faults-{kind}", rates={kind: HIGH}) for kind in ("drop", "flip", "truncate", "delay")),
+    Setting("faults-late", rates={"late": (HIGH, *LATE)}),
+    Setting("faults-duplicate", rates={"duplicate": HIGH}),
+    Setting("faults-stray", rates={"stray": 2 * HIGH}),
+    Setting("faults-noise", rates={"noise": 2 * HIGH}),
+    Setting("faults-silent", rates={"silent": (HIGH, 0.02, 0.1)}),
+    Setting("faults-mixed-asyncio", "asyncio", rates=dict.fromkeys(("drop", "flip", "stray", "noise"), 0.05)),
+]
+ECHOES = [
+    Setting("echo-expect", echo="expect"),
+    Setting("echo-auto", echo="auto"),
+    Setting("echo-partial", echo="expect", partial=HIGH),
+    Setting("echo-changed", echo="expect", changed=HIGH),
+    Setting("echo-noise", echo="expect", rates={"noise": HIGH}),
+    Setting("echo-drop", echo="expect", rates={"drop": HIGH}),
+]
+
+
+class Probe(VirtualNode):
+    """A virtual node that keeps what it heard, and can lose answers.
+
+    Attributes:
+        heard: requests, in their order.
+        mute: so many answers are lost from now on.
+        deaf: so many requests are lost from now on.
+        old_number: it answers a node_setup with the number that it had.
+    """
+
+    def __init__(self, number: int = 1, **settings: Any) -> None:
+        super().__init__(number, record=True, **settings)
+        self.heard: list[qlink.Message] = []
+        self.mute = self.deaf = 0
+        self.old_number = False
+
+    def handle(self, request: qlink.Message, now: float) -> qlink.Message | None:
+        if self.deaf:
+            self.deaf -= 1
+            return None
+        before = self.number
+        self.heard.append(request)
+        response = super().handle(request, now)
+        if response is not None and self.mute:
+            self.mute -= 1
+            return None
+        if self.old_number and isinstance(response, qlink.NodeSetupResponse):
+            response.node = before
+        return response
+
+    @property
+    def words(self) -> list[int]:
+        """Words that it has queued."""
+        assert self.record is not None
+        return self.record.words.tolist()
+
+
+class AsyncFace:
+    """Makes an AsyncBus look like a Bus."""
+
+    def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
+        self._target = target
+        self._loop = loop
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._target, name)
+        return self._wrapped(value) if inspect.ismethod(value) else value
+
+    def _wrapped(self, method: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any, **kwargs: Any) -> Any:
+            result = method(*args, **kwargs)
+            if inspect.iscoroutine(result):
+                return self._loop.run_until_complete(result)
+            if inspect.isasyncgen(result):
+                return self._iterate(result)
+            return AsyncFace(result, self._loop) if isinstance(result, AsyncNode) else result
+
+        return call
+
+    def _iterate(self, steps: Any) -> Iterator[Any]:
+        try:
+            while True:
+                yield self._loop.run_until_complete(anext(steps))
+        except StopAsyncIteration:
+            return
+        finally:
+            self._loop.run_until_complete(steps.aclose())
+
+
+class Rig:
+    """A bus, its nodes, and the clock that they share."""
+
+    def __init__(self, setting: Setting, nodes: tuple[Probe, ...], bus: Bus, wire: Wire) -> None:
+        self.setting = setting
+        self.nodes = nodes
+        self.bus = bus
+        self.wire = wire
+        self.faulty = setting.faulty
+        self.virtual = setting.transport == "virtual"
+        self.events: list[Event] = []
+
+    @property
+    def node(self) -> Probe:
+        """The first node, or the only one."""
+        return self.nodes[0]
+
+    def now(self) -> float:
+        return self.bus.port.now()
+
+    def sleep(self, seconds: float) -> None:
+        self.bus.port.sleep(seconds)
+
+    def sure(self, call: Callable[[], T]) -> T:
+        """Do what a user does: on a bad line, try again. On a good one nothing may fail."""
+        for _ in range(PATIENCE if self.faulty else 0):
+            with contextlib.suppress(LinkError):
+                return call()
+        return call()
+
+    def move(self, number: int, words: list[int], outputs: int = 0) -> qlink.MotionResponse:
+        """Hand over words that no earlier motion has; settle them where no answer comes."""
+        for _ in range(PATIENCE if self.faulty else 1):
+            try:
+                return self.bus.motion(number, outputs=outputs, segments=words)
+            except LinkError:
+                if not self.faulty:
+                    raise
+                pending = self.bus.memory.motions[number].pending
+                if pending is not None and pending.segments == words:
+                    return self.sure(lambda: self.bus.motion(number, outputs=outputs))
+        raise AssertionError("the words were never sent")
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        """Keep asking, so that time passes for the nodes as well, until something is so."""
+        for _ in range(5000):
+            self.sure(lambda: self.bus.read(self.node.number, size=1))
+            if condition():
+                return
+            self.sleep(0.01)
+        raise AssertionError("it never got so")
+
+
+@contextlib.contextmanager
+def make_rig(setting: Setting, *nodes: Probe, turnaround: float = 0.0, **options: Any) -> Iterator[Rig]:
+    """Put nodes on a line, and a bus at its outside."""
+    echo = Echo(partial=setting.partial, changed=setting.changed, seed=1) if setting.echo != "none" else False
+    plan = FaultPlan(**setting.rates, seed=7, strays=_stray) if setting.rates else None  # type: ignore[arg-type]
+    paced = setting.transport == "virtual"
+    wire = Wire(baud=115200 if paced else None, faults=plan, echo=echo, chunks="random" if paced else "frame")
+    for node in nodes:
+        wire.attach(SlaveEngine(qlink, node, turnaround=turnaround))
+    given = {"echo": setting.echo, "health": None, "slack": SLACK[setting.transport], **options}
+    with contextlib.ExitStack() as stack:
+        port = stack.enter_context(_port(setting, wire))
+        bus: Bus
+        if setting.face == "blocking":
+            bus = stack.enter_context(Bus(port, **given))
+        else:
+            runner = stack.enter_context(asyncio.Runner())
+            loop = runner.get_loop()
+            face = AsyncBus(port, **given)
+            stack.callback(face.close)
+            bus = cast(Bus, AsyncFace(face, loop))
+        yield Rig(setting, nodes, bus, wire)
+
+
+@contextlib.contextmanager
+def _port(setting: Setting, wire: Wire) -> Iterator[Port]:
+    if setting.transport == "virtual":
+        yield VirtualPort(wire, reaction=(0.0, 0.0003))
+    elif setting.transport == "pty":
+        with PtyBus(wire) as line, open_port(line.path) as port:
+            yield port
+    else:
+        near, far = memory_pair()
+        pump = Pump(wire, far)
+        pump.start()
+        try:
+            yield near
+        finally:
+            pump.stop()
+            near.close()
+
+
+class Pump(threading.Thread):
+    """Runs a line at the other end of a memory pair, in real time."""
+
+    def __init__(self, wire: Wire, port: MemoryPort) -> None:
+        super().__init__(daemon=True)
+        self._wire = wire
+        self._port = port
+        self._stopping = False
+        self._failure: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            while not self._stopping:
+                self._once()
+        except PortLost:  # the near end was closed first
+            return
+        except BaseException as failure:  # noqa: BLE001  # raised again where the pump is stopped
+            self._failure = failure
+
+    def _once(self) -> None:
+        wire, port = self._wire, self._port
+        due = wire.next_timer()
+        wait = 0.01 if due is None else min(max(0.0, due - port.now()), 0.01)
+        if data := port.read(wait):
+            wire.transmit(data, port.now())
+        if heard := wire.take(port.now()):
+            port.write(heard)
+
+    def stop(self) -> None:
+        self._stopping = True
+        self.join()
+        if self._failure is not None:
+            raise self._failure
+
+
+def _stray(chance: random.Random) -> bytes:
+    """A valid answer of a node that there is not: a node's own could be the answer to what is asked."""
+    node = chance.randrange(12, 17)
+    answers: list[qlink.Message] = [
+        qlink.MotionResponse(node=node, counter=chance.randrange(256), fifo_space=255),
+        qlink.MotorPositionResponse(node=node, position=-1),
+        qlink.ReadResponse(node=node, data=b"\xff\xff\xff"),
+        qlink.NodeProgramLoadResponse(node=node, counter=chance.randrange(256)),
+        qlink.ClearFifoResponse(node=node),
+    ]
+    return chance.choice(answers).to_frame()
