@@ -35,6 +35,7 @@ def as_text(result: Result, seconds: float) -> str:
 def _figures(result: Result) -> list[tuple[str, str]]:
     account, total = result.account, result.total
     damaged = sum(total.damaged.values())
+    none = "0" if not result.complaints else "not known"  # the first one ends a soak
     return [
         ("transactions", _n(account.asked)),
         ("... answered", _n(account.outcomes["answered"])),
@@ -49,8 +50,8 @@ def _figures(result: Result) -> list[tuple[str, str]]:
         ("damaged frames, strays, late among these", f"{_n(damaged)}, {_n(total.strays)}, {_n(total.late)}"),
         ("wrong answers accepted", _n(len(account.wrong))),
         ("frames that nobody sent and that passed the CRC", _n(account.forged + result.forged_requests)),
-        ("words of path queued, lost or queued twice", f"{_n(result.words)}, 0"),
-        ("pieces of programs stored, lost or stored twice", f"{_n(result.pieces)}, 0"),
+        ("words of path queued, lost or queued twice", f"{_n(result.words)}, {none}"),
+        ("pieces of programs stored, lost or stored twice", f"{_n(result.pieces)}, {none}"),
         ("repeats that a node recognised and did not take again", _n(result.repeats)),
         ("faults that nobody has counted", _n(account.unseen.total())),
         ("timeouts without a cause", _n(len(account.unexplained))),
