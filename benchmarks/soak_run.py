@@ -13,7 +13,7 @@ from benchmarks.soak_model import Held, Mismatch
 from benchmarks.soak_traffic import NOBODY, NUMBERS, UNSUPPORTED, Traffic
 from qlinkgen.errors import LinkError
 from qlinkgen.link import LinkCounters
-from qlinkgen.link.master import Reply
+from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.sim import FaultPlan, VirtualPort, Wire
 from qlinkgen.sim.fault_kinds import KINDS, RateLike

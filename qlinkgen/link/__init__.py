@@ -10,11 +10,12 @@ from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
-from qlinkgen.link.master import MasterEngine, Reply
+from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.monitor import Monitor
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
 from qlinkgen.link.slave import SlaveEngine, Station
 from qlinkgen.link.timing import Timing
+from qlinkgen.link.transaction import Reply
 
 __all__ = [
     "Ask",

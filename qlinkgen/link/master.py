@@ -28,8 +28,8 @@ waiting   an answer may come until the deadline       the answer -> idle; the de
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any
 
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
 from qlinkgen.link.codec import Codec, address_getter
@@ -50,6 +50,7 @@ from qlinkgen.link.events import (
 )
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.timing import Timing, check_attempts
+from qlinkgen.link.transaction import Accepts, Plan, Reply
 
 #: Events that are kept for one who does not fetch them after each transaction.
 EVENTS_KEPT = 4096
@@ -61,43 +62,6 @@ IDLE = "idle"
 GUARD = "guard"
 PROBING = "probe"
 WAITING = "waiting"
-
-
-class Reply(NamedTuple):
-    """The outcome of a transaction that did not fail."""
-
-    #: None where nothing answers.
-    response: Any
-    #: How often the request was sent.
-    attempts: int
-    #: Seconds from the call to the answer.
-    elapsed: float
-    #: When the answer came; where nothing answers, when the request was sent.
-    at: float
-    #: Seconds from sending the last attempt to the answer.
-    response_time: float
-
-
-#: Whether a response is acceptable for a request, where more is known than its shape.
-Accepts = Callable[[Any, Any], bool]
-
-
-class _Plan:
-    """What is known of a command before it is asked: looked up once, not in each transaction."""
-
-    __slots__ = (
-        "accepts", "allowance", "answer_time", "answers_broadcast", "command", "echoes", "response", "tries",
-    )  # fmt: skip
-
-    def __init__(self, command: Any, timing: Timing, accepts: Accepts | None) -> None:
-        self.command = command
-        self.response = command.response
-        self.accepts = accepts
-        self.echoes = command.echoes
-        self.answers_broadcast = command.addressing == "answered_broadcast"
-        self.allowance = timing.gap(command)
-        self.answer_time = timing.deadline(command, 0)
-        self.tries = timing.attempts_of(command)
 
 
 class MasterEngine:
@@ -131,7 +95,7 @@ class MasterEngine:
         self._bus = codec.BUS
         self.health = HealthBook(health, nobody=(None, self._bus.broadcast))
         self._plans = {
-            command.request: _Plan(command, timing, hooks.get(name))
+            command.request: Plan(command, timing, hooks.get(name))
             for name, command in codec.COMMANDS.items()
         }
         self._decoder = codec.StreamDecoder("response")
@@ -144,10 +108,10 @@ class MasterEngine:
         self._state = IDLE
         self._outcome: Reply | LinkError | None = None
         self._request: Any = None
-        self._plan: _Plan = next(iter(self._plans.values()))
+        self._plan: Plan = next(iter(self._plans.values()))
         self._node: int | None = None
         #: What was asked before, whose answer may still come.
-        self._earlier: tuple[_Plan, int | None] | None = None
+        self._earlier: tuple[Plan, int | None] | None = None
         self._frame = b""
         self._count = self.counters[None]
         self._tries = 0
@@ -231,7 +195,7 @@ class MasterEngine:
         self._state = PROBING if self._echo.mode == "auto" else GUARD
         self._probe_until = 0.0
 
-    def _tries_of(self, plan: _Plan, attempts: int) -> int:
+    def _tries_of(self, plan: Plan, attempts: int) -> int:
         check_attempts(attempts)
         return self.timing.attempts_of(plan.command, attempts)
 
@@ -409,7 +373,7 @@ class MasterEngine:
     def _is_own(self, event: Any) -> bool:
         return self._echo.is_own(event.to_frame() if hasattr(event, "to_frame") else event.raw)
 
-    def _answers(self, plan: _Plan, response: Any) -> bool:
+    def _answers(self, plan: Plan, response: Any) -> bool:
         """Whether a response of the right type answers the request."""
         request = self._request
         for name in plan.echoes:
@@ -432,7 +396,7 @@ class MasterEngine:
         count.late += late
         self.events.append(Stray(now, message, late))
 
-    def _may_answer(self, plan: _Plan, asked: int | None, message: Any) -> bool:
+    def _may_answer(self, plan: Plan, asked: int | None, message: Any) -> bool:
         """Whether a message is what a node that was asked would say, if to another attempt."""
         anybody = plan.answers_broadcast and asked == self._bus.broadcast
         return type(message) is plan.response and (anybody or self._address(message) == asked)

@@ -8,8 +8,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from qlinkgen.link.events import Event
-from qlinkgen.link.master import MasterEngine, Reply
+from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Steps
+from qlinkgen.link.transaction import Reply
 from qlinkgen.transport.conversation import MasterDriver, conversation
 from qlinkgen.transport.port import Port
 

@@ -7,8 +7,9 @@ from typing import Any
 
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.events import Event
-from qlinkgen.link.master import MasterEngine, Reply
+from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.timing import Timing
+from qlinkgen.link.transaction import Reply
 from qlinkgen.transport.port import Ability, Port
 
 #: Where a port cannot say how long it holds bytes back, the slowest of the common adapters is assumed: the

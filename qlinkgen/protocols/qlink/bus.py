@@ -11,8 +11,8 @@ from typing import TypeVar
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
-from qlinkgen.link.master import Reply
 from qlinkgen.link.procedure import FAILURES
+from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink import survey
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qlinkgen.errors import LinkError, LoadError
-from qlinkgen.link.master import Reply
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
+from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import PIECE
 from qlinkgen_codecs import qlink
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from qlinkgen.link.master import Accepts
+from qlinkgen.link.transaction import Accepts
 from qlinkgen_codecs import qlink
 
 

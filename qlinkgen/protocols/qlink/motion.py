@@ -18,8 +18,8 @@ from itertools import islice
 from typing import Any
 
 from qlinkgen.errors import LinkError
-from qlinkgen.link.master import Reply
 from qlinkgen.link.procedure import FAILURES, Ask, Pause, Procedure, Tell
+from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import WORDS
 from qlinkgen_codecs import qlink
 
@@ -64,6 +64,12 @@ class MotionState:
         )
         if fresh and unsent:
             self.pending = None
+        elif self.pending is not None:
+            words = len(self.pending.segments)
+            error.add_note(
+                f"motion {self.pending.counter} with {words} words is pending: it is sent again before the "
+                "next motion to this node, unless clear_fifo or node_reset drops it"
+            )
 
     def drop(self) -> None:
         """What is pending is not sent again, and neither is its number: a late answer to it means nothing."""

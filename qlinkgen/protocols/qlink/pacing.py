@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from qlinkgen.errors import NoReply
-from qlinkgen.link.master import Reply
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
+from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import BROADCAST
 from qlinkgen_codecs import qlink
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from qlinkgen.errors import LinkError
-from qlinkgen.link.master import Reply
 from qlinkgen.link.procedure import Ask, Procedure, Tell
+from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen_codecs import qlink
 

@@ -1,0 +1,45 @@
+"""What is asked, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from qlinkgen.link.timing import Timing
+
+
+class Reply(NamedTuple):
+    """The outcome of a transaction that did not fail."""
+
+    #: None where nothing answers.
+    response: Any
+    #: How often the request was sent.
+    attempts: int
+    #: Seconds from the call to the answer.
+    elapsed: float
+    #: When the answer came; where nothing answers, when the request was sent.
+    at: float
+    #: Seconds from sending the last attempt to the answer.
+    response_time: float
+
+
+#: Whether a response is acceptable for a request, where more is known than its shape.
+Accepts = Callable[[Any, Any], bool]
+
+
+class Plan:
+    """What is known of a command before it is asked: looked up once, not in each transaction."""
+
+    __slots__ = (
+        "accepts", "allowance", "answer_time", "answers_broadcast", "command", "echoes", "response", "tries",
+    )  # fmt: skip
+
+    def __init__(self, command: Any, timing: Timing, accepts: Accepts | None) -> None:
+        self.command = command
+        self.response = command.response
+        self.accepts = accepts
+        self.echoes = command.echoes
+        self.answers_broadcast = command.addressing == "answered_broadcast"
+        self.allowance = timing.gap(command)
+        self.answer_time = timing.deadline(command, 0)
+        self.tries = timing.attempts_of(command)
