@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -37,6 +38,7 @@ def loaded(model: Protocol, codec: ModuleType, options: Options | None = None) -
     return made
 
 
+@cache
 def stations_of(name: str) -> Any:
     return loaded(protocol(name), module(name))
 
@@ -142,6 +144,118 @@ def test_a_runtime_has_to_say_how_requests_are_sent(caller: str) -> None:
         result(calls.tell(codec.NodeStartRequest(node=1)))
 
 
+# The host's side
+
+
+HOST = {command.name: command for command in protocol("mc1231a").commands}
+HOST_CALLERS = ("HostCalls", "AxisCalls", "AsyncHostCalls", "AsyncAxisCalls")
+ON_AXIS = {name for name, command in HOST.items() if command.attributes["axis"] in ("current", "unknown")}
+
+
+def host_recorder(caller: str) -> tuple[Any, list[tuple[Any, ...]]]:
+    """An object of a class of a host's calls that notes what it is asked, and its notes."""
+    notes: list[tuple[Any, ...]] = []
+
+    def note(request: Any, response: Any, *axis: int) -> Any:
+        notes.append((request, response, *axis))
+        return response.__new__(response)
+
+    async def note_later(*given: Any) -> Any:
+        return note(*given)
+
+    used = note_later if caller.startswith("Async") else note
+    base = getattr(stations_of("mc1231a"), caller)
+    return type("Recorder", (base,), {"ask": staticmethod(used), "number": 2})(), notes
+
+
+@pytest.mark.parametrize("caller", HOST_CALLERS)
+@pytest.mark.parametrize("name", HOST)
+def test_every_command_of_a_host_can_be_called(name: str, caller: str) -> None:
+    calls, notes = host_recorder(caller)
+    one = "Axis" in caller
+    assert hasattr(calls, name) == (not one or name in ON_AXIS)
+    if not hasattr(calls, name):
+        return
+    fields = defaults("mc1231a", HOST[name].request)
+    axis = [2] if name in ON_AXIS and not one else []
+    answer = result(getattr(calls, name)(*axis, **fields))
+    response = module("mc1231a").MESSAGES[f"{name}.response"]
+    assert notes == [(build("mc1231a", HOST[name].request), response, *axis)]
+    assert type(answer) is response
+    parameters = inspect.signature(getattr(calls, name)).parameters
+    assert ("axis" in parameters) == bool(axis)
+    assert inspect.iscoroutinefunction(getattr(calls, name)) == caller.startswith("Async")
+
+
+@pytest.mark.parametrize("caller", HOST_CALLERS)
+def test_a_host_has_to_say_how_packets_are_sent(caller: str) -> None:
+    calls = getattr(stations_of("mc1231a"), caller)()
+    codec = module("mc1231a")
+    axis = () if "Axis" in caller else (2,)
+    with pytest.raises(NotImplementedError):
+        result(calls.ask(codec.GetKpRequest(), codec.GetKpResponse, *axis))
+    with pytest.raises(NotImplementedError):
+        result(calls.tell(codec.GetKpRequest(), *axis))
+
+
+def test_docstrings_of_a_host_say_what_the_schema_says() -> None:
+    calls = stations_of("mc1231a").HostCalls
+    assert "Double buffered." in calls.set_pos.__doc__
+    assert "axis: Axis that it acts on, counted from 1." in calls.set_pos.__doc__
+    assert "Axis by mask." in calls.multi_update.__doc__
+    assert "Axis current" not in calls.set_kp.__doc__
+    assert "Axis unknown." in calls.lmts_on.__doc__
+    assert "UNCONFIRMED" in calls.set_kvff.__doc__
+    assert "0.0..65535.99998474121 counts/sample in steps of 1/65536" in calls.set_vel.__doc__
+    assert "number: Number of the axis" in stations_of("mc1231a").AxisCalls.__doc__
+
+
+HOST_SCHEMA = """
+qlinkgen: 1
+protocol: {name: small_host, revision: "1", source: Made up for a test}
+frame:
+  packet:
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..4}
+    checksum: {role: checksum, type: u16, algorithm: sum16, words: 2, rejected: 0}
+bus: {kind: host}
+defaults: {repeat: safe}
+COMMANDS
+"""
+
+
+def small_host(commands: str) -> tuple[Any, Any]:
+    """Codec and stations of a small protocol of a host."""
+    model, faults = loads(HOST_SCHEMA.replace("COMMANDS", commands), "small_host.yaml")
+    assert model, faults
+    codec = load(model)
+    return codec, loaded(model, codec)
+
+
+def test_a_host_of_a_device_without_axes() -> None:
+    codec, made = small_host("commands: {go: {id: 1, request: {axis: u16}, response: {}}}")
+    assert made.__all__ == ["HostCalls", "AsyncHostCalls"]
+    notes = []
+    calls = type("Calls", (made.HostCalls,), {"ask": lambda self, *given: notes.append(given)})()
+    calls.go(axis=3)
+    assert notes == [(codec.GoRequest(axis=3), codec.GoResponse)]
+
+
+def test_a_field_may_be_called_axis_too_and_not_everything_is_answered() -> None:
+    codec, made = small_host(
+        "attributes: {axis: {values: [current, global]}}\n"
+        "commands:\n"
+        "  go: {id: 1, request: {axis: u16}, response: none, attributes: {axis: current}}\n"
+        "  halt: {id: 2, request: {}, response: none, attributes: {axis: global}}"
+    )
+    notes = []
+    calls = type("Calls", (made.HostCalls,), {"tell": lambda self, *given: notes.append(given)})()
+    calls.go(2, axis=3)
+    calls.halt()
+    assert notes == [(codec.GoRequest(axis=3), 2), (codec.HaltRequest(),)]
+    assert not hasattr(made.AxisCalls, "halt")
+
+
 # The slave's side
 
 
@@ -198,9 +312,9 @@ def test_one_handler_is_replaced_at_a_time() -> None:
 # What is written, and where
 
 
-@pytest.mark.parametrize("name", ["trio", "mc1231a"])
-def test_buses_without_a_master_have_none(name: str) -> None:
-    assert stations.generate(protocol(name), Options()) == {}
+def test_rings_have_none_and_neither_has_the_far_side_of_a_host() -> None:
+    assert stations.generate(protocol("trio"), Options()) == {}
+    assert stations.generate(protocol("mc1231a"), Options(role="slave")) == {}
 
 
 def test_a_side_and_commands_can_be_left_out() -> None:
@@ -280,7 +394,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with codecs and stations of every bus, and a program that uses them."""
     folder = tmp_path_factory.mktemp("generated")
     outputs = {**shared(), **stations.shared()}
-    for name in BUSES:
+    for name in (*BUSES, "mc1231a"):
         outputs.update(generate_codec(protocol(name), Options()))
         outputs.update(stations.generate(protocol(name), Options()))
     for path, text in outputs.items():
@@ -296,9 +410,10 @@ from __future__ import annotations
 
 from typing import TypeVar, assert_type
 
+from qlinkgen_codecs import mc1231a as chip_codec
 from qlinkgen_codecs import modbus_rtu as modbus_codec
 from qlinkgen_codecs import qlink as codec
-from qlinkgen_stations import modbus_rtu, qlink
+from qlinkgen_stations import mc1231a, modbus_rtu, qlink
 
 R = TypeVar("R", bound=codec.Message)
 
@@ -358,6 +473,29 @@ def sync(bus: Bus, node: Node, modbus: modbus_rtu.MasterCalls, modbus_node: modb
     assert_type(Slave(3).handle(codec.MotionRequest(node=3), 2.0), codec.Message | None)
 
 
+C = TypeVar("C", bound=chip_codec.Message)
+
+
+class Chip(mc1231a.HostCalls):
+    def ask(self, request: chip_codec.Message, response: type[C], axis: int | None = None) -> C:
+        return response.from_bytes(bytes(axis or 0))
+
+    def update(self, axis: int, *, check: bool = False) -> chip_codec.UpdateResponse:
+        return super().update(axis)
+
+
+def host(chip: Chip, axis: mc1231a.AxisCalls) -> None:
+    assert_type(chip.get_actl_pos(2).value, int)
+    assert_type(axis.get_vel(), chip_codec.GetVelResponse)
+    assert_type(chip.set_vel(1, value=2.75), chip_codec.SetVelResponse)
+    chip.multi_update(axes=chip_codec.Axes.AXIS_1)
+
+
+async def asynchronous_host(chip: mc1231a.AsyncHostCalls, axis: mc1231a.AsyncAxisCalls) -> None:
+    assert_type(await chip.get_status(1), chip_codec.GetStatusResponse)
+    assert_type(await axis.get_status(), chip_codec.GetStatusResponse)
+
+
 async def asynchronous(bus: qlink.AsyncMasterCalls, node: AsyncNode) -> None:
     assert_type(await bus.motion(3), codec.MotionResponse)
     assert_type(await node.motion(counter=None), codec.MotionResponse)
@@ -394,7 +532,7 @@ def test_a_module_needs_its_codecs_and_nothing_else(written: Path) -> None:
     assert rest <= {"__future__", "struct", "_struct", "binascii"}
 
 
-@pytest.mark.parametrize("name", BUSES)
+@pytest.mark.parametrize("name", [*BUSES, "mc1231a"])
 def test_lines_are_not_too_long_and_nothing_trails(written: Path, name: str) -> None:
     text = (written / f"qlinkgen_stations/{name}.py").read_text("utf-8")
     for number, line in enumerate(text.splitlines(), 1):

@@ -1,0 +1,512 @@
+"""The asking side of a host port: a device takes packets that have no frame, and answers with a checksum.
+
+A packet is a command byte and words. Nothing marks where one begins, so a byte that is lost leaves host and
+device out of step: the device waits for the rest of a packet and takes the next command for it. This engine
+never lets that pass in silence where it reads the checksums, and gets back in step by itself.
+
+It is driven like `MasterEngine` (see `qlinkgen.link.master`), and by the same drivers. States:
+
+==========  ========================================  ====================================================
+state       meaning                                   left by
+==========  ========================================  ====================================================
+idle        nothing is asked                          `start` -> ready, or guard where out of step
+ready       a packet may be sent                      bytes_to_send -> selecting, waiting, or idle where
+                                                      nothing is waited for
+selecting   the context was sent, its answer comes    right: ready; wrong, late: guard
+waiting     the request was sent, its answer comes    right: idle; wrong, late: guard for the next attempt,
+                                                      or failed -> idle after the last
+guard       out of step; the line must get quiet      quiet: filling; not quiet in time: failed -> idle
+filling     one byte was sent to complete a packet    an answer, or silence to every byte: proving;
+            that the device may wait for              silence: one more byte
+proving     a context, then the proof were sent       both right: ready; else guard, at most 5 times
+==========  ========================================  ====================================================
+
+A *context* is a request that decides what later ones act on, such as the current axis. A packet names the
+one that it needs, and it is sent before whenever it may not be in force: the first time, after another one,
+and after anything that did not fit, since the device may have taken what was left of a packet for another.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection
+from typing import Any
+
+from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
+from qlinkgen.link.events import Answered, Damaged, Failed, Sent, TimedOut
+from qlinkgen.link.host_events import Filled, HostCounters, HostEvent, InStep, OutOfStep
+from qlinkgen.link.host_rules import Asked, HostCodec, HostRules, Packet, Plan, WayBack
+from qlinkgen.link.host_timing import ROUNDS, SILENT_ROUNDS, HostTiming
+from qlinkgen.link.master import EVENTS_KEPT
+from qlinkgen.link.timing import check_attempts
+from qlinkgen.link.transaction import Reply
+
+IDLE = "idle"
+READY = "ready"
+SELECTING = "selecting"
+WAITING = "waiting"
+GUARD = "guard"
+FILLING = "filling"
+PROVING = "proving"
+
+
+class HostEngine:
+    """The host of one device.
+
+    Attributes:
+        codec: the generated module of the protocol.
+        timing: every deadline.
+        events: what happened, oldest first; the driver takes them out.
+        verbose: events tell of each request and answer too, not only of what went wrong.
+        count: counts of what happened.
+        in_step: host and device agree on where a packet begins, as far as is known.
+        context: class of the context in force, None where that is not known.
+    """
+
+    def __init__(
+        self,
+        codec: HostCodec,
+        timing: HostTiming,
+        rules: HostRules,
+        *,
+        checked: Collection[str] | None = None,
+    ) -> None:
+        """`checked` are the names of the commands whose checksum is read; all of them unless given."""
+        self.codec = codec
+        self.timing = timing
+        self.rules = rules
+        self.events: deque[HostEvent] = deque(maxlen=EVENTS_KEPT)
+        self.verbose = True
+        self.count = HostCounters()
+        self.in_step = True
+        self.context: type[Any] | None = None
+        self._plans = {
+            command.request: Plan(command, timing, rules, check=checked is None or name in checked)
+            for name, command in codec.COMMANDS.items()
+        }
+        self._byte_time = timing.byte_time
+        self._decode = codec.decode_response
+        self._misfits = codec.DecodeError
+        self._check_size = self._plans[type(rules.proof)].check_size
+        longest = max(command.request.MAX_WIRE_SIZE for command in codec.COMMANDS.values())
+        self._most_fills = timing.fills(longest)
+        self._state = IDLE
+        self._outcome: Reply | LinkError | None = None
+        # The packet of the transaction; what is asked at this moment: the same, a context, or the proof.
+        self._packet = Packet(None)
+        self._wanted = self._sendable(rules.proof)
+        self._asked = self._wanted
+        self._asked_check = True
+        self._listening = False
+        self._need = 0
+        self._buffer = b""
+        #: When everything has left that was handed over.
+        self._free_at = 0.0
+        #: Bytes to come that nobody reads, and until when they must have come.
+        self._owed = 0
+        self._owed_until = 0.0
+        self._tries = 0
+        self._attempt = 0
+        self._started = 0.0
+        self._sent_at = 0.0
+        self._deadline = 0.0
+        self._quiet_at = 0.0
+        self._give_up_at = 0.0
+        self._way = WayBack(rules.fill)
+        #: Kind and bytes of what came in place of an answer.
+        self._wrong: list[tuple[str, bytes]] = []
+
+    # What a driver calls ------------------------------------------------------------------------------------
+
+    @property
+    def busy(self) -> bool:
+        """A transaction is under way."""
+        return self._state is not IDLE
+
+    @property
+    def total(self) -> HostCounters:
+        """Counts of what happened."""
+        return self.count
+
+    def start(self, request: Any, now: float, *, attempts: int | None = None, trial: bool = False) -> None:
+        """Begin a transaction.
+
+        Args:
+            request: message of the generated module, or a Packet.
+            now: time.
+            attempts: how often it is sent at most; that of the timing unless given. A request that must not
+                be repeated is sent once whatever stands here.
+            trial: of no meaning to a host; the drivers hand it to every engine.
+
+        Raises:
+            EncodeError: of the generated module; the request holds what cannot be sent.
+            TypeError: it is no request of this protocol.
+            ValueError: attempts is not 1 or more.
+            RuntimeError: another transaction is under way.
+        """
+        del trial
+        if self._state is not IDLE:
+            raise RuntimeError("a transaction is under way; a host does one at a time")
+        packet = request if type(request) is Packet else Packet(request)
+        plan = self._plans.get(type(packet.request))
+        if plan is None:
+            name = type(packet.request).__name__
+            raise TypeError(f"{name} was given; a request of this protocol is needed")
+        tries = plan.tries
+        if attempts is not None:
+            tries = self.timing.attempts_of(plan.command, check_attempts(attempts))
+        self._wanted = Asked(packet.request, plan, packet.request.to_frame())
+        self._packet = packet
+        self._tries = tries
+        self._attempt = 0
+        self._started = now
+        self._way.rounds = self._way.silent = 0
+        self._outcome = None
+        if self._wrong:
+            self._wrong = []
+        if self._owed and now > self._owed_until:
+            self._out_of_step(now, None, "checksums that were not to be read have not come")
+        if self.in_step:
+            self._state = READY
+        else:
+            self._guard(self._quiet_at, now)
+
+    def bytes_to_send(self, now: float) -> bytes:
+        """Return what the driver has to write now."""
+        state = self._state
+        if state is READY:
+            return self._send(now)
+        if state is GUARD and now >= self._quiet_at:
+            return self._send_fill(now)
+        if state is PROVING and not self._listening:
+            return self._ask(self._sendable(self._proving()), now, check=True)
+        return b""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that came."""
+        self._way.heard = True
+        if self._owed:
+            data = self._without_owed(data)
+            if not data:
+                return
+        if self._listening:
+            self._buffer += data
+            if len(self._buffer) >= self._need:
+                self._arrived(now)
+        else:
+            self._unasked(data, now)
+
+    def next_timer(self) -> float | None:
+        """Return when the engine has to be called again although nothing came; None: not at all."""
+        state = self._state
+        if state is IDLE:
+            return None
+        if state is GUARD:
+            return min(self._quiet_at, self._give_up_at)
+        if self._listening:
+            return self._deadline
+        return self._started  # at once: something is to be sent
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+        if self._state is GUARD:
+            if now < self._quiet_at and now >= self._give_up_at:
+                self._fail(BadReply, "the line does not get quiet: the device sends without being asked", now)
+        elif self._listening and now >= self._deadline:
+            self._timed_out(now)
+
+    def take(self) -> Reply:
+        """Return what the transaction that has just ended gave.
+
+        Raises:
+            NoReply: no answer came.
+            BadReply: only damaged or wrong answers came.
+            IllegalCommand: the device does not know the command.
+        """
+        outcome = self._outcome
+        self._outcome = None
+        if isinstance(outcome, LinkError):
+            raise outcome
+        if outcome is None:
+            raise RuntimeError("no transaction has ended")
+        return outcome
+
+    def abort(self, now: float) -> None:
+        """Give up the transaction under way: its answer may still come, and will answer nothing."""
+        state = self._state
+        if state is IDLE:
+            return
+        until = max(now, self._deadline) if self._listening else now
+        if state is not READY:
+            self._out_of_step(now, self._packet.request, "a transaction was given up", until)
+        self._state = IDLE
+        self._outcome = None
+
+    # Sending ------------------------------------------------------------------------------------------------
+
+    def _sendable(self, request: Any) -> Asked:
+        return Asked(request, self._plans[type(request)], request.to_frame())
+
+    def _send(self, now: float) -> bytes:
+        packet, wanted = self._packet, self._wanted
+        plan = wanted.plan
+        check = plan.check if packet.check is None or plan.response is None else packet.check
+        context = packet.context
+        first = b""
+        if context is not None and type(context) is not self.context:
+            self.count.contexts += 1
+            selection = self._sendable(context)
+            if check:
+                self._state = SELECTING
+                return self._ask(selection, now, check=True)
+            first = self._send_off(selection, now)
+        self._attempt += 1
+        if not check and not plan.payload:
+            frame = self._send_off(wanted, now)
+            self._succeed(plan.response and plan.response(), now)
+            return first + frame
+        self._state = WAITING
+        if self._attempt > 1:
+            self.count.repeats += 1
+        return first + self._ask(wanted, now, check=check)
+
+    def _ask(self, asked: Asked, now: float, *, check: bool) -> bytes:
+        """Send a packet and wait for its answer."""
+        plan = asked.plan
+        self.count.requests += 1
+        self._asked = asked
+        self._asked_check = check
+        self._listening = True
+        self._need = plan.payload + plan.check_size if check else plan.payload
+        self._buffer = b""
+        self._sent_at = now
+        self._deadline = self._line_up(asked, now)
+        if self.verbose:
+            attempt = self._attempt if self._state is WAITING else 1
+            self.events.append(Sent(now, None, asked.request, attempt, asked.frame))
+        return asked.frame
+
+    def _send_off(self, asked: Asked, now: float) -> bytes:
+        """Send a packet whose answer nobody reads."""
+        plan = asked.plan
+        self.count.requests += 1
+        self._sent_at = now
+        self._owed += plan.payload + plan.check_size
+        self._owed_until = self._line_up(asked, now)
+        if plan.moves:
+            self.context = plan.makes
+        if self.verbose:
+            self.events.append(Sent(now, None, asked.request, 1, asked.frame))
+        return asked.frame
+
+    def _line_up(self, asked: Asked, now: float) -> float:
+        """When the answer must be complete: behind all that is still being sent, and owed."""
+        begin = max(now, self._free_at)
+        self._free_at = begin + len(asked.frame) * self._byte_time
+        return begin + asked.plan.answer_time + self._owed * self._byte_time
+
+    # Receiving ----------------------------------------------------------------------------------------------
+
+    def _without_owed(self, data: bytes) -> bytes:
+        skipped = min(self._owed, len(data))
+        self._owed -= skipped
+        return data[skipped:]
+
+    def _unasked(self, data: bytes, now: float) -> None:
+        """Bytes have come that answer nothing."""
+        self.count.skipped += len(data)
+        if self.in_step:
+            fault = self.codec.Fault("frame", 0, data, "nothing was asked")
+            self.count.count_damaged("frame")
+            self.events.append(Damaged(now, None, fault))
+            self._out_of_step(now, None, "bytes came that nobody had asked for", received=data)
+        self._quiet_at = max(self._quiet_at, now + self.timing.quiet)
+
+    def _arrived(self, now: float) -> None:
+        """What was to come has come, and perhaps more."""
+        if self._state is FILLING:
+            self._filled()
+            return
+        asked, data, size = self._asked, self._buffer, self._need
+        plan = asked.plan
+        raw, rest = (data, b"") if len(data) == size else (data[:size], data[size:])
+        try:
+            response = self._decode(raw, asked) if self._asked_check else plan.response.from_bytes(raw)
+        except self._misfits as error:
+            self._wrong_answer(getattr(error, "kind", "frame"), data, str(error), now)
+            return
+        if plan.moves:
+            self.context = plan.makes
+        if not self._asked_check:
+            self._owed += plan.check_size
+            self._owed_until = self._deadline
+            rest = self._without_owed(rest)
+        self._listening = False
+        if self._state is WAITING:
+            self._succeed(response, now)
+            if rest:
+                self._unasked(rest, now)
+        elif rest:
+            self._wrong_answer("frame", data, f"{asked.NAME}: more came than its answer", now)
+        else:
+            self._go_on(asked, now)
+
+    def _go_on(self, asked: Asked, now: float) -> None:
+        """A context or the proof was answered as it must be."""
+        if self._state is PROVING and asked.request is self.rules.proof:
+            self.in_step = True
+            self.count.in_step += 1
+            self.count.completed += self._way.completed
+            self.events.append(InStep(now, self._way.fills, self._way.completed))
+        if self.in_step:
+            self._state = READY
+
+    # Getting back in step -----------------------------------------------------------------------------------
+
+    def _out_of_step(
+        self, now: float, request: Any, reason: str, until: float = 0.0, received: bytes = b""
+    ) -> None:
+        """Nothing that was known of the device holds any more, until it has proved otherwise."""
+        if self.in_step:
+            self.count.out_of_step += 1
+            self.events.append(OutOfStep(now, request, reason, received))
+        if self.in_step or request is not None:
+            self._way.fill = self.rules.fills.get(type(request), self.rules.fill)
+        self.in_step = False
+        self.context = None
+        self._owed = 0
+        self._listening = False
+        self._buffer = b""
+        self._quiet_at = max(now, until) + self.timing.quiet
+
+    def _guard(self, quiet_at: float, now: float) -> None:
+        """Wait for a quiet line, which it may be by now."""
+        quiet = self.timing.quiet_after(self._way.silent)
+        self._state = GUARD
+        self._way.heard = False
+        self._listening = False
+        self._quiet_at = quiet_at
+        self._give_up_at = max(now, quiet_at) + quiet + self.timing.on_wire(self.timing.longest_frame)
+        self._way.fills = 0
+        self._way.completed = False
+
+    def _guard_again(self, now: float) -> None:
+        self._guard(now + self.timing.quiet_after(self._way.silent), now)
+
+    def _send_fill(self, now: float) -> bytes:
+        """A device that waits for the rest of a packet must get it, or it takes the next command for that."""
+        byte = bytes((self._way.fill,))
+        self._state = FILLING
+        self._listening = True
+        self._buffer = b""
+        self._need = self._check_size
+        self._deadline = now + self.timing.fill_deadline(self._check_size)
+        self._way.fills += 1
+        self.count.fills += 1
+        if self.verbose:
+            self.events.append(Filled(now, self._way.fill))
+        return byte
+
+    def _filled(self) -> None:
+        """The device has answered a filling byte, or none: either way it waits for nothing any more."""
+        self._way.completed = bool(self._buffer) and self._buffer[: self._check_size] != self.rules.refusal
+        self._state = PROVING
+        self._listening = False  # the next call of bytes_to_send asks
+        self._buffer = b""
+
+    def _proving(self) -> Any:
+        """The packet that is next as a proof: two different ones, so that a late answer to one is noticed."""
+        context = self._packet.context if self._packet.context is not None else self.rules.context
+        if context is not None and self.context is not type(context):
+            return context
+        return self.rules.proof
+
+    def _lost_round(self, reason: str, error: type[LinkError], now: float) -> None:
+        """A context, or a round of getting back in step, has failed."""
+        self._out_of_step(now, self._packet.request if self._attempt else None, reason)
+        self._way.rounds += 1
+        self._way.silent += not self._way.heard
+        if self._way.rounds < ROUNDS and self._way.silent < SILENT_ROUNDS:
+            self._guard_again(now)
+        else:
+            self._fail(error, f"host and device are out of step, and did not get back: {reason}", now)
+
+    # The end of an attempt, and of a transaction ------------------------------------------------------------
+
+    def _wrong_answer(self, kind: str, data: bytes, text: str, now: float) -> None:
+        count = self.count
+        count.count_damaged(kind)
+        count.illegal += kind == "illegal"
+        self.events.append(Damaged(now, None, self.codec.Fault(kind, 0, data, text)))
+        if self._state is WAITING:
+            self._wrong.append((kind, data))
+            self._attempt_failed(text, now, data)
+        else:
+            self._lost_round(text, IllegalCommand if kind == "illegal" else BadReply, now)
+
+    def _timed_out(self, now: float) -> None:
+        state, data = self._state, self._buffer
+        if state is FILLING:
+            if self._way.fills < self._most_fills and not data:
+                self._state = GUARD  # the line is quiet: the next byte goes out at once
+                self._listening = False
+                self._quiet_at = now
+                self._give_up_at = now + 2 * self.timing.quiet
+            else:
+                self._filled()
+            return
+        self.count.timeouts += 1
+        self.events.append(TimedOut(now, None, self._asked.request, self._attempt if state is WAITING else 1))
+        if data:
+            self.count.count_damaged("truncated")
+            self.count.skipped += len(data)
+        reason = f"{self._asked.NAME}: {len(data)} of {self._need} bytes came" if data else "no answer"
+        if state is WAITING:
+            if data == self.rules.refusal:  # a device that does not know the command knows no words of it
+                self._wrong.append(("illegal", data))
+            elif data:
+                self._wrong.append(("truncated", data))
+            self._attempt_failed(reason, now, data)
+        else:
+            self._lost_round(reason, BadReply if data else NoReply, now)
+
+    def _attempt_failed(self, reason: str, now: float, data: bytes) -> None:
+        self._out_of_step(now, self._packet.request, reason, received=data)
+        if self._attempt < self._tries:
+            self._guard_again(now)
+            return
+        kinds = {kind for kind, _ in self._wrong}
+        if kinds == {"illegal"} and len(self._wrong) == self._attempt:
+            self._fail(IllegalCommand, "the device does not know this command: its checksum is 0", now)
+        elif kinds:
+            self._fail(BadReply, f"what came was no answer ({', '.join(sorted(kinds))})", now)
+        else:
+            self._fail(NoReply, "no answer", now)
+
+    def _succeed(self, response: Any, now: float) -> None:
+        self._state = IDLE
+        elapsed = now - self._started
+        self._outcome = Reply(response, self._attempt, elapsed, now, now - self._sent_at)
+        self.count.answers += 1
+        if self.verbose:
+            self.events.append(Answered(now, None, self._packet.request, response, self._attempt, elapsed))
+
+    def _fail(self, error: type[LinkError], reason: str, now: float) -> None:
+        elapsed = now - self._started
+        request = self._packet.request
+        sent = f"sent {self._attempt} times" if self._attempt != 1 else "sent once"
+        if not self._attempt:
+            sent = "it was not sent"
+        elif not self._wanted.plan.command.repeat_safe and error is not IllegalCommand:
+            sent += "; it may have been carried out, and must not be repeated blindly"
+        self._outcome = error(
+            f"{request.NAME}: {reason}; {sent}, {elapsed * 1e3:.1f} ms",
+            attempts=self._attempt,
+            elapsed=elapsed,
+            received=b"".join(raw for _, raw in self._wrong)[-64:],
+        )
+        if self.in_step:
+            self._out_of_step(now, request, reason)
+        self._state = IDLE
+        self.count.failures += 1
+        self.events.append(Failed(now, None, request, self._outcome))

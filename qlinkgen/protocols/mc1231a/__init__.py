@@ -1,0 +1,25 @@
+"""The MC1231A chip set: its host, blocking and for asyncio, and the chip set itself, simulated.
+
+`Host` and `AsyncHost` ask, `ChipSet` behind a `ChipEngine` answers. Messages and their errors are in
+`qlinkgen_codecs.mc1231a`.
+"""
+
+from __future__ import annotations
+
+from qlinkgen.protocols.mc1231a.aio import AsyncAxis, AsyncHost
+from qlinkgen.protocols.mc1231a.chip import ChipSet
+from qlinkgen.protocols.mc1231a.chip_engine import ChipCounters, ChipEngine
+from qlinkgen.protocols.mc1231a.host import Axis, Host
+from qlinkgen.protocols.mc1231a.usage import Checksum, UnconfirmedCommand
+
+__all__ = [
+    "AsyncAxis",
+    "AsyncHost",
+    "Axis",
+    "Checksum",
+    "ChipCounters",
+    "ChipEngine",
+    "ChipSet",
+    "Host",
+    "UnconfirmedCommand",
+]

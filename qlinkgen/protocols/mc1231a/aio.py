@@ -1,0 +1,139 @@
+"""The asyncio face of a host: the same methods, awaited."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+from qlinkgen.link.events import Event
+from qlinkgen.link.host import HostEngine
+from qlinkgen.link.host_rules import Packet
+from qlinkgen.protocols.mc1231a import updating
+from qlinkgen.protocols.mc1231a.facts import SELECT, check_axis
+from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine
+from qlinkgen.transport.aio import AsyncMaster
+from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.port import Port
+from qlinkgen_codecs import mc1231a
+from qlinkgen_stations.mc1231a import AsyncAxisCalls, AsyncHostCalls
+
+R = TypeVar("R", bound=mc1231a.Message)
+
+
+class AsyncHost(AsyncMaster, AsyncHostCalls):
+    """The host of a chip set, used from any number of tasks of one event loop. The rest is as in `Host`.
+
+    Example:
+        >>> async with AsyncHost.open("/dev/ttyUSB0", baud=57600) as host:  # doctest: +SKIP
+        ...     await host.axis(2).set_pos(value=0x02345678)
+        ...     await host.axis(2).update(check=True)
+
+    Attributes:
+        command_errors: update and multi_update look for the command error unless they are told otherwise.
+    """
+
+    engine: HostEngine  # type: ignore[assignment]  # the drivers use what both kinds of engine have
+
+    def __init__(
+        self,
+        port: Port,
+        *,
+        checksum: Checksum = "always",
+        attempts: int = 3,
+        command_errors: bool = False,
+        forgets: float = 0.0,
+        slack: float | None = None,
+        on_event: Callable[[Event], None] | None = None,
+    ) -> None:
+        """Take over a port; the arguments are those of `Host`."""
+        engine = make_engine(port, checksum=checksum, attempts=attempts, slack=slack, forgets=forgets)
+        super().__init__(cast(Any, engine), port, on_event=on_event)
+        self.command_errors = command_errors
+        self.usage = Usage()
+
+    @classmethod
+    def open(
+        cls,
+        name: str,
+        *,
+        baud: int,
+        checksum: Checksum = "always",
+        attempts: int = 3,
+        command_errors: bool = False,
+        forgets: float = 0.0,
+        slack: float | None = None,
+        on_event: Callable[[Event], None] | None = None,
+    ) -> AsyncHost:
+        """Open a device name or a URL of pyserial; no source names a speed. The rest as for the class.
+
+        Raises:
+            PortMissing: there is no such port.
+            PortBusy: another program has it, or this user may not open it.
+        """
+        return cls(
+            open_port(name, baud=baud),
+            checksum=checksum,
+            attempts=attempts,
+            command_errors=command_errors,
+            forgets=forgets,
+            slack=slack,
+            on_event=on_event,
+        )
+
+    def axis(self, number: int) -> AsyncAxis:
+        """Return one axis, 1 or 2."""
+        return AsyncAxis(self, number)
+
+    async def ask(
+        self,
+        request: mc1231a.Message,
+        response: type[R],  # noqa: ARG002  # for type checkers
+        axis: int | None = None,
+    ) -> R:
+        """Send a packet, for an axis if one is given, and return its answer."""
+        self.usage.note(request)
+        context = None if axis is None else SELECT[check_axis(axis)]
+        answer: R = (await self.transact(Packet(request, context))).response
+        return answer
+
+    async def raise_command_error(self, axis: int) -> int:
+        """As `Host.raise_command_error`."""
+        return await self.run(updating.raise_command_error(axis))
+
+    async def update(self, axis: int, *, check: bool | None = None) -> mc1231a.UpdateResponse:
+        """As `Host.update`."""
+        return await self.run(updating.update(axis, check=self.command_errors if check is None else check))
+
+    async def multi_update(self, *, axes: int = 0, check: bool | None = None) -> mc1231a.MultiUpdateResponse:
+        """As `Host.multi_update`."""
+        return await self.run(
+            updating.multi_update(axes, check=self.command_errors if check is None else check)
+        )
+
+
+class AsyncAxis(AsyncAxisCalls):
+    """One axis: every command that acts on the current axis, without the argument for it.
+
+    Attributes:
+        host: the host.
+        number: 1 or 2.
+    """
+
+    def __init__(self, host: AsyncHost, number: int) -> None:
+        self.host = host
+        self.number = check_axis(number)
+        self._context = SELECT[number]
+
+    async def ask(self, request: mc1231a.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
+        """Send a packet for this axis and return its answer."""
+        self.host.usage.note(request)
+        answer: R = (await self.host.transact(Packet(request, self._context))).response
+        return answer
+
+    async def raise_command_error(self) -> int:
+        """As `Host.raise_command_error`."""
+        return await self.host.raise_command_error(self.number)
+
+    async def update(self, *, check: bool | None = None) -> mc1231a.UpdateResponse:
+        """As `Host.update`."""
+        return await self.host.update(self.number, check=check)

@@ -1,0 +1,236 @@
+"""The chip set, simulated: two axes, one of them current, and what both share.
+
+Like an engine it has no clock and does no input or output: `now` comes in as an argument, in seconds. Between
+two calls everything happens that time has brought, sample by sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any, Final
+
+from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
+from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
+from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
+from qlinkgen_codecs import mc1231a
+
+#: Seconds of one sample of the trajectories; set_smpl_time has no unit, so it is only kept.
+SAMPLE_TIME: Final = 0.0005
+#: The number that get_vrsn gives; its layout was not found.
+VERSION: Final = 0x1231
+_Handler = Callable[[Any], Any]
+
+
+class ChipSet:
+    """A simulated chip set of two axes.
+
+    Attributes:
+        axes: each axis by its number.
+        current: number of the current axis.
+        illegal: names of commands that this chip set does not know.
+        time: cycles since the reset.
+        values: registers of the whole chip set.
+        home: level of the home inputs, by axis.
+    """
+
+    def __init__(self, *, illegal: Iterable[str] = (), sample_time: float = SAMPLE_TIME) -> None:
+        """`sample_time` is in seconds; `illegal` commands are answered by a checksum of 0.
+
+        Raises:
+            ValueError: there is no such command, or a sample takes no time.
+        """
+        self.illegal = frozenset(illegal)
+        if unknown := self.illegal - set(mc1231a.COMMANDS):
+            raise ValueError(f"illegal: there is no command {min(unknown)!r}; see `qlinkgen show mc1231a`")
+        if not sample_time > 0:
+            raise ValueError(f"sample_time: {sample_time} s was given; a sample takes more than 0")
+        self.home = dict.fromkeys(AXES, False)
+        self._sample_time = sample_time
+        self._started: float | None = None
+        self._samples = 0
+        self._handlers = {
+            command.request: (name, self._handler(name), _respond(command.response))
+            for name, command in mc1231a.COMMANDS.items()
+        }
+        self.axes: dict[int, ChipAxis] = {axis: ChipAxis() for axis in AXES}
+        self._reset()
+
+    def _reset(self) -> None:
+        """As after the power was switched on; what is wired to the inputs stays as it is."""
+        self.axes = {axis: ChipAxis(self.axes[axis].limits) for axis in AXES}
+        self.current = 1
+        self.time = 0
+        self.values = {"smpl_time": 0, "lmt_sense": 0}
+        self._output = mc1231a.OutputMode.PWM
+        self._interrupting: int | None = None
+        for axis in self.axes.values():
+            axis.meet_limits()
+
+    # Commands -----------------------------------------------------------------------------------------------
+
+    def knows(self, request: type[Any]) -> bool:
+        """Whether a command, by the class of its request, is legal here."""
+        return self._handlers[request][0] not in self.illegal
+
+    def handle(self, request: Any, now: float) -> Any:
+        """Do what a packet says; return its response."""
+        self.advance(now)
+        _, handler, respond = self._handlers[type(request)]
+        result = handler(request)
+        self._look_at_interrupts()
+        return respond(result)
+
+    def _handler(self, name: str) -> _Handler:
+        """What a command does, given its request: a method of the chip set, or an action of the axis."""
+        fields = mc1231a.COMMANDS[name].request.FIELDS
+        own = getattr(self, f"_do_{name}", None)
+        if own is not None:
+            return lambda request: own(*(getattr(request, field) for field in fields))
+        action = AXIS_COMMANDS[name]
+        return lambda request: action(self._axis, *(getattr(request, field) for field in fields))
+
+    @property
+    def _axis(self) -> ChipAxis:
+        return self.axes[self.current]
+
+    def _do_set_1(self) -> int:
+        self.current = 1
+        return self._axis.status
+
+    def _do_set_2(self) -> int:
+        self.current = 2
+        return self._axis.status
+
+    def _do_set_i(self) -> int:
+        if self._interrupting is not None:
+            self.current = self._interrupting
+        return self._axis.status
+
+    def _do_get_intrpt(self) -> int:
+        return self.axes[self._interrupting or self.current].status
+
+    def _do_rst_intrpt(self, mask: int) -> None:
+        if self._interrupting is not None:
+            self.axes[self._interrupting].keep_events(mask)
+            self._interrupting = None
+
+    def _do_multi_update(self, axes: int) -> None:
+        for number, axis in self.axes.items():
+            if axes >> (number - 1) & 1:
+                axis.update()
+
+    def _do_reset(self) -> None:
+        self._reset()
+
+    def _do_set_output_pwm(self) -> None:
+        self._output = mc1231a.OutputMode.PWM
+
+    def _do_set_output_dac16(self) -> None:
+        self._output = mc1231a.OutputMode.DAC16
+
+    def _do_get_output_mode(self) -> Any:
+        return self._output
+
+    def _do_set_lmt_sense(self, value: int) -> None:
+        """A bit of 1 makes an input active low: it counts as met while nothing is wired to it."""
+        changed = value ^ self.values["lmt_sense"]
+        self.values["lmt_sense"] = value
+        for number, axis in self.axes.items():
+            for place in range(2):
+                if changed >> (2 * (number - 1) + place) & 1:
+                    axis.limits[place] = not axis.limits[place]
+            axis.meet_limits()
+
+    def _do_get_lmt_swtch(self) -> int:
+        bits = [met for axis in self.axes.values() for met in axis.limits]
+        return sum(met << place for place, met in enumerate(bits))
+
+    def _do_get_home(self) -> int:
+        return sum(level << (number - 1) for number, level in self.home.items())
+
+    def _do_set_smpl_time(self, value: int) -> None:
+        self.values["smpl_time"] = value
+
+    def _do_get_smpl_time(self) -> int:
+        return self.values["smpl_time"]
+
+    def _do_get_vrsn(self) -> int:
+        return VERSION
+
+    def _do_get_time(self) -> int:
+        return self.time & 0xFFFFFFFF
+
+    # Interrupts ---------------------------------------------------------------------------------------------
+
+    @property
+    def interrupting(self) -> int | None:
+        """Number of the axis that raises the host interrupt, None while none does."""
+        return self._interrupting
+
+    def _look_at_interrupts(self) -> None:
+        """The axis that was first keeps the interrupt; of two at once it is axis 1."""
+        asking = [n for n, axis in self.axes.items() if axis.events & axis.values["intrpt_mask"]]
+        if self._interrupting not in asking:
+            self._interrupting = asking[0] if asking else None
+
+    # Time, and what is wired to the chip set ----------------------------------------------------------------
+
+    def advance(self, now: float) -> None:
+        """Let everything happen that is due by `now`."""
+        if self._started is None:
+            self._started = now
+        samples = int((now - self._started) / self._sample_time) - self._samples
+        if samples <= 0:
+            return
+        self._samples += samples
+        axes = tuple(self.axes.values())
+        while samples and not all(axis.resting for axis in axes):
+            samples -= 1
+            self.time += 1
+            for axis in axes:
+                axis.sample()
+                if axis.armed != "off":
+                    axis.look_at_breakpoint(self.time)
+            self._look_at_interrupts()
+        self.time += samples
+
+    def set_limit(self, axis: int, *, positive: bool | None = None, negative: bool | None = None) -> None:
+        """Let an axis meet a limit switch, or leave it."""
+        limits = self.axes[check_axis(axis)].limits
+        for place, met in enumerate((positive, negative)):
+            if met is not None:
+                limits[place] = met
+        self.axes[axis].meet_limits()
+        self._look_at_interrupts()
+
+    def pulse(self, axis: int, source: str) -> None:
+        """Give an axis an "index" pulse, a "home" signal, or the signal of an external breakpoint, "ext"."""
+        if source not in {"index", "home", "ext"}:
+            raise ValueError(f'source: {source!r} was given; there are "index", "home" and "ext"')
+        self.axes[check_axis(axis)].pulse(source)
+        self._look_at_interrupts()
+
+    def hold(self, axis: int, *, held: bool = True) -> None:
+        """Hold a motor, so that it does not follow its target; let go, it catches up at once."""
+        state = self.axes[check_axis(axis)]
+        state.held = held
+        if not held and state.motor_on:
+            state.lost = 0
+
+    def turn_master(self, axis: int, counts: int) -> None:
+        """Turn the master encoder of an axis in electronic gear."""
+        self.axes[check_axis(axis)].follow(counts)
+        self._look_at_interrupts()
+
+    def raise_event(self, axis: int, event: int) -> None:
+        """Set an event that nothing here brings about by itself, such as a commutation error."""
+        self.axes[check_axis(axis)].raise_event(event)
+        self._look_at_interrupts()
+
+
+def _respond(response: Any) -> Callable[[Any], Any]:
+    """How a result becomes a response: one field, or none."""
+    if not response.FIELDS:
+        return lambda _result: response()
+    (field,) = response.FIELDS
+    return lambda result: response(**{field: result})

@@ -1,0 +1,171 @@
+"""The blocking face of a host."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+from qlinkgen.link.events import Event
+from qlinkgen.link.host import HostEngine
+from qlinkgen.link.host_rules import Packet
+from qlinkgen.protocols.mc1231a import updating
+from qlinkgen.protocols.mc1231a.facts import SELECT, check_axis
+from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine
+from qlinkgen.transport.blocking import BlockingMaster
+from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.port import Port
+from qlinkgen_codecs import mc1231a
+from qlinkgen_stations.mc1231a import AxisCalls, HostCalls
+
+R = TypeVar("R", bound=mc1231a.Message)
+
+
+class Host(BlockingMaster, HostCalls):
+    """The host of a chip set, used from any number of threads.
+
+    Every command of the table is a method here; those that act on the current axis take the axis as their
+    first argument, and stand on `axis(n)` without it. The current axis is kept: set_1 or set_2 is sent only
+    where it must be. They return the response and raise LinkError (NoReply, BadReply, IllegalCommand),
+    PortLost, or the EncodeError of `qlinkgen_codecs.mc1231a` before a byte is sent.
+
+    Example:
+        >>> with Host.open("/dev/ttyUSB0", baud=57600) as host:  # doctest: +SKIP
+        ...     host.axis(2).set_pos(value=0x02345678)
+        ...     host.axis(2).update(check=True)
+
+    Attributes:
+        command_errors: update and multi_update look for the command error unless they are told otherwise.
+    """
+
+    engine: HostEngine  # type: ignore[assignment]  # the drivers use what both kinds of engine have
+
+    def __init__(
+        self,
+        port: Port,
+        *,
+        checksum: Checksum = "always",
+        attempts: int = 3,
+        command_errors: bool = False,
+        forgets: float = 0.0,
+        slack: float | None = None,
+        on_event: Callable[[Event], None] | None = None,
+    ) -> None:
+        """Take over a port; closing the host closes it.
+
+        Args:
+            port: where the chip set is.
+            checksum: whose checksum is read: "always", "never", or the names of some commands. What is not
+                read may have been lost or changed on the line, and nobody is told.
+            attempts: how often a packet is sent before it has failed, all tries counted; those that must not
+                be repeated are sent once.
+            command_errors: have update and multi_update read the status word too, and raise CommandError.
+            forgets: seconds of silence after which the chip's side of the link forgets a packet of which not
+                everything has come; 0 for one that never does.
+            slack: seconds that driver, adapter and operating system may add to a transaction, in place of
+                what the port says of itself.
+            on_event: called with each event, in the thread that asks.
+        """
+        engine = make_engine(port, checksum=checksum, attempts=attempts, slack=slack, forgets=forgets)
+        super().__init__(cast(Any, engine), port, on_event=on_event)
+        self.command_errors = command_errors
+        self.usage = Usage()
+
+    @classmethod
+    def open(
+        cls,
+        name: str,
+        *,
+        baud: int,
+        checksum: Checksum = "always",
+        attempts: int = 3,
+        command_errors: bool = False,
+        forgets: float = 0.0,
+        slack: float | None = None,
+        on_event: Callable[[Event], None] | None = None,
+    ) -> Host:
+        """Open a device name or a URL of pyserial; no source names a speed. The rest as for the class.
+
+        Raises:
+            PortMissing: there is no such port.
+            PortBusy: another program has it, or this user may not open it.
+        """
+        return cls(
+            open_port(name, baud=baud),
+            checksum=checksum,
+            attempts=attempts,
+            command_errors=command_errors,
+            forgets=forgets,
+            slack=slack,
+            on_event=on_event,
+        )
+
+    def axis(self, number: int) -> Axis:
+        """Return one axis, 1 or 2."""
+        return Axis(self, number)
+
+    def ask(
+        self,
+        request: mc1231a.Message,
+        response: type[R],  # noqa: ARG002  # for type checkers
+        axis: int | None = None,
+    ) -> R:
+        """Send a packet, for an axis if one is given, and return its answer."""
+        self.usage.note(request)
+        context = None if axis is None else SELECT[check_axis(axis)]
+        answer: R = self.transact(Packet(request, context)).response
+        return answer
+
+    def raise_command_error(self, axis: int) -> int:
+        """Read the status word of an axis and return it.
+
+        Raises:
+            CommandError: its command error bit is set.
+        """
+        return self.run(updating.raise_command_error(axis))
+
+    def update(self, axis: int, *, check: bool | None = None) -> mc1231a.UpdateResponse:
+        """Make all buffered values of an axis active now.
+
+        Args:
+            axis: 1 or 2.
+            check: read the status word then, and raise CommandError if it says so, be it of this update or
+                of one before; None: as the host was told.
+        """
+        return self.run(updating.update(axis, check=self.command_errors if check is None else check))
+
+    def multi_update(self, *, axes: int = 0, check: bool | None = None) -> mc1231a.MultiUpdateResponse:
+        """Update several axes at the same instant; unlike one update, the mask is inferred, not confirmed.
+
+        Args:
+            axes: masks of Axes; bit 0 is axis 1.
+            check: as for `update`, of each of these axes.
+        """
+        return self.run(updating.multi_update(axes, check=self.command_errors if check is None else check))
+
+
+class Axis(AxisCalls):
+    """One axis: every command that acts on the current axis, without the argument for it.
+
+    Attributes:
+        host: the host.
+        number: 1 or 2.
+    """
+
+    def __init__(self, host: Host, number: int) -> None:
+        self.host = host
+        self.number = check_axis(number)
+        self._context = SELECT[number]
+
+    def ask(self, request: mc1231a.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
+        """Send a packet for this axis and return its answer."""
+        self.host.usage.note(request)
+        answer: R = self.host.transact(Packet(request, self._context)).response
+        return answer
+
+    def raise_command_error(self) -> int:
+        """As `Host.raise_command_error`."""
+        return self.host.raise_command_error(self.number)
+
+    def update(self, *, check: bool | None = None) -> mc1231a.UpdateResponse:
+        """As `Host.update`."""
+        return self.host.update(self.number, check=check)

@@ -1,0 +1,51 @@
+"""Updates whose command error is looked for: procedures, so that both faces run the same."""
+
+from __future__ import annotations
+
+from qlinkgen.errors import CommandError
+from qlinkgen.link.host_rules import Packet
+from qlinkgen.link.procedure import Ask, Procedure
+from qlinkgen.link.transaction import Reply
+from qlinkgen.protocols.mc1231a.facts import AXES, SELECT, check_axis
+from qlinkgen_codecs import mc1231a
+from qlinkgen_codecs.mc1231a import AxisStatus
+
+
+def raise_command_error(axis: int) -> Procedure[int]:
+    """Read the status word of an axis and return it.
+
+    Raises:
+        CommandError: its command error bit is set.
+    """
+    packet = Packet(mc1231a.GetStatusRequest(), SELECT[check_axis(axis)], check=True)
+    reply: Reply = yield Ask(packet)
+    status: int = reply.response.status
+    if status & AxisStatus.COMMAND_ERROR:
+        raise CommandError(
+            f"axis {axis}: command error, status 0x{status:04X}: a change was not valid then and was "
+            "dropped, the rest of its update took effect; the bit stays set until clr_status or rst_status",
+            status=status,
+            node=axis,
+            attempts=reply.attempts,
+            elapsed=reply.elapsed,
+        )
+    return status
+
+
+def update(axis: int, *, check: bool) -> Procedure[mc1231a.UpdateResponse]:
+    """Update one axis; where `check` is set, look for the command error then."""
+    reply: Reply = yield Ask(Packet(mc1231a.UpdateRequest(), SELECT[check_axis(axis)]))
+    if check:
+        yield from raise_command_error(axis)
+    response: mc1231a.UpdateResponse = reply.response
+    return response
+
+
+def multi_update(axes: int, *, check: bool) -> Procedure[mc1231a.MultiUpdateResponse]:
+    """Update several axes; where `check` is set, look for the command error of each then."""
+    reply: Reply = yield Ask(Packet(mc1231a.MultiUpdateRequest(axes=axes)))
+    for axis in AXES if check else ():
+        if axes >> (axis - 1) & 1:
+            yield from raise_command_error(axis)
+    response: mc1231a.MultiUpdateResponse = reply.response
+    return response

@@ -1,0 +1,38 @@
+"""An MC1231A chip set on a simulated serial link: on a virtual clock, or behind a pty.
+
+wire = chip_wire(ChipSet())
+host = Host(VirtualPort(wire))                    # on a clock of its own
+with PtyBus(wire, link="chip") as bus: ...        # for any program, in real time
+"""
+
+from __future__ import annotations
+
+from qlinkgen.protocols.mc1231a.chip import ChipSet
+from qlinkgen.protocols.mc1231a.chip_engine import ChipEngine
+from qlinkgen.sim.faults import FaultPlan
+from qlinkgen.sim.wire import Chunks, Wire
+
+__all__ = ["chip_wire"]
+
+
+def chip_wire(
+    chip: ChipSet | ChipEngine,
+    *,
+    baud: int | None = 115200,
+    faults: FaultPlan | None = None,
+    chunks: Chunks = "frame",
+    forgets: float = 0.0,
+) -> Wire:
+    """Return a link with a chip set at its end, for a `VirtualPort` or a `PtyBus`.
+
+    Args:
+        chip: the chip set, or its end of the link where more is to be chosen of that.
+        baud: bits a second, or None: bytes take no time.
+        faults: what goes wrong on the link; to "slaves" is to the chip set, to "master" to the host.
+        chunks: in what pieces bytes arrive; see `Wire`.
+        forgets: seconds of silence after which the chip's end forgets a packet begun; 0: never.
+    """
+    engine = chip if isinstance(chip, ChipEngine) else ChipEngine(chip, forgets=forgets)
+    wire = Wire(baud=baud, faults=faults, chunks=chunks, collisions=False)  # a line for each direction
+    wire.attach(engine, "chip set")
+    return wire

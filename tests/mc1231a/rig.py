@@ -1,0 +1,275 @@
+"""A chip set to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over a pty.
+
+A behaviour is written once, for a `Rig`. It uses the host as a user would; what is wired to the chip set is
+done through the rig, in the thread that runs the chip set.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import inspect
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+from qlinkgen.errors import PortLost
+from qlinkgen.protocols.mc1231a import AsyncAxis, AsyncHost, ChipEngine, ChipSet, Host
+from qlinkgen.sim import VirtualPort, Wire
+from qlinkgen.sim.chip_bus import chip_wire
+from qlinkgen.sim.pty_bus import PtyBus
+from qlinkgen.transport import MemoryPort, Port, memory_pair, open_port
+from qlinkgen_codecs.mc1231a import AxisStatus
+
+BAUD = 115200
+#: Seconds of host slack; in real time what a busy machine needs.
+SLACK = {"virtual": 0.002, "memory": 0.1, "pty": 0.1}
+#: Seconds after which something that must happen has not happened.
+PATIENCE = 20.0
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Where a behaviour is tried."""
+
+    face: Literal["blocking", "asyncio"] = "blocking"
+    transport: Literal["virtual", "memory", "pty"] = "virtual"
+
+    @property
+    def name(self) -> str:
+        return f"{self.face}-{self.transport}"
+
+
+SETTINGS = [
+    Setting(face, transport) for face in ("blocking", "asyncio") for transport in ("virtual", "memory", "pty")
+]
+
+
+class Breaking(Port):
+    """A port that notes what is written, and changes it on its way when it is told to.
+
+    Attributes:
+        sent: what the host has written, piece by piece.
+        outward: changes of the next pieces that are written, in their order; None for none.
+        inward: changes of the next pieces that are read.
+    """
+
+    def __init__(self, port: Port) -> None:
+        self._port = port
+        self.name, self.baud, self.capabilities = port.name, port.baud, port.capabilities
+        self.sent: list[bytes] = []
+        self.outward: deque[Callable[[bytes], bytes] | None] = deque()
+        self.inward: deque[Callable[[bytes], bytes] | None] = deque()
+
+    def read(self, timeout: float) -> bytes:
+        data = self._port.read(timeout)
+        change = self.inward.popleft() if data and self.inward else None
+        return change(data) if change else data
+
+    def write(self, data: bytes) -> None:
+        self.sent.append(data)
+        change = self.outward.popleft() if self.outward else None
+        changed = change(data) if change else data
+        if changed:
+            self._port.write(changed)
+
+    def now(self) -> float:
+        return self._port.now()
+
+    def sleep(self, seconds: float) -> None:
+        self._port.sleep(seconds)
+
+    def fileno(self) -> int | None:
+        return self._port.fileno()
+
+    def close(self) -> None:
+        self._port.close()
+
+
+class AsyncFace:
+    """Makes an AsyncHost look like a Host."""
+
+    def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
+        self._target = target
+        self._loop = loop
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._target, name)
+        return self._wrapped(value) if inspect.ismethod(value) else value
+
+    def _wrapped(self, method: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any, **kwargs: Any) -> Any:
+            result = method(*args, **kwargs)
+            if inspect.iscoroutine(result):
+                return self._loop.run_until_complete(result)
+            return AsyncFace(result, self._loop) if isinstance(result, AsyncAxis) else result
+
+        return call
+
+
+class Rig:
+    """A host, its chip set, and the line between them."""
+
+    def __init__(
+        self, host: Host, port: Breaking, engine: ChipEngine, do: Callable[[Callable[[], Any]], Any]
+    ) -> None:
+        self.host = host
+        self.port = port
+        self.engine = engine
+        self.chip = engine.chip
+        self._do = do
+
+    def wired(self, action: Callable[[ChipSet], Any]) -> Any:
+        """Do something to the inputs of the chip set, or look at it, at this moment."""
+
+        def act() -> Any:
+            self.chip.advance(self.port.now())
+            return action(self.chip)
+
+        return self._do(act)
+
+    @property
+    def packets(self) -> list[str]:
+        """Packets that were carried out, in hex."""
+        assert self.engine.record is not None
+        return [packet.hex() for packet in self.engine.record]
+
+    def sleep(self, seconds: float) -> None:
+        self.port.sleep(seconds)
+
+    def until(self, axis: int, mask: int, *, value: int | None = None) -> int:
+        """Ask for the status until some of its bits are as wanted, all set unless said otherwise."""
+        wanted = mask if value is None else value
+        end = self.port.now() + PATIENCE
+        status = 0
+        while self.port.now() < end:
+            status = self.host.axis(axis).get_status().status
+            if status & mask == wanted:
+                return status
+            self.sleep(0.002)
+        raise AssertionError(f"status of axis {axis} stays 0x{status:04X}")
+
+    def arrive(self, axis: int) -> int:
+        return self.until(axis, AxisStatus.IN_MOTION, value=0)
+
+
+class Pump(threading.Thread):
+    """Runs a line at the other end of a memory pair, in real time."""
+
+    def __init__(self, wire: Wire, port: MemoryPort) -> None:
+        super().__init__(daemon=True)
+        self._wire = wire
+        self._port = port
+        self._lock = threading.Lock()
+        self._stopping = False
+        self._failure: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            while not self._stopping:
+                self._once()
+        except PortLost:  # the near end was closed first
+            return
+        except BaseException as failure:  # noqa: BLE001  # raised again where the pump is stopped
+            self._failure = failure
+
+    def _once(self) -> None:
+        due = self._wire.next_timer()
+        now = self._port.now()
+        data = self._port.read(0.005 if due is None else min(max(0.0, due - now), 0.005))
+        with self._lock:
+            now = self._port.now()
+            self._wire.transmit(data, now)
+            heard = self._wire.take(now)
+        if heard:
+            self._port.write(heard)
+
+    def do(self, action: Callable[[], Any]) -> Any:
+        with self._lock:
+            return action()
+
+    def stop(self) -> None:
+        self._stopping = True
+        self.join()
+        if self._failure is not None:
+            raise self._failure
+
+
+def _by_line(line: PtyBus) -> Callable[[Callable[[], Any]], Any]:
+    """How to do something in the thread that runs a line."""
+
+    def do(action: Callable[[], Any]) -> Any:
+        done: list[Any] = []
+        ready = threading.Event()
+
+        def act() -> None:
+            done.append(action())
+            ready.set()
+
+        line.call(act)
+        assert ready.wait(PATIENCE)
+        return done[0]
+
+    return do
+
+
+@contextlib.contextmanager
+def _line(setting: Setting, wire: Wire) -> Iterator[tuple[Port, Callable[[Callable[[], Any]], Any]]]:
+    if setting.transport == "virtual":
+        yield VirtualPort(wire), lambda action: action()
+    elif setting.transport == "pty":
+        with PtyBus(wire) as line, open_port(line.path) as port:
+            yield port, _by_line(line)
+    else:
+        near, far = memory_pair(BAUD)
+        pump = Pump(wire, far)
+        pump.start()
+        try:
+            yield near, pump.do
+        finally:
+            pump.stop()
+            near.close()
+
+
+@contextlib.contextmanager
+def make_rig(
+    setting: Setting, *, illegal: tuple[str, ...] = (), forgets: float = 0.0, **options: Any
+) -> Iterator[Rig]:
+    """A rig; options are those of the host."""
+    engine = ChipEngine(ChipSet(illegal=illegal), forgets=forgets, record=True)
+    wire = chip_wire(engine, baud=BAUD if setting.transport == "virtual" else None)
+    options.setdefault("slack", SLACK[setting.transport])
+    with contextlib.ExitStack() as stack:
+        inner, do = stack.enter_context(_line(setting, wire))
+        port = Breaking(inner)
+        if setting.face == "blocking":
+            host = stack.enter_context(Host(port, **options))
+        else:
+            loop = asyncio.new_event_loop()
+            stack.callback(loop.close)
+            face = AsyncHost(port, **options)
+            stack.callback(face.close)
+            host = cast(Host, AsyncFace(face, loop))
+        yield Rig(host, port, engine, do)
+
+
+def virtual(**options: Any) -> contextlib.AbstractContextManager[Rig]:
+    """A rig on a virtual clock with a blocking host."""
+    return make_rig(Setting(), **options)
+
+
+def lose(*places: int) -> Callable[[bytes], bytes]:
+    """A change that loses the bytes at these places."""
+    return lambda data: bytes(byte for at, byte in enumerate(data) if at not in places)
+
+
+def become(text: str) -> Callable[[bytes], bytes]:
+    """A change into other bytes altogether, in hex."""
+    return lambda _data: bytes.fromhex(text)
+
+
+def flip(place: int, bits: int) -> Callable[[bytes], bytes]:
+    """A change of some bits of one byte."""
+    return lambda data: bytes(byte ^ bits if at == place else byte for at, byte in enumerate(data))
