@@ -8,10 +8,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from qlinkgen.link.events import Event
-from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Steps
 from qlinkgen.link.transaction import Reply
-from qlinkgen.transport.conversation import MasterDriver, conversation
+from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
 from qlinkgen.transport.port import Port
 
 
@@ -27,9 +26,7 @@ class BlockingMaster(MasterDriver):
         on_event: called with each event of the engine, in the thread that asked.
     """
 
-    def __init__(
-        self, engine: MasterEngine, port: Port, *, on_event: Callable[[Event], None] | None = None
-    ) -> None:
+    def __init__(self, engine: Asker, port: Port, *, on_event: Callable[[Event], None] | None = None) -> None:
         super().__init__(engine, port, on_event)
         self._lock = threading.RLock()  # so that on_event may ask in its turn
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import Any
+from typing import Any, Protocol
 
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.events import Event
-from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Reply
 from qlinkgen.transport.port import Ability, Port
@@ -39,6 +38,53 @@ def timing_of(codec: Codec, port: Port, *, slack: float | None = None, attempts:
     )
 
 
+class Asker(Protocol):
+    """What a driver needs of an engine that asks: `MasterEngine` on a bus, `HostEngine` at a host port."""
+
+    #: What happened, oldest first.
+    events: Any
+    #: Whether the events tell of every request and answer.
+    verbose: bool
+
+    @property
+    def busy(self) -> bool:
+        """A transaction is under way."""
+        ...
+
+    @property
+    def total(self) -> Any:
+        """Counts of what happened."""
+        ...
+
+    def start(self, request: Any, now: float, *, attempts: int | None, trial: bool) -> None:
+        """Begin a transaction."""
+        ...
+
+    def bytes_to_send(self, now: float) -> bytes:
+        """Return what is to be written now."""
+        ...
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Take bytes that came."""
+        ...
+
+    def next_timer(self) -> float | None:
+        """Return when to call again, None where the transaction is over."""
+        ...
+
+    def handle_timer(self, now: float) -> None:
+        """Do what is due."""
+        ...
+
+    def take(self) -> Reply:
+        """Return the outcome, or raise it."""
+        ...
+
+    def abort(self, now: float) -> None:
+        """Give the transaction up."""
+        ...
+
+
 class MasterDriver:
     """What the drivers have in common.
 
@@ -47,7 +93,7 @@ class MasterDriver:
         port: where it asks.
     """
 
-    def __init__(self, engine: MasterEngine, port: Port, on_event: Callable[[Event], None] | None) -> None:
+    def __init__(self, engine: Asker, port: Port, on_event: Callable[[Event], None] | None) -> None:
         self.engine = engine
         self.port = port
         self.on_event = on_event
@@ -76,7 +122,7 @@ class MasterDriver:
 
 
 def conversation(
-    engine: MasterEngine, port: Port, request: Any, attempts: int | None, *, trial: bool
+    engine: Asker, port: Port, request: Any, attempts: int | None, *, trial: bool
 ) -> Generator[float, bytes, Reply]:
     """One transaction: yields how long to wait for bytes, is sent those that came.
 

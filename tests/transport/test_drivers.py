@@ -301,7 +301,8 @@ class TestGivingUp:
         self, error: type[BaseException], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         _, port, nodes = bus(3)
-        master = BlockingMaster(engine_for(port, 0.002), port)
+        engine = engine_for(port, 0.002)
+        master = BlockingMaster(engine, port)
         read = port.read
 
         def interrupted(timeout: float) -> bytes:
@@ -314,7 +315,7 @@ class TestGivingUp:
         with pytest.raises(error):
             master.transact(ASK)
         assert not master.engine.busy
-        old = master.engine.counters[3]
+        old = engine.counters[3]
         assert (old.requests, old.answers) == (1, 0)
         reply = master.transact(qlink.LoopBackRequest(node=3, data=b"x"))
         assert reply.response.data == b"x"

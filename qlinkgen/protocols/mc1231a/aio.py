@@ -32,7 +32,7 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
         command_errors: update and multi_update look for the command error unless they are told otherwise.
     """
 
-    engine: HostEngine  # type: ignore[assignment]  # the drivers use what both kinds of engine have
+    engine: HostEngine
 
     def __init__(
         self,

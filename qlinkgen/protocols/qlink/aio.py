@@ -11,6 +11,7 @@ from typing import TypeVar
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
+from qlinkgen.link.master import MasterEngine
 from qlinkgen.protocols.qlink import survey
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
@@ -33,6 +34,8 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         >>> async with AsyncBus.open("/dev/ttyUSB0") as bus:  # doctest: +SKIP
         ...     (await bus.node(3).motor_position()).position
     """
+
+    engine: MasterEngine
 
     def __init__(
         self,

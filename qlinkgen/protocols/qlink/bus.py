@@ -11,6 +11,7 @@ from typing import TypeVar
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
+from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import FAILURES
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink import survey
@@ -39,6 +40,8 @@ class Bus(BlockingMaster, MasterCalls):
         >>> with Bus.open("/dev/ttyUSB0") as bus:  # doctest: +SKIP
         ...     bus.node(3).motor_position().position
     """
+
+    engine: MasterEngine
 
     def __init__(
         self,
