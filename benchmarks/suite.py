@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks import c_codec, generator, imports, python_codec, stream, wire
+from benchmarks import c_codec, generator, host, imports, python_codec, ring, stream, wire
 from benchmarks.report import Section, page, section_text
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
@@ -23,6 +23,8 @@ SECTIONS: dict[str, tuple[Callable[[int], Section], int, int]] = {
     "imports": (imports.section, 41, 7),
     "generator": (generator.section, 4, 1),
     "wire": (wire.section, 200, 20),
+    "ring": (ring.section, 200, 20),
+    "host": (host.section, 200, 20),
 }
 
 INTRO = """\

@@ -36,6 +36,8 @@ DOCUMENTS = [
     "docs/load-firmware.md",
     "docs/own-io.md",
     "docs/timing.md",
+    "docs/mc1231a.md",
+    "docs/trio.md",
 ]
 MARK = r"(?:^<!-- (?P<mark>\w+): (?P<name>\S+) -->\n)?"
 BLOCK = re.compile(MARK + r"^```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -494,6 +494,41 @@ class Bus:
         return f"Bus({self.kind!r}, {', '.join(f'{name}={getattr(self, name)}' for name in names)})"
 
 
+class Marking:
+    """Where a header and an end byte hold what, for nodes that send a message on while it still comes.
+
+    Attributes:
+        marker: set in the header and the end byte of a message, and in no other.
+        address_shift: place of the address in both.
+        address_mask: its bits, in their lowest place.
+        id_shift: place of the number of the message.
+        id_mask: its bits, in their lowest place.
+        end: the number that makes an end byte.
+        most: most bytes between header and end.
+    """
+
+    __slots__ = ("address_mask", "address_shift", "end", "id_mask", "id_shift", "marker", "most")
+
+    def __init__(
+        self,
+        *,
+        marker: int,
+        address_shift: int,
+        address_mask: int,
+        id_shift: int,
+        id_mask: int,
+        end: int,
+        most: int,
+    ) -> None:
+        self.marker = marker
+        self.address_shift = address_shift
+        self.address_mask = address_mask
+        self.id_shift = id_shift
+        self.id_mask = id_mask
+        self.end = end
+        self.most = most
+
+
 class Command:
     """A transaction: who is asked what, what answers and when, and what may be repeated.
 

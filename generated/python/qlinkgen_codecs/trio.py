@@ -28,6 +28,7 @@ from ._support import (
     Fault,
     find_crc,
     illegal,
+    Marking,
     Misfit,
     named,
     OpenEnum,
@@ -60,7 +61,9 @@ __all__ = [
     "KeypadMode",
     "KeypadModeEnum",
     "KeypadOffset",
+    "MARKING",
     "MESSAGES",
+    "Marking",
     "Message",
     "StreamDecoder",
     "decode",
@@ -95,6 +98,16 @@ _ID_MASK = 0x07
 _END = 0
 #: Most bytes between header and end.
 _MOST = 258
+#: The same, for nodes that send messages on.
+MARKING = Marking(
+    marker=_MARKER,
+    address_shift=_ADDRESS_SHIFT,
+    address_mask=_ADDRESS_MASK,
+    id_shift=_ID_SHIFT,
+    id_mask=_ID_MASK,
+    end=_END,
+    most=_MOST,
+)
 
 _checksum = find_crc("crc-16/ibm-3740")
 _crc = _checksum.compute

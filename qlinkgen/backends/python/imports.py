@@ -15,8 +15,8 @@ _SUPPORT = (
 )  # fmt: skip
 #: Names that are plain words as well: used only where they are called.
 _CALLED = (
-    "Constant", "Count", "DecimalSteps", "Items", "Mask", "Octets", "Steps", "Text", "Whole", "crc",
-    "find_crc", "sum_of",
+    "Constant", "Count", "DecimalSteps", "Items", "Marking", "Mask", "Octets", "Steps", "Text", "Whole",
+    "crc", "find_crc", "sum_of",
 )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from qlinkgen.backends.python.classes import ClassBuilder, ClassModel, class_nam
 from qlinkgen.backends.python.frames_delimited import is_unique, seal_lines
 from qlinkgen.backends.python.imports import PUBLIC, imports
 from qlinkgen.backends.python.place import Place, in_hex, place_of
-from qlinkgen.model.frame import DelimitedFrame
+from qlinkgen.model.frame import DelimitedFrame, MarkedFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 
@@ -136,6 +136,7 @@ class Module:
         names = [class_name(message) for message in self.messages]
         names += [row.name for group in ("enums", "flags") for row in self.tables[group]]
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *PUBLIC]
+        names += ["MARKING", "Marking"] if isinstance(self.protocol.frame, MarkedFrame) else []
         names += re.findall(r"^def ([a-z]\w*)", text, re.MULTILINE)
         return sorted(set(names))
 

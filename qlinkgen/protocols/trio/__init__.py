@@ -1,0 +1,34 @@
+"""The Trio fibre-optic network: nodes of the ring, for blocking programs and for asyncio.
+
+`MotionCoordinator` has the network's words of Trio BASIC as methods, `MembraneKeypad` keys and a display.
+Each joins the ring at one port, and sends on what is for others. Messages and their errors are in
+`qlinkgen_codecs.trio`.
+"""
+
+from __future__ import annotations
+
+from qlinkgen.link.ring_events import NetStat
+from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
+from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
+from qlinkgen.protocols.trio.display import Display
+from qlinkgen.protocols.trio.errors import NoRoom, NothingCame
+from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.protocols.trio.nodes import MembraneKeypad, MotionCoordinator, PassiveNode
+from qlinkgen.protocols.trio.printing import CHR, CURSOR, VALUE
+
+__all__ = [
+    "CHR",
+    "CURSOR",
+    "VALUE",
+    "AsyncMembraneKeypad",
+    "AsyncMotionCoordinator",
+    "CoordinatorNode",
+    "Display",
+    "KeypadNode",
+    "MembraneKeypad",
+    "MotionCoordinator",
+    "NetStat",
+    "NoRoom",
+    "NothingCame",
+    "PassiveNode",
+]

@@ -1,0 +1,142 @@
+"""The same nodes for asyncio: what waits is awaited, the rest is as in `nodes`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self
+
+from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
+from qlinkgen.protocols.trio.errors import NothingCame
+from qlinkgen.protocols.trio.face import TX_TIMEOUT, CoordinatorFace, Face, Item, N, paced_baud
+from qlinkgen.protocols.trio.facts import LINE_END, check_channel
+from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.protocols.trio.printing import Number
+from qlinkgen.transport.port import Port
+from qlinkgen.transport.ring import OnEvent
+from qlinkgen.transport.ring_aio import AsyncRingDriver, drive_async
+from qlinkgen_codecs import trio
+
+
+class AsyncFace(Face[N]):
+    """What the faces for asyncio share; they are made, and used, inside a running event loop."""
+
+    driver: AsyncRingDriver
+
+    def __init__(self, node: N, driver: AsyncRingDriver, *, tx_timeout: float = TX_TIMEOUT) -> None:
+        """Use a node that a driver keeps at work."""
+        super().__init__(node, tx_timeout=tx_timeout)
+        self.driver = driver
+
+    async def transmit(self, message: trio.Message) -> None:
+        """Send any message; see `BlockingFace.transmit`."""
+        if await self.driver.until(self._put(message), self.tx_timeout) is None:
+            raise self._no_room()
+
+    async def wait_until(self, condition: Callable[[], object], timeout: float | None = None) -> None:
+        """Wait until something is so; see `BlockingFace.wait_until`."""
+        if await self.driver.until(lambda _now: bool(condition()) or None, timeout) is None:
+            raise NothingCame(f"what was waited for did not come about in {timeout} s", elapsed=timeout or 0)
+
+    async def flush(self, timeout: float | None = None) -> None:
+        """Wait until everything in the transmit buffer was handed to the port."""
+        await self.wait_until(lambda: self.engine.idle, timeout)
+
+    async def sleep(self, seconds: float) -> None:
+        """Let time pass on the node's clock; the node goes on sending and receiving."""
+        await self.driver.pause(seconds)
+
+    async def close(self) -> None:
+        """Send what is still in the transmit buffer, leave the ring, and close the port."""
+        await self.driver.close()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+
+class AsyncMotionCoordinator(CoordinatorFace, AsyncFace[CoordinatorNode]):
+    """A Motion Coordinator for asyncio. The event loop keeps the node at work; see `MotionCoordinator`."""
+
+    def __init__(
+        self, port: Port, *, tx_timeout: float = TX_TIMEOUT, on_event: OnEvent | None = None, **options: Any
+    ) -> None:
+        """Join the ring at a port, in a running event loop; see `MotionCoordinator`."""
+        node = CoordinatorNode(**{"baud": paced_baud(port), **options})
+        super().__init__(node, drive_async(port, node.link, on_event=on_event), tx_timeout=tx_timeout)
+
+    @classmethod
+    def driven(cls, node: CoordinatorNode, driver: AsyncRingDriver) -> Self:
+        """Use a node that something else keeps at work, such as a simulated ring."""
+        face = cls.__new__(cls)
+        AsyncFace.__init__(face, node, driver)
+        return face
+
+    async def print_(self, n: int, *items: Item, sep: str = "", end: str = LINE_END) -> None:
+        """PRINT #n, item; item; ...; see `MotionCoordinator.print_`."""
+        for message in self._texts(n, items, sep, end):
+            await self.transmit(message)
+
+    async def get(self, channel: int, timeout: float | None = None) -> int:
+        """GET #channel; see `MotionCoordinator.get`."""
+        value = await self.driver.until(self._take(channel), timeout)
+        if value is None:
+            raise NothingCame(f"GET #{channel}: no character in {timeout} s", elapsed=timeout or 0)
+        return value
+
+    async def key(self, channel: int) -> bool:
+        """KEY #channel; see `MotionCoordinator.key`. Without a character other tasks get their turn."""
+        check_channel(channel)
+        if not self.node.received:
+            await self.driver.give_way()
+        return bool(self.node.received)
+
+    async def send(self, n: int, type_: int, data1: int, data2: Number | None = None) -> None:
+        """SEND(n, type, data1[, data2]); see `MotionCoordinator.send`."""
+        await self.transmit(send_message(n, type_, data1, data2))
+
+    async def keypad_mode(self, n: int, mode: trio.KeypadModeEnum | int) -> None:
+        """Choose what a keypad sends for its keys; BASIC has no word for this message."""
+        await self.transmit(mode_message(n, mode))
+
+
+class AsyncMembraneKeypad(AsyncFace[KeypadNode]):
+    """A membrane keypad for asyncio; see `MembraneKeypad`. Pressing a key waits for nothing."""
+
+    def __init__(self, port: Port, *, on_event: OnEvent | None = None, **options: Any) -> None:
+        """Join the ring at a port, in a running event loop; see `MembraneKeypad`."""
+        node = KeypadNode(**{"baud": paced_baud(port), **options})
+        super().__init__(node, drive_async(port, node.link, on_event=on_event))
+
+    @classmethod
+    def driven(cls, node: KeypadNode, driver: AsyncRingDriver) -> Self:
+        """Use a node that something else keeps at work, such as a simulated ring."""
+        face = cls.__new__(cls)
+        AsyncFace.__init__(face, node, driver)
+        return face
+
+    def press(self, *keys: int | str) -> None:
+        """Press keys, one after the other, and let each one go before the next."""
+        for key in keys:
+            self.key_down(key)
+            self.key_up(key)
+
+    def key_down(self, key: int | str) -> bool:
+        """Press a key and hold it; return whether its character went to the ring."""
+        return self.driver.act(lambda now: self.node.press(key, now))
+
+    def key_up(self, key: int | str) -> bool:
+        """Let a key go; return whether a character went to the ring, which it does in mode on_off."""
+        return self.driver.act(lambda now: self.node.release(key, now))
+
+    @property
+    def lines(self) -> list[str]:
+        """What the display shows, row by row."""
+        return self.node.display.lines
+
+    def __str__(self) -> str:
+        return self.node.display.text

@@ -1,0 +1,134 @@
+"""A Motion Coordinator as a node of the ring: what it does with messages, and the messages it makes.
+
+No input or output and no clock here: `node.link` is the engine that a driver serves, and `now` comes in.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from decimal import Decimal
+from typing import Any, cast
+
+from qlinkgen.link.ring import RingNode
+from qlinkgen.link.ring_events import Dropped
+from qlinkgen.protocols.trio.facts import KEYS, LAST_VARIABLE, OFFSET, RECEIVE_BUFFER, VARIABLE, wire_address
+from qlinkgen.protocols.trio.printing import Number
+from qlinkgen.protocols.trio.variables import KeyTable, Variables
+from qlinkgen_codecs import trio
+
+
+class CoordinatorCounters:
+    """What a Motion Coordinator has dropped.
+
+    Attributes:
+        characters_lost: characters for which the receive buffer had no room; the newest are dropped.
+        variables_lost: messages for a variable that it does not have.
+        ignored: messages that mean something to a keypad only.
+    """
+
+    __slots__ = ("characters_lost", "ignored", "variables_lost")
+
+    def __init__(self) -> None:
+        self.characters_lost = 0
+        self.variables_lost = 0
+        self.ignored = 0
+
+    def __repr__(self) -> str:
+        return f"CoordinatorCounters({', '.join(f'{n}={getattr(self, n)}' for n in self.__slots__)})"
+
+
+class CoordinatorNode:
+    """The behaviour of a Motion Coordinator.
+
+    Attributes:
+        link: the engine: NETSTAT, counters, events.
+        vr: the variables.
+        keys: the DEFKEY table.
+        received: characters that nobody has read yet, at most 256.
+        counters: what it has dropped.
+    """
+
+    kind = "coordinator"
+
+    def __init__(self, **options: Any) -> None:
+        """Make a node; the options are those of `RingNode`."""
+        self.link = RingNode(trio, self._handle, **options)
+        self.vr = Variables()
+        self.keys = KeyTable()
+        self.received: deque[str] = deque()
+        self.counters = CoordinatorCounters()
+
+    def reset(self) -> None:
+        """Be switched off and on: what is under way and what was received is lost; variables stay."""
+        self.link.reset()
+        self.received.clear()
+
+    # messages that come
+
+    def _handle(self, message: trio.Message, now: float) -> None:
+        if isinstance(message, trio.CharacterTransfer):
+            self._characters(message, now)
+        elif not isinstance(message, trio.DirectVariableTransfer):
+            self.counters.ignored += 1
+        elif message.number <= LAST_VARIABLE:
+            self.vr[message.number] = message.value
+        else:
+            self.counters.variables_lost += 1
+            text = f"there is no VR({message.number}), the last one is VR({LAST_VARIABLE})"
+            self.link.events.append(Dropped(now, message, text))
+
+    def _characters(self, message: trio.CharacterTransfer, now: float) -> None:
+        room = RECEIVE_BUFFER - len(self.received)
+        self.received += message.characters[:room]
+        lost = len(message.characters) - room
+        if lost > 0:
+            self.counters.characters_lost += lost
+            text = f"the receive buffer is full: the last {lost} of its characters are lost"
+            self.link.events.append(Dropped(now, message, text))
+
+    def take(self, channel: int) -> int | None:
+        """Return the character that came first and forget it, None where there is none.
+
+        Args:
+            channel: 3 for its value by the DEFKEY table, 4 for its number.
+        """
+        if not self.received:
+            return None
+        code = ord(self.received.popleft())
+        return self.keys[code] if channel == KEYS else code
+
+
+# messages that go
+
+
+def text_message(node: int, text: str) -> trio.Message:
+    """Return the message of PRINT #node; at most 256 characters."""
+    return trio.CharacterTransfer(address=wire_address(node), characters=text)
+
+
+def mode_message(node: int, mode: trio.KeypadModeEnum | int) -> trio.Message:
+    """Return the message that sets the mode of a keypad; BASIC has no word for it."""
+    return trio.KeypadMode(address=wire_address(node), mode=mode)
+
+
+def send_message(node: int, kind: int, data1: int, data2: Number | None) -> trio.Message:
+    """Return the message of SEND(node, kind, data1[, data2]).
+
+    Raises:
+        ValueError: an argument is out of its range.
+        TypeError: data2 is missing, or is one too many.
+    """
+    address = wire_address(node)
+    if kind == OFFSET:
+        if data2 is not None:
+            raise TypeError(f"data2: {data2!r} was given; a keypad offset (type {OFFSET}) has data1 alone")
+        return trio.KeypadOffset(address=address, offset=wire_address(data1, "data1"))
+    if kind != VARIABLE:
+        raise ValueError(
+            f"type: {kind!r} was given; SEND has {VARIABLE} (direct variable transfer) and {OFFSET} "
+            "(keypad offset), which are not the types on the wire"
+        )
+    if isinstance(data2, bool) or not isinstance(data2, Number):
+        raise TypeError(f"data2: {data2!r} was given; a direct variable transfer needs the value there")
+    # The codec rounds any number that knows its exact ratio to the nearest step.
+    return trio.DirectVariableTransfer(address=address, number=data1, value=cast(Decimal, data2))

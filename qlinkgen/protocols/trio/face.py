@@ -1,0 +1,200 @@
+"""What the faces of all nodes share: the common part, and the part of blocking programs.
+
+A face lets a program use a node; a driver keeps the node at work meanwhile (`qlinkgen.transport.ring`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Any, Generic, Self, TypeVar
+
+from qlinkgen.link.ring import RingNode
+from qlinkgen.link.ring_events import NetStat, RingCounters
+from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, text_message
+from qlinkgen.protocols.trio.errors import NoRoom, NothingCame
+from qlinkgen.protocols.trio.facts import check_channel
+from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.protocols.trio.printing import Formatted, Number, pieces, printed
+from qlinkgen.protocols.trio.variables import Variables
+from qlinkgen.transport.port import Ability, Port
+from qlinkgen.transport.ring import RingDriver
+from qlinkgen_codecs import trio
+
+Node = CoordinatorNode | KeypadNode | RingNode
+N = TypeVar("N", bound=Node)
+T = TypeVar("T")
+#: Seconds that a message waits for room in the transmit buffer before NETSTAT bit 0 is set.
+TX_TIMEOUT = 1.0
+#: An item of PRINT.
+Item = str | Number | Formatted
+
+
+def engine_of(node: Node) -> RingNode:
+    """Return the engine of a node; a passive one is nothing else."""
+    return node if isinstance(node, RingNode) else node.link
+
+
+def paced_baud(port: Port) -> int | None:
+    """Return the speed of a port where bytes take their time, for the `baud` of an engine."""
+    return port.baud if port.capabilities.paced is Ability.YES else None
+
+
+@contextlib.contextmanager
+def closing_on_error(port: Port) -> Iterator[Port]:
+    """Close a port that was opened for a node which then can not be made."""
+    try:
+        yield port
+    except BaseException:
+        port.close()
+        raise
+
+
+class Face(Generic[N]):
+    """What the faces share whatever drives their node.
+
+    Attributes:
+        node: the behaviour without input or output.
+        driver: what keeps it at work.
+        tx_timeout: seconds that a message waits for room in the transmit buffer.
+    """
+
+    driver: Any
+
+    def __init__(self, node: N, *, tx_timeout: float = TX_TIMEOUT) -> None:
+        self.node = node
+        self.tx_timeout = tx_timeout
+
+    @property
+    def engine(self) -> RingNode:
+        """The node's engine."""
+        return engine_of(self.node)
+
+    @property
+    def counters(self) -> RingCounters:
+        """What the node has seen of the ring."""
+        return self.engine.counters
+
+    @property
+    def netstat(self) -> NetStat:
+        """What has gone wrong since it was cleared; `netstat = 0` clears it, as in BASIC."""
+        return self.engine.netstat
+
+    @netstat.setter
+    def netstat(self, status: int) -> None:
+        self.engine.netstat = NetStat(status)
+
+    def clear_netstat(self) -> NetStat:
+        """Clear the status, and return what it was; nothing that happens in between is lost."""
+
+        def clear(_now: float) -> NetStat:
+            status, self.engine.netstat = self.engine.netstat, NetStat(0)
+            return status
+
+        status: NetStat = self.driver.act(clear)
+        return status
+
+    def now(self) -> float:
+        """Return the time on the node's clock, in seconds."""
+        now: float = self.driver.now()
+        return now
+
+    def _put(self, message: trio.Message) -> Callable[[float], bool | None]:
+        """What to try until there is room for a message."""
+        return lambda now: self.engine.send(message, now) or None
+
+    def _no_room(self) -> NoRoom:
+        self.driver.act(self.engine.refuse)
+        return NoRoom(
+            f"the transmit buffer had no room for {self.tx_timeout:g} s (NETSTAT bit 0): messages of other "
+            "nodes come first, so look for one that sends without end, or send less",
+            elapsed=self.tx_timeout,
+        )
+
+
+class CoordinatorFace(Face[CoordinatorNode]):
+    """What a program on a Motion Coordinator has without waiting for anything."""
+
+    @property
+    def vr(self) -> Variables:
+        """The variables VR(0) to VR(250); nodes of the ring may change them at any time."""
+        return self.node.vr
+
+    def defkey(self, key: int | str, *values: int) -> None:
+        """Define what channel 3 returns for a key and those behind it: DEFKEY(key, value, value, ...).
+
+        Args:
+            key: the character that the keypad sends, or its number.
+            values: for this key and the following ones; a key that was never defined returns its number.
+
+        Raises:
+            ValueError: there is no such key.
+        """
+        self.node.keys.define(ord(key) if isinstance(key, str) else key, *values)
+
+    def _take(self, channel: int) -> Callable[[float], int | None]:
+        check_channel(channel)
+        return lambda _now: self.node.take(channel)
+
+    @staticmethod
+    def _texts(n: int, items: tuple[Item, ...], sep: str, end: str) -> Iterator[trio.Message]:
+        text_message(n, " ")  # a wrong number is refused before anything is sent
+        return (text_message(n, piece) for piece in pieces(printed(items, sep, end)))
+
+
+class BlockingFace(Face[N]):
+    """What the faces of blocking programs share."""
+
+    driver: RingDriver
+
+    def __init__(self, node: N, driver: RingDriver, *, tx_timeout: float = TX_TIMEOUT) -> None:
+        """Use a node that a driver keeps at work."""
+        super().__init__(node, tx_timeout=tx_timeout)
+        self.driver = driver
+
+    def transmit(self, message: trio.Message) -> None:
+        """Send any message; its address counts the nodes along the ring, 1-15.
+
+        It returns when the message is in the transmit buffer. The sender never knows whether it arrives.
+
+        Raises:
+            NoRoom: the buffer had no room in time.
+            EncodeError: of the generated module: a field is out of its range.
+            PortLost: the port went away.
+        """
+        if self.driver.until(self._put(message), self.tx_timeout) is None:
+            raise self._no_room()
+
+    def wait_until(self, condition: Callable[[], object], timeout: float | None = None) -> None:
+        """Wait until something is so, looking whenever the node has seen something: WAIT UNTIL.
+
+        Raises:
+            NothingCame: it was not so within `timeout` seconds.
+        """
+        if self.driver.until(lambda _now: bool(condition()) or None, timeout) is None:
+            raise NothingCame(f"what was waited for did not come about in {timeout} s", elapsed=timeout or 0)
+
+    def flush(self, timeout: float | None = None) -> None:
+        """Wait until everything in the transmit buffer was handed to the port.
+
+        Raises:
+            NothingCame: something is still there after `timeout` seconds.
+        """
+        self.wait_until(lambda: self.engine.idle, timeout)
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass; the node goes on sending and receiving."""
+        self.driver.pause(seconds)
+
+    def close(self) -> None:
+        """Send what is still in the transmit buffer, leave the ring, and close the port."""
+        self.driver.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

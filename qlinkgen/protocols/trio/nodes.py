@@ -1,0 +1,199 @@
+"""Nodes of the ring for blocking programs: `MotionCoordinator`, `MembraneKeypad`, `PassiveNode`."""
+
+from __future__ import annotations
+
+from typing import Any, Self
+
+from qlinkgen.link.ring import RingNode
+from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
+from qlinkgen.protocols.trio.errors import NothingCame
+from qlinkgen.protocols.trio.face import (
+    TX_TIMEOUT,
+    BlockingFace,
+    CoordinatorFace,
+    Item,
+    closing_on_error,
+    paced_baud,
+)
+from qlinkgen.protocols.trio.facts import LINE_END, check_channel
+from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.protocols.trio.printing import Number
+from qlinkgen.transport.opening import open_port
+from qlinkgen.transport.port import Port
+from qlinkgen.transport.ring import OnEvent, RingDriver, drive
+from qlinkgen_codecs import trio
+
+
+class MotionCoordinator(CoordinatorFace, BlockingFace[CoordinatorNode]):
+    """A Motion Coordinator: the network's words of BASIC as methods.
+
+    A thread of its own receives and sends on, so the node does its part on the ring whatever the program
+    does. Any number of threads may use it. Nodes are numbered as in BASIC: 10 is the next one along the ring,
+    24 the fifteenth; a number past the end of the ring goes round.
+
+    Attributes:
+        node: the behaviour without input or output.
+        driver: what keeps it at work.
+    """
+
+    def __init__(
+        self, port: Port, *, tx_timeout: float = TX_TIMEOUT, on_event: OnEvent | None = None, **options: Any
+    ) -> None:
+        """Join the ring at a port.
+
+        Args:
+            port: receives from the node before, and transmits to the next one.
+            tx_timeout: seconds that a message waits for room in the transmit buffer.
+            on_event: called with each event of the engine (`qlinkgen.link.ring_events`).
+            options: `cut_through`, `patience` and `room` of `RingNode`.
+        """
+        node = CoordinatorNode(**{"baud": paced_baud(port), **options})
+        super().__init__(node, drive(port, node.link, on_event=on_event), tx_timeout=tx_timeout)
+
+    @classmethod
+    def open(cls, name: str, baud: int = 115200, **options: Any) -> Self:
+        """Join the ring at a device or URL. Raises the errors of `open_port`."""
+        with closing_on_error(open_port(name, baud=baud)) as port:
+            return cls(port, **options)
+
+    @classmethod
+    def driven(cls, node: CoordinatorNode, driver: RingDriver) -> Self:
+        """Use a node that something else keeps at work, such as a simulated ring."""
+        face = cls.__new__(cls)
+        BlockingFace.__init__(face, node, driver)
+        return face
+
+    def print_(self, n: int, *items: Item, sep: str = "", end: str = LINE_END) -> None:
+        """PRINT #n, item; item; ...
+
+        Args:
+            n: number of the receiver, 10-24.
+            items: text, numbers (with four decimals), `VALUE(number, width, decimals)`, `CHR`, `CURSOR`.
+            sep: what stands between items.
+            end: what follows them; `end=""` is BASIC's semicolon at the end of the line.
+
+        Raises:
+            ValueError: a number of a node, or a character, that there is not. Nothing was sent.
+            NoRoom: the transmit buffer had no room in time.
+            PortLost: the port went away.
+        """
+        for message in self._texts(n, items, sep, end):
+            self.transmit(message)
+
+    def get(self, channel: int, timeout: float | None = None) -> int:
+        """GET #channel: return the character that came first, waiting for one if there is none.
+
+        Args:
+            channel: 3 for its value by the DEFKEY table, 4 for the number of the character.
+            timeout: seconds to wait, None for ever.
+
+        Raises:
+            NothingCame: nothing in that time.
+            ValueError: it is another channel.
+            PortLost: the port went away.
+        """
+        value = self.driver.until(self._take(channel), timeout)
+        if value is None:
+            raise NothingCame(f"GET #{channel}: no character in {timeout} s", elapsed=timeout or 0)
+        return value
+
+    def key(self, channel: int) -> bool:
+        """KEY #channel: tell whether a character is there; it stays there.
+
+        A program may ask again and again: when there is none, this gives way to the node for a millisecond.
+        """
+        check_channel(channel)
+        if not self.node.received:
+            self.driver.give_way()
+        return bool(self.node.received)
+
+    def send(self, n: int, type_: int, data1: int, data2: Number | None = None) -> None:
+        """SEND(n, type, data1[, data2]).
+
+        Args:
+            n: number of the receiver, 10-24.
+            type_: 1 to set its variable `data1` to `data2`, 2 to make a keypad send its keys to node `data1`.
+            data1: number of the variable, or of the node as counted from the keypad, 10-24.
+            data2: any number; it is rounded to a multiple of 2 to the power of -32.
+
+        Raises:
+            ValueError: an argument is out of its range.
+            TypeError: data2 is missing, or is one too many.
+            NoRoom: the transmit buffer had no room in time.
+            PortLost: the port went away.
+        """
+        self.transmit(send_message(n, type_, data1, data2))
+
+    def keypad_mode(self, n: int, mode: trio.KeypadModeEnum | int) -> None:
+        """Choose what a keypad sends for its keys; BASIC has no word for this message."""
+        self.transmit(mode_message(n, mode))
+
+
+class MembraneKeypad(BlockingFace[KeypadNode]):
+    """A membrane keypad. It sends nothing, and passes nothing on, before it is told its offset.
+
+    Attributes:
+        node: the behaviour without input or output.
+        driver: what keeps it at work.
+    """
+
+    def __init__(self, port: Port, *, on_event: OnEvent | None = None, **options: Any) -> None:
+        """Join the ring at a port; the options are `rows`, `columns`, and those of `RingNode`."""
+        node = KeypadNode(**{"baud": paced_baud(port), **options})
+        super().__init__(node, drive(port, node.link, on_event=on_event))
+
+    @classmethod
+    def open(cls, name: str, baud: int = 115200, **options: Any) -> Self:
+        """Join the ring at a device or URL. Raises the errors of `open_port`."""
+        with closing_on_error(open_port(name, baud=baud)) as port:
+            return cls(port, **options)
+
+    @classmethod
+    def driven(cls, node: KeypadNode, driver: RingDriver) -> Self:
+        """Use a node that something else keeps at work, such as a simulated ring."""
+        face = cls.__new__(cls)
+        BlockingFace.__init__(face, node, driver)
+        return face
+
+    def press(self, *keys: int | str) -> None:
+        """Press keys, one after the other, and let each one go before the next."""
+        for key in keys:
+            self.key_down(key)
+            self.key_up(key)
+
+    def key_down(self, key: int | str) -> bool:
+        """Press a key and hold it; return whether its character went to the ring."""
+        return self.driver.act(lambda now: self.node.press(key, now))
+
+    def key_up(self, key: int | str) -> bool:
+        """Let a key go; return whether a character went to the ring, which it does in mode on_off."""
+        return self.driver.act(lambda now: self.node.release(key, now))
+
+    @property
+    def lines(self) -> list[str]:
+        """What the display shows, row by row."""
+        return self.node.display.lines
+
+    def __str__(self) -> str:
+        return self.node.display.text
+
+
+class PassiveNode(BlockingFace[RingNode]):
+    """A node that sends everything on and tells what it sees; it may send messages too.
+
+    Attributes:
+        node: the engine, which tells of each message (`Passed`, `Taken`).
+        driver: what keeps it at work.
+    """
+
+    def __init__(self, port: Port, *, on_event: OnEvent | None = None, **options: Any) -> None:
+        """Join the ring at a port; the options are those of `RingNode`."""
+        node = RingNode(trio, **{"baud": paced_baud(port), **options})
+        node.verbose = True
+        super().__init__(node, drive(port, node, on_event=on_event))
+
+    @classmethod
+    def open(cls, name: str, baud: int = 115200, **options: Any) -> Self:
+        """Join the ring at a device or URL. Raises the errors of `open_port`."""
+        with closing_on_error(open_port(name, baud=baud)) as port:
+            return cls(port, **options)

@@ -1,0 +1,184 @@
+"""A ring as a model of discrete events: each node hears the one before it, and nobody else.
+
+It is the line of `wire.py` with other routes. The nodes stand in the order in which they were attached; the
+outside, where the program under test is, stands between the last one and the first. Without an outside the
+last node feeds the first.
+
+Hop `i` is the fibre that leads away from place `i`; the outside's place is the last. A `FaultPlan` on a hop
+disturbs whole messages: it collects one before it lets it go on, so on a hop with a plan every message is
+late by its own length. A hop without one hands on each byte as it comes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from qlinkgen.link.ring import RingCodec
+from qlinkgen.sim.errors import SimulationError
+from qlinkgen.sim.faults import FaultPlan
+from qlinkgen.sim.traffic import Chunk, Engine, Route, Sender
+from qlinkgen.sim.wire import LINE, Chunks, Wire
+
+#: Plans for all hops together, or for some of them by the number of the place that they lead away from.
+Faults = FaultPlan | Mapping[int, FaultPlan] | None
+
+
+class _Hop:
+    """One fibre.
+
+    Attributes:
+        line: sends what is on it by itself, such as noise.
+        held: bytes of a message that is not complete yet.
+    """
+
+    __slots__ = ("held", "line")
+
+    def __init__(self) -> None:
+        self.line = Sender(LINE)
+        self.held = b""
+
+
+class RingWire(Wire):
+    """The fibres of a ring, and the nodes at them.
+
+    Attributes:
+        lost: bytes that were sent to a node that is switched off.
+    """
+
+    def __init__(
+        self,
+        codec: RingCodec,
+        *,
+        baud: int | None = None,
+        faults: Faults = None,
+        chunks: Chunks | None = None,
+        outside: bool = True,
+    ) -> None:
+        """Make a ring without nodes.
+
+        Args:
+            codec: the generated module of the protocol, which knows where a message begins and ends.
+            baud: bits a second, or None: what is sent arrives at once.
+            faults: what goes wrong on all hops, or on some.
+            chunks: see `Wire`; "byte" where bytes take their time, else "frame".
+            outside: there is a place for the program under test.
+
+        Raises:
+            SimulationError: an argument out of range.
+        """
+        self._marking = codec.MARKING
+        self._plans: Mapping[int, FaultPlan] = faults if isinstance(faults, Mapping) else {}
+        self._hops: dict[Sender, _Hop] = {}
+        self._places: list[Sender] = []
+        self._off: set[Sender] = set()
+        self._has_outside = outside
+        self.lost = 0
+        super().__init__(
+            baud=baud,
+            bits_per_byte=codec.BUS.bits_per_byte,
+            faults=faults if isinstance(faults, FaultPlan) else None,
+            collisions=False,
+            chunks=chunks or ("byte" if baud else "frame"),
+        )
+
+    # places
+
+    def _connect(self) -> None:
+        places = [*self._stations, *([self._outside] if self._has_outside else [])]
+        for at, place in enumerate(places):
+            after = places[(at + 1) % len(places)]
+            hop = self._hops.setdefault(place, _Hop())
+            for route in (place.route, hop.line.route):
+                route.hearers = () if after is self._outside or after in self._off else (after,)
+                route.outside = after is self._outside
+                route.on_line = True
+        self._places = places
+        most = self._marking.address_mask  # there is no address for another one
+        if len(places) > most:
+            raise SimulationError(f"{len(places)} places, the outside's included: a ring has {most} at most")
+
+    def plan(self, hop: int) -> FaultPlan | None:
+        """Return what goes wrong on a hop."""
+        return self._plans.get(hop, self.faults)
+
+    def switch_off(self, engine: Engine) -> None:
+        """Switch a node off: it hears and sends nothing, so the ring is open at its place.
+
+        Raises:
+            SimulationError: it is not on this ring.
+        """
+        station = self._station(engine)
+        station.due = None
+        self._off.add(station)
+        self._connect()
+
+    def switch_on(self, engine: Engine) -> None:
+        """Switch a node on again. What it forgets meanwhile is for the caller to reset.
+
+        Raises:
+            SimulationError: it is not on this ring.
+        """
+        station = self._station(engine)
+        self._off.discard(station)
+        self._connect()
+        self._watch(station)
+
+    def _watch(self, station: Sender) -> None:
+        if station not in self._off:
+            super()._watch(station)
+
+    def step(self, until: float) -> bool:
+        """Go on to the next event, but not beyond `until`; False where there is none before it ends.
+
+        Raises:
+            SimulationError: stations answer one another without end.
+        """
+        due = self.next_timer()
+        if due is not None and due <= until:
+            self.advance(max(due, self._now))
+            return True
+        if self._now < until < float("inf"):
+            self.advance(until)
+            return True
+        return False
+
+    @property
+    def now(self) -> float:
+        """The time up to which everything has happened."""
+        return self._now
+
+    # what is on a hop
+
+    def _send(self, station: Sender, data: bytes, now: float) -> None:
+        if not station.route.hearers and not station.route.outside:
+            self.lost += len(data)
+        number = self._places.index(station) if self._plans else 0
+        plan = self.plan(number)
+        if plan is None:
+            self._submit(now, Chunk(station.route, data))
+            return
+        for message in self._whole(self._hops[station], data):
+            what = plan.disturb(message, now, station.name, to_master=True)
+            if what is None:
+                self._submit(now, Chunk(station.route, message))
+            else:
+                self._send_disturbed(station, None, now, what)
+
+    def _whole(self, hop: _Hop, data: bytes) -> Iterator[bytes]:
+        """Yield each message when its end has come, and what stands in front of a header."""
+        marking = self._marking
+        for byte in data:
+            if not byte & marking.marker:
+                hop.held += bytes((byte,))
+                continue
+            is_end = byte >> marking.id_shift & marking.id_mask == marking.end
+            if not is_end and hop.held:
+                yield hop.held
+                hop.held = b""
+            hop.held += bytes((byte,))
+            if is_end:
+                yield hop.held
+                hop.held = b""
+
+    def _extra_route(self, sender: Sender) -> Route:
+        return self._hops[sender].line.route

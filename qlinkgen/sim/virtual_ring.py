@@ -1,0 +1,252 @@
+"""A whole ring on a virtual clock: nodes, fibres, faults, and the programs on the nodes."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar
+
+from qlinkgen.link.ring import RingNode
+from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
+from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
+from qlinkgen.protocols.trio.face import Node, engine_of
+from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.protocols.trio.nodes import MembraneKeypad, MotionCoordinator
+from qlinkgen.sim.errors import SimulationError
+from qlinkgen.sim.programs import Programs
+from qlinkgen.sim.ring import Faults, RingWire
+from qlinkgen.transport.ring_aio import AsyncRingDriver
+from qlinkgen.transport.ring_driver import GIVE_WAY, RingDriver
+from qlinkgen_codecs import trio
+
+T = TypeVar("T")
+#: Makes a node of each kind that a ring can be described with; options are those of `RingNode`.
+KINDS: dict[str, Callable[..., Node]] = {
+    "coordinator": CoordinatorNode,
+    "keypad": KeypadNode,
+    "passive": lambda **options: RingNode(trio, **options),
+}
+
+
+def make_nodes(ring: str | Iterable[str | Node], **options: Any) -> list[Node]:
+    """Return the nodes of a ring in their order.
+
+    Args:
+        ring: kinds such as "coordinator,keypad,coordinator", or nodes, or both in a list.
+        options: for each node that is made here; see `RingNode`.
+
+    Raises:
+        SimulationError: there is no such kind, or no node at all.
+    """
+    parts = ring.split(",") if isinstance(ring, str) else ring
+    nodes = [_make(part.strip(), options) if isinstance(part, str) else part for part in parts]
+    if not nodes:
+        raise SimulationError("a ring needs at least one node")
+    return nodes
+
+
+def _make(kind: str, options: dict[str, Any]) -> Node:
+    if kind not in KINDS:
+        raise SimulationError(f"there is no node of the kind {kind!r}; a ring is made of {', '.join(KINDS)}")
+    return KINDS[kind](**options)
+
+
+class VirtualRing:
+    """A closed ring of simulated nodes. Time passes only while a program waits, or in `sleep` and `settle`.
+
+    Attributes:
+        nodes: the behaviours, in the order of the ring.
+        wire: the fibres.
+    """
+
+    def __init__(
+        self,
+        ring: str | Iterable[str | Node],
+        *,
+        baud: int | None = None,
+        faults: Faults = None,
+        **options: Any,
+    ) -> None:
+        """Make a ring.
+
+        Args:
+            ring: see `make_nodes`; at most 15 nodes.
+            baud: bits a second, or None: bytes take no time.
+            faults: a plan for all hops, or plans by the number of the node that the hop leads away from.
+            options: for each node that is made here; see `RingNode`.
+
+        Raises:
+            SimulationError: an argument out of its range.
+        """
+        self.nodes = make_nodes(ring, **{"baud": baud, **options})
+        self.wire = RingWire(trio, baud=baud, faults=faults, outside=False)
+        for number, node in enumerate(self.nodes):
+            self.wire.attach(engine_of(node), f"node {number}")
+        self.wire.advance(0.0)
+        self._programs = Programs(self.wire.step)
+
+    @property
+    def now(self) -> float:
+        """Seconds on the virtual clock."""
+        return self.wire.now
+
+    # faces
+
+    def coordinator(self, place: int) -> MotionCoordinator:
+        """Return the Motion Coordinator at a place of the ring, for a blocking program."""
+        node = self._node(place, CoordinatorNode)
+        return MotionCoordinator.driven(node, HostedNode(self, node))
+
+    def keypad(self, place: int) -> MembraneKeypad:
+        """Return the keypad at a place of the ring, for a blocking program."""
+        node = self._node(place, KeypadNode)
+        return MembraneKeypad.driven(node, HostedNode(self, node))
+
+    def async_coordinator(self, place: int) -> AsyncMotionCoordinator:
+        """Return the Motion Coordinator at a place of the ring, for asyncio."""
+        node = self._node(place, CoordinatorNode)
+        return AsyncMotionCoordinator.driven(node, AsyncHostedNode(self, node))
+
+    def async_keypad(self, place: int) -> AsyncMembraneKeypad:
+        """Return the keypad at a place of the ring, for asyncio."""
+        node = self._node(place, KeypadNode)
+        return AsyncMembraneKeypad.driven(node, AsyncHostedNode(self, node))
+
+    def _node(self, place: int, kind: type[T]) -> T:
+        node = self.nodes[place]
+        if not isinstance(node, kind):
+            raise SimulationError(f"node {place} is no {kind.__name__} but a {type(node).__name__}")
+        return node
+
+    # time
+
+    def run(self, *programs: Callable[[], Any]) -> list[Any]:
+        """Run blocking programs side by side to their ends; return what they return.
+
+        Raises:
+            SimulationError: all of them wait for something that will never happen.
+        """
+        return self._programs.run(programs)
+
+    def give_way(self, due: float) -> None:
+        """Wait for the next event, at the latest until `due`; for drivers."""
+        self._programs.give_way(due)
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass for the whole ring."""
+        self.wire.advance(self.now + seconds)
+
+    def settle(self, limit: float = math.inf) -> None:
+        """Go on until nothing is under way any more, or `limit` seconds have passed."""
+        end = self.now + limit
+        while self.wire.step(end) and self.now < end:
+            pass
+
+    # nodes
+
+    def switch_off(self, place: int) -> None:
+        """Switch a node off: the ring is open there, and everything that would have to pass it is lost."""
+        self.wire.switch_off(engine_of(self.nodes[place]))
+
+    def switch_on(self, place: int) -> None:
+        """Switch a node on again; a keypad has lost its offset, a Motion Coordinator what it had received."""
+        node = self.nodes[place]
+        node.reset()
+        self.wire.switch_on(engine_of(node))
+
+
+class HostedNode(RingDriver):
+    """Lets a blocking program use a node of a `VirtualRing`."""
+
+    def __init__(self, ring: VirtualRing, node: Node) -> None:
+        self.node = engine_of(node)
+        self._ring = ring
+
+    def now(self) -> float:
+        """Return the virtual time."""
+        return self._ring.now
+
+    def act(self, function: Callable[[float], T]) -> T:
+        """See `RingDriver.act`."""
+        result = function(self._ring.now)
+        self._ring.wire.wake(self.node)
+        return result
+
+    def until(self, attempt: Callable[[float], T | None], timeout: float | None) -> T | None:
+        """See `RingDriver.until`.
+
+        Raises:
+            SimulationError: nothing will ever happen.
+        """
+        ring = self._ring
+        due = math.inf if timeout is None else ring.now + timeout
+        while (value := attempt(ring.now)) is None:
+            if ring.now >= due:
+                return None
+            ring.give_way(due)
+        ring.wire.wake(self.node)
+        return value
+
+    def give_way(self) -> None:
+        """See `RingDriver.give_way`."""
+        self._ring.give_way(self._ring.now + GIVE_WAY)
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass on the virtual clock."""
+        self.until(lambda _now: None, seconds)
+
+    def close(self) -> None:
+        """Do nothing: the node stays on the ring."""
+
+
+class AsyncHostedNode(AsyncRingDriver):
+    """Lets tasks use a node of a `VirtualRing`."""
+
+    def __init__(self, ring: VirtualRing, node: Node) -> None:
+        self.node = engine_of(node)
+        self._ring = ring
+        self._driver = HostedNode(ring, node)
+
+    def now(self) -> float:
+        """Return the virtual time."""
+        return self._ring.now
+
+    def act(self, function: Callable[[float], T]) -> T:
+        """See `RingDriver.act`."""
+        return self._driver.act(function)
+
+    async def until(self, attempt: Callable[[float], T | None], timeout: float | None) -> T | None:
+        """See `RingDriver.until`; other tasks get their turn after each event.
+
+        Raises:
+            SimulationError: nothing will ever happen, and there is no timeout.
+        """
+        ring = self._ring
+        due = math.inf if timeout is None else ring.now + timeout
+        idle = 0
+        while (value := attempt(ring.now)) is None:
+            if ring.now >= due:
+                return None
+            await asyncio.sleep(0)
+            # Other tasks may be about to send: only when nobody has for a while will nobody ever.
+            idle = 0 if ring.wire.step(due) else idle + 1
+            if idle > _IDLE_ROUNDS:
+                raise SimulationError("nothing is going to happen on the ring: give a timeout, or send first")
+        ring.wire.wake(self.node)
+        return value
+
+    async def give_way(self) -> None:
+        """See `RingDriver.give_way`."""
+        await self.pause(GIVE_WAY)
+
+    async def pause(self, seconds: float) -> None:
+        """Let time pass on the virtual clock."""
+        await self.until(lambda _now: None, seconds)
+
+    async def close(self) -> None:
+        """Do nothing: the node stays on the ring."""
+
+
+#: Turns of the event loop without anything on the ring after which it is taken for stuck.
+_IDLE_ROUNDS = 10_000

@@ -1,0 +1,250 @@
+"""A thread that keeps a node of a ring at work, whatever the program does."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import sys
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Protocol, Self, TypeVar
+
+from qlinkgen.errors import PortError, PortLost
+from qlinkgen.link.ring import RingNode
+from qlinkgen.transport.port import Port
+from qlinkgen.transport.ring_driver import FLUSH, GIVE_WAY, LOOK, LOOK_OFTEN, NodeIo, OnEvent, RingDriver
+
+T = TypeVar("T")
+#: `select` takes no descriptor from here on (FD_SETSIZE).
+_SELECT_LIMIT = 1024
+
+
+class _Waker(Protocol):
+    def wait(self, timeout: float) -> bytes: ...
+
+    def wake(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def release(self) -> None: ...
+
+
+class NodeThread(RingDriver):
+    """Keeps a node at work in a thread of its own.
+
+    Attributes:
+        node: the engine.
+        port: where it receives and transmits; it belongs to this driver from now on.
+        on_event: called with each event of the engine, in the thread of the node.
+    """
+
+    def __init__(self, port: Port, node: RingNode, *, on_event: OnEvent | None = None) -> None:
+        """Begin to receive and to send on."""
+        self.node = node
+        self.port = port
+        self.on_event = on_event
+        self._io = NodeIo(port, node)
+        self._changed = threading.Condition()
+        self._failure: BaseException | None = None
+        self._closing = False
+        self._waker: _Waker = _waker(port, self)
+        self._thread = threading.Thread(target=self._run, name=f"ring node at {port.name}", daemon=True)
+        self._thread.start()
+
+    def now(self) -> float:
+        """Return the time on the port's clock."""
+        return self.port.now()
+
+    # the thread of the node
+
+    def _run(self) -> None:
+        with _HandOver(self):
+            data = b""
+            while not self._closing:
+                with self._changed:
+                    now = self._io.step(data)
+                    timeout = self._io.wait_at_most(now, 60.0)
+                    self._changed.notify_all()
+                self._io.report(self.on_event)
+                data = self._waker.wait(timeout)
+
+    def fail(self, failure: BaseException) -> None:
+        """Keep a failure for the thread that uses the node next."""
+        with self._changed:
+            self._failure = failure
+            self._changed.notify_all()
+
+    # the threads of the program
+
+    def act(self, function: Callable[[float], T]) -> T:
+        """See `RingDriver.act`.
+
+        Raises:
+            PortLost: the port went away.
+        """
+        with self._changed:
+            self._check()
+            now = self.port.now()
+            result = function(now)
+            self._io.flush(now)
+            self._leave()
+        return result
+
+    def until(self, attempt: Callable[[float], T | None], timeout: float | None) -> T | None:
+        """See `RingDriver.until`.
+
+        Raises:
+            PortLost: the port went away.
+        """
+        with self._changed:
+            deadline = None if timeout is None else self.port.now() + timeout
+            while True:
+                self._check()
+                now = self.port.now()
+                value = attempt(now)
+                if value is not None:
+                    break
+                left = None if deadline is None else deadline - now
+                if left is not None and left <= 0:
+                    return None
+                self._changed.wait(left)
+            self._io.flush(now)
+            self._leave()
+        return value
+
+    def _leave(self) -> None:
+        """Wake the thread where there is something that it does not know of."""
+        if self.node.next_timer() is not None or (self.on_event is not None and self.node.events):
+            self._waker.wake()
+
+    def give_way(self) -> None:
+        """See `RingDriver.give_way`."""
+        with self._changed:
+            self._changed.wait(GIVE_WAY)
+
+    def pause(self, seconds: float) -> None:
+        """Let time pass; the node goes on."""
+        self.port.sleep(seconds)
+
+    def _check(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+        if self._closing:
+            raise PortLost(f"{self.port.name} was closed here; open it again to use it", port=self.port.name)
+
+    def close(self) -> None:
+        """Send what is still to be sent, stop the thread, and close the port.
+
+        Raises:
+            Exception: what `on_event` has raised; the port is closed all the same.
+        """
+        if self._closing:
+            return
+        failure = self._failure
+        if failure is None:
+            with contextlib.suppress(PortError):  # a port that is lost has nothing left to send
+                self.until(lambda _now: self.node.idle or None, FLUSH)
+        self._closing = True
+        self._waker.stop()
+        if self._thread is not threading.current_thread():
+            self._thread.join()
+        self._waker.release()
+        self.port.close()
+        with self._changed:
+            self._changed.notify_all()
+        if failure is not None and not isinstance(failure, PortError):
+            raise failure
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class _HandOver:
+    """Ends a thread without a traceback: what made it fail is raised where the node is used."""
+
+    def __init__(self, driver: NodeThread) -> None:
+        self._driver = driver
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> bool:
+        if error is not None:
+            self._driver.fail(error)
+        return True
+
+
+def _waker(port: Port, driver: NodeThread) -> _Waker:
+    descriptor = port.fileno()
+    if descriptor is None or sys.platform == "win32":
+        return _Slices(port, driver)
+    return _Pipe(port, descriptor)
+
+
+class _Pipe:
+    """Waits for bytes at a descriptor, and can be woken."""
+
+    def __init__(self, port: Port, descriptor: int) -> None:
+        self._port = port
+        self._wake_out, self._wake_in = os.pipe()
+        os.set_blocking(self._wake_out, False)
+        os.set_blocking(self._wake_in, False)
+        self._watched = (descriptor, self._wake_out)
+        self._released = False
+        self._poll = select.poll() if max(self._watched) >= _SELECT_LIMIT else None
+        if self._poll is not None:
+            for each in self._watched:
+                self._poll.register(each, select.POLLIN)
+
+    def wait(self, timeout: float) -> bytes:
+        if self._poll is not None:
+            ready = [each for each, _ in self._poll.poll(timeout * 1000)]
+        else:
+            ready = select.select(self._watched, (), (), timeout)[0]
+        if self._wake_out in ready:
+            os.read(self._wake_out, 4096)
+        return self._port.read(0) if self._watched[0] in ready else b""
+
+    def wake(self) -> None:
+        if not self._released:
+            with contextlib.suppress(BlockingIOError):  # the pipe is full: that wakes as well
+                os.write(self._wake_in, b"!")
+
+    def stop(self) -> None:
+        self.wake()
+
+    def release(self) -> None:
+        if not self._released:
+            self._released = True
+            os.close(self._wake_in)
+            os.close(self._wake_out)
+
+
+class _Slices:
+    """Waits for bytes at a port that has no descriptor: a little at a time."""
+
+    def __init__(self, port: Port, driver: NodeThread) -> None:
+        self._port = port
+        self._driver = driver
+
+    def wait(self, timeout: float) -> bytes:
+        often = not self._driver.node.idle
+        return self._port.read(min(timeout, LOOK_OFTEN if often else LOOK))
+
+    def wake(self) -> None:
+        pass
+
+    def stop(self) -> None:
+        self._port.close()  # so that a read that waits returns
+
+    def release(self) -> None:
+        pass

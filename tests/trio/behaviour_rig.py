@@ -1,0 +1,141 @@
+"""A ring to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over ptys.
+
+A behaviour is written once, as a program that uses the faces of several nodes in turn.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import inspect
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+from qlinkgen.protocols.trio import (
+    AsyncMembraneKeypad,
+    AsyncMotionCoordinator,
+    MembraneKeypad,
+    MotionCoordinator,
+)
+from qlinkgen.sim.port_ring import PortRing
+from qlinkgen.sim.virtual_ring import VirtualRing
+from qlinkgen.transport import Port, memory_ring, open_port
+
+#: Seconds that a wait may take where it must not fail; a busy machine needs some.
+PATIENCE = 20.0
+FACES: dict[str, dict[str, Any]] = {
+    "blocking": {"coordinator": MotionCoordinator, "keypad": MembraneKeypad},
+    "asyncio": {"coordinator": AsyncMotionCoordinator, "keypad": AsyncMembraneKeypad},
+}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Where a behaviour is tried."""
+
+    face: Literal["blocking", "asyncio"]
+    transport: Literal["virtual", "memory", "pty"]
+
+    @property
+    def name(self) -> str:
+        return f"{self.face}-{self.transport}"
+
+
+SETTINGS = [
+    Setting(face, transport)
+    for face in ("blocking", "asyncio")
+    for transport in ("virtual", "memory", "pty")
+]  # fmt: skip
+
+
+class AsyncFace:
+    """Makes a face for asyncio look like a blocking one."""
+
+    def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
+        object.__setattr__(self, "_target", target)
+        object.__setattr__(self, "_loop", loop)
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._target, name)
+        if not inspect.ismethod(value):
+            return value
+
+        def call(*args: Any, **kwargs: Any) -> Any:
+            result = value(*args, **kwargs)
+            return self._loop.run_until_complete(result) if inspect.iscoroutine(result) else result
+
+        return call
+
+    def __str__(self) -> str:
+        return str(self._target)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        setattr(self._target, name, value)
+
+
+class Rig:
+    """The nodes of a ring, each with its face."""
+
+    def __init__(self, setting: Setting, faces: list[Any]) -> None:
+        self.setting = setting
+        self.faces = faces
+
+    def coordinator(self, place: int = 0) -> MotionCoordinator:
+        return cast(MotionCoordinator, self.faces[place])
+
+    def keypad(self, place: int) -> MembraneKeypad:
+        return cast(MembraneKeypad, self.faces[place])
+
+    def until(self, condition: Callable[[], object]) -> None:
+        """Let time pass until something is so on whatever node."""
+        for _ in range(int(PATIENCE / 0.002)):
+            if condition():
+                return
+            self.faces[0].sleep(0.002)
+        raise AssertionError("it never got so")
+
+    def rest(self) -> None:
+        """Let everything arrive that is under way, when nothing can be waited for."""
+        self.faces[0].sleep(0.05)
+
+
+@contextlib.contextmanager
+def make_rig(setting: Setting, ring: str, **options: Any) -> Iterator[Rig]:
+    """Make a ring of these nodes and a face for each."""
+    kinds = ring.split(",")
+    with contextlib.ExitStack() as stack:
+        loop = stack.enter_context(asyncio.Runner()).get_loop() if setting.face == "asyncio" else None
+        if setting.transport == "virtual":
+            simulated = VirtualRing(ring, **options)
+            prefix = "async_" if loop else ""
+            faces = [getattr(simulated, prefix + kind)(at) for at, kind in enumerate(kinds)]
+        else:
+            ports = _ports(stack, setting, len(kinds))
+            faces = [
+                _face(setting, kind, port, loop, options) for kind, port in zip(kinds, ports, strict=True)
+            ]
+        shown = [AsyncFace(face, loop) if loop else face for face in faces]
+        for face in shown:
+            stack.callback(face.close)
+        yield Rig(setting, shown)
+
+
+def _ports(stack: contextlib.ExitStack, setting: Setting, count: int) -> list[Port]:
+    if setting.transport == "memory":
+        return list(memory_ring(count))
+    ring = stack.enter_context(PortRing(["port"] * count))
+    return [open_port(path) for path in ring.paths]
+
+
+def _face(
+    setting: Setting, kind: str, port: Port, loop: asyncio.AbstractEventLoop | None, options: dict[str, Any]
+) -> Any:
+    make = FACES[setting.face][kind]
+    if loop is None:
+        return make(port, **options)
+
+    async def made() -> Any:
+        return make(port, **options)
+
+    return loop.run_until_complete(made())
