@@ -31,9 +31,11 @@ setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' to
 	@$(PIP) '.[dev]'
 	@touch $@
 
-demo: .venv/.user  ## A message of each protocol in construct, Python and C; then a simulated bus, moved over a pty
+demo: .venv/.user  ## A message of each protocol in construct, Python and C; then a bus, a ring and a chip set behind ptys
 	@$(BIN)/python examples/demo.py
 	@$(BIN)/python examples/bus.py
+	@$(BIN)/python examples/ring.py
+	@$(BIN)/python examples/chip.py
 
 test: lint  ## Lint, types, layers, drift of the generated files, then every test
 	@echo "== pytest"

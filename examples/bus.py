@@ -39,9 +39,9 @@ def main() -> int:
             print(f"  node {found.node}: version {found.info.version_major}.{found.info.version_minor}, "
                   f"serial number {found.info.serial_number}")  # fmt: skip
         node = bus.node(3)
+        recorder.clear()
         node.node_start()
         print(f"moving node 3 along {len(PATH)} words, {sum(PATH)} counts in all")
-        recorder.clear()
         for _ in bus.stream_motion({3: PATH}):
             pass
         while (state := node.motion()).motor_status & qlink.MotorStatus.RUNNING:

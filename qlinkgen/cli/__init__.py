@@ -17,11 +17,12 @@ COMMANDS = {
     "encode": "Values to wire bytes.",
     "decode": "Wire bytes to values: one JSON object a line.",
     "explain": "Say what every byte of a frame is, and what is wrong with it.",
-    "simulate": "Put simulated nodes on a port of their own, with faults if wanted.",
+    "simulate": "Put simulated nodes, a ring, or a chip set on a port of their own, with faults if wanted.",
     "scan": "Find the nodes of a Q.link bus.",
-    "send": "Send one request on a port; print its answer as decode does.",
+    "send": "Send one request on a port and print its answer, or one message into a ring.",
     "load": "Load an Intel HEX file into a Q.link node.",
-    "monitor": "Listen to a bus: who asks, who answers, what is repeated, late or damaged.",
+    "monitor": "Listen to a bus or a fibre: who asks, who answers, what is repeated, late or damaged.",
+    "ring": "Be a passive node of a Trio ring: send everything on, and print it.",
     "doctor": "Say what a serial port can do, what its latency costs, and what to change.",
 }
 

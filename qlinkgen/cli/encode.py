@@ -87,8 +87,13 @@ def compose(
     assignments: tuple[str, ...],
     addresses: tuple[str, ...],
     object_: str | None,
+    *,
+    codec: ModuleType | None = None,
 ) -> tuple[ModuleType, Message, Any]:
-    """The codec, the message that a command line means, and the object with its values."""
+    """The codec, the message that a command line means, and the object with its values.
+
+    The codec is made of the protocol unless one is given.
+    """
     if message and "=" in message:
         assignments, message = (message, *assignments), None
     record = _record(protocol, {} if object_ is None else jsonlines.parse_object(object_, "--json"))
@@ -96,7 +101,7 @@ def compose(
     given = {**record.fields, **_assigned(assignments)}
     address = _one(addresses) if addresses else record.address
     warn_unconfirmed(protocol, found)
-    codec = load_codec(protocol)
+    codec = codec or load_codec(protocol)
     return codec, found, build(codec, found, given, _address(protocol, found, address))
 
 

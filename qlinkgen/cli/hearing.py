@@ -22,7 +22,7 @@ from qlinkgen.model.protocol import Protocol
 MASTER = "master"
 EVERYBODY = "all"
 #: Width of "node 16 > master", and of the longest names that are given room.
-_WHO, _MOST = 16, 32
+_WHO, MOST = 16, 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class Teller:
         self._broadcast = codec.BUS.broadcast
         self._start = start
         self._raw = raw
-        self._width = min(max(map(len, protocol.by_name)), _MOST)
+        self._width = min(max(map(len, protocol.by_name)), MOST)
 
     def line(self, heard: Heard) -> str:
         """One thing as a line of text."""
@@ -151,8 +151,7 @@ class Teller:
         if self._raw:
             record["raw"] = frame.hex()
             remarks = [*remarks, frame.hex(" ")]
-        values = fields(self._protocol.by_name[message.NAME], message)
-        text = " ".join(f"{name}={_shown(value)}" for name, value in values.items())
+        text = values_text(self._protocol, message)
         who = f"{_name(record['from'])} > {_name(record['to'])}"
         return Telling(record, who, message.NAME, text, remarks, wrong)
 
@@ -161,7 +160,15 @@ def _name(who: int | str | None) -> str:
     return "?" if who is None else who if isinstance(who, str) else f"node {who}"
 
 
+def values_text(protocol: Protocol, message: Any) -> str:
+    """The fields of a message as text."""
+    values = fields(protocol.by_name[message.NAME], message)
+    return " ".join(f"{name}={_shown(value)}" for name, value in values.items())
+
+
 def _shown(value: Any) -> str:
     if isinstance(value, list):
         return ",".join(map(str, value)) or "none"
-    return value if isinstance(value, str) and value else jsonlines.line(value)
+    # A text with a blank has to be told from the next field; one with control characters would act.
+    plain = isinstance(value, str) and value.isprintable() and " " not in value
+    return value if plain and value else jsonlines.line(value)

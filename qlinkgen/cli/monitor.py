@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 import math
-import sys
 
 import click
 
-from qlinkgen.cli import jsonlines
+from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import load_codec
 from qlinkgen.cli.common import crc_option, load_protocol
-from qlinkgen.cli.hearing import Teller
+from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, check_options, kind_of
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import (
     baud_option,
-    check_master_slave,
-    counted,
     line_of,
     matching,
-    open_line,
+    open_free,
+    open_usual,
     parity_option,
     seconds,
     slack_option,
-    speed,
     stop_bits_option,
 )
-from qlinkgen.link.events import Damaged
-from qlinkgen.link.monitor import Heard, Monitor, Unanswered
-from qlinkgen.transport.conversation import timing_of
-from qlinkgen.transport.port import Port
 
-#: Most seconds between two looks at whether to stop.
-LOOK = 0.1
+BELONGS: Belongs = {"slack": (BUS,)}
 
 
 @click.command("monitor")
@@ -67,6 +59,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     took, or what is not as usual: repeat, late, not answered, a second answer, one to nothing. The times are
     those at which this computer got the bytes; --slack is what an answer may be late by for that.
 
+    On a ring this is a listener on one fibre: it prints messages with the address that they have there. Of
+    mc1231a, host and chip set have a line each, and an answer makes sense beside its request alone: it
+    cannot be monitored.
+
     With --json a frame is an object as decode prints it, with "at", "from" and "to"; requests have "repeat",
     answers "delay" and "late", frames that answer nothing "stray". {"at", "unanswered": {...}} is a request
     without an answer, {"at", "asked", "error": {...}} a damaged frame, with the node that was being asked.
@@ -74,79 +70,31 @@ def command(  # noqa: PLR0917  # click passes them by name
     \b
     qlinkgen monitor /dev/ttyUSB1
     qlinkgen monitor /dev/ttyUSB1 --json --count 1000 > traffic.jsonl
+    qlinkgen monitor /dev/ttyUSB1 --protocol trio --baud 38400
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
-    check_master_slave(loaded, "monitor")
-    codec = load_codec(loaded)
-    with StopSignals() as signals, open_line(port, speed(loaded, baud), line_of(parity, stop_bits)) as opened:
-        start = opened.now()
-        teller = Teller(loaded, codec, start, raw=raw)
-        monitor = Monitor(codec, timing_of(codec, opened, slack=slack), accepts=matching(protocol))
-        session = _Session(monitor, teller, as_json=as_json, count=count)
-        click.echo(f"qlinkgen: listening to {loaded.name} on {port}; Ctrl-C ends it", err=True)
-        try:
-            session.listen(opened, math.inf if length is None else start + length, signals)
-        finally:
-            click.echo(f"qlinkgen: {session.summary()}", err=True)
-
-
-class _Session:
-    """Feeds a monitor from a port, prints what it hears, and counts."""
-
-    def __init__(self, monitor: Monitor, teller: Teller, *, as_json: bool, count: int | None) -> None:
-        """`count` frames end it."""
-        self._monitor = monitor
-        self._teller = teller
-        self._as_json = as_json
-        self._left = math.inf if count is None else count
-        self._frames = self._faults = self._unanswered = 0
-
-    def listen(self, port: Port, end: float, signals: StopSignals) -> None:
-        """Listen until a time, a number of frames, or a signal."""
-        self._until(port, end, signals)
-        # What was asked before the end has its time to be answered.
-        due = self._monitor.next_timer()
-        if due is not None:
-            self._until(port, due, None)
-        self._monitor.finish(port.now())
-        self._print()
-
-    def _until(self, port: Port, end: float, signals: StopSignals | None) -> None:
-        monitor, now = self._monitor, port.now()
-        while self._left and now < end and not (signals and signals.stopped):
-            due = monitor.next_timer()
-            limit = min(end, now + LOOK if due is None else min(due, now + LOOK))
-            data = port.read(max(0.0, limit - now))
-            now = port.now()
-            if data:
-                monitor.receive(data, now)
-            monitor.handle_timer(now)
-            self._print()
-
-    def _print(self) -> None:
-        heard = self._monitor.heard
-        if not heard:
-            return
-        while heard and self._left:
-            self._show(heard.popleft())
-        heard.clear()
-        sys.stdout.flush()
-
-    def _show(self, heard: Heard) -> None:
-        if isinstance(heard, Unanswered):
-            self._unanswered += 1
-        else:
-            self._left -= 1
-            self._frames += 1
-            self._faults += isinstance(heard, Damaged)
-        teller = self._teller
-        text = jsonlines.line(teller.tell(heard).record) if self._as_json else teller.line(heard)
-        sys.stdout.write(f"{text}\n")
-
-    def summary(self) -> str:
-        """What there was, in a line."""
-        return (
-            f"{counted(self._frames, 'frame')}, {self._faults} of them damaged; "
-            f"{counted(self._unanswered, 'request')} not answered; "
-            f"{self._monitor.skipped} of {counted(self._monitor.bytes, 'byte')} in no frame"
+    kind = kind_of(loaded)
+    if kind is HOST:
+        raise Failure(
+            f"{loaded.name} cannot be monitored: host and device have a line each, and an answer makes sense "
+            "beside its request alone; what the host says is shown by "
+            f"`qlinkgen decode {loaded.name} --direction request --raw < {port}`"
         )
+    check_options(loaded.name, kind, BELONGS)
+    codec = load_codec(loaded)
+    line = line_of(parity, stop_bits)
+    opener = open_free if kind is RING else open_usual
+    with StopSignals() as signals, opener(loaded, port, baud, line) as opened:
+        end = math.inf if length is None else opened.now() + length
+        click.echo(f"qlinkgen: listening to {loaded.name} on {port}; Ctrl-C ends it", err=True)
+        if kind is RING:
+            from qlinkgen.cli.monitor_ring import monitor_ring  # noqa: PLC0415  # each kind loads its own
+
+            monitor_ring(loaded, codec, opened, signals, as_json=as_json, raw=raw, count=count, end=end)
+        else:
+            from qlinkgen.cli.monitor_bus import monitor_bus  # noqa: PLC0415
+
+            monitor_bus(
+                loaded, codec, opened, signals, as_json=as_json, raw=raw, count=count, end=end, slack=slack,
+                accepts=matching(protocol),
+            )  # fmt: skip

@@ -1,37 +1,39 @@
-"""``qlinkgen send``: one transaction on a port."""
+"""``qlinkgen send``: one transaction on a port, or one message into a ring."""
 
 from __future__ import annotations
 
-from typing import Any
+from types import ModuleType
+from typing import Literal
 
 import click
 
-from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import Failure
-from qlinkgen.cli.common import crc_option, load_protocol, warn
-from qlinkgen.cli.decode import message_record
+from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.encode import address_option, compose, json_option
+from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, is_shipped, kind_of
+from qlinkgen.cli.send_bus import check_request, send_on_bus
 from qlinkgen.cli.wire_options import (
     attempts_option,
     baud_option,
-    check_master_slave,
-    echo_mode,
     echo_option,
     line_of,
     matching,
-    open_line,
     parity_option,
+    seconds,
     slack_option,
-    speed,
     stop_bits_option,
 )
-from qlinkgen.errors import LinkError
-from qlinkgen.link.events import Event, Stray
-from qlinkgen.link.master import MasterEngine, Reply
-from qlinkgen.model.message import Message
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.conversation import timing_of
+
+BELONGS: Belongs = {
+    "attempts": (BUS, HOST),
+    "slack": (BUS, HOST),
+    "echo": (BUS,),
+    "axis": (HOST,),
+    "checksum": (HOST,),
+    "check": (HOST,),
+    "stay": (RING,),
+    "count": (RING,),
+}
 
 
 @click.command("send")
@@ -47,6 +49,32 @@ from qlinkgen.transport.conversation import timing_of
 @echo_option
 @parity_option
 @stop_bits_option
+@click.option(
+    "--axis", type=click.IntRange(1, 2), metavar="N", help="mc1231a: the axis to make current before."
+)
+@click.option(
+    "--checksum",
+    type=click.Choice(["always", "never"]),
+    default="always",
+    show_default=True,
+    help="mc1231a: whether the checksum behind the answer is read.",
+)
+@click.option(
+    "--check", is_flag=True, help="mc1231a: read the status word then, and fail if it tells a command error."
+)
+@click.option(
+    "--seconds",
+    "stay",
+    callback=seconds,
+    metavar="SECONDS",
+    help="trio: how long to stay on the ring behind the message.  [default: 0.2]",
+)
+@click.option(
+    "--count",
+    type=click.IntRange(1),
+    metavar="N",
+    help="trio: leave before that when N messages for this place have come.",
+)
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     port: str,
@@ -61,6 +89,11 @@ def command(  # noqa: PLR0917  # click passes them by name
     echo: str | None,
     parity: str,
     stop_bits: str,
+    axis: int | None,
+    checksum: Literal["always", "never"],
+    check: bool,
+    stay: float | None,
+    count: int | None,
     crc: str | None,
 ) -> None:
     """Send a request on PORT and print the answer as decode does: one JSON object.
@@ -69,58 +102,59 @@ def command(  # noqa: PLR0917  # click passes them by name
     written as for encode. A request that nobody answers prints nothing. One that must not be repeated is sent
     once, whatever --attempts says. The counter of a motion is the one that is given.
 
-    Exit code 1 if no answer or a wrong one came, or if the port is missing, busy or lost; 2 if the request
-    cannot be sent, before a byte is.
+    On a ring this is one more place for as long as it lasts: it sends on what comes, prints what is for it,
+    and leaves after --seconds, as soon as nothing is under way. Nothing tells whether a message has arrived.
+    Of mc1231a, --axis sends set_1 or set_2 before; without it the axis that is current is meant.
+
+    Exit code 1 if no answer or a wrong one came, if the chip set refuses, or if the port is missing, busy or
+    lost; 2 if the request cannot be sent, before a byte is.
 
     \b
     qlinkgen send /dev/ttyUSB0 qlink motor_position --node 3
     qlinkgen send /dev/ttyUSB0 qlink motion --node 3 counter=1 outputs=0x0F segments=100,200
     qlinkgen send /dev/ttyUSB0 qlink node_start --node 0
+    qlinkgen send /dev/ttyUSB0 trio character_transfer --address 2 characters=HELLO --baud 38400
+    qlinkgen send /dev/ttyUSB0 mc1231a set_vel value=2.75 --axis 2 --baud 57600
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
-    check_master_slave(loaded, "send")
-    codec, found, request = compose(loaded, message, assignments, addresses, object_)
-    _check_request(loaded, found)
+    kind = kind_of(loaded)
+    check_options(loaded.name, kind, BELONGS)
+    own = _own_codec(protocol, kind)
+    codec, found, request = compose(loaded, message, assignments, addresses, object_, codec=own)
+    line = line_of(parity, stop_bits)
+    if kind is not RING:
+        check_request(loaded, found)
     try:
         request.to_frame()
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
-    with open_line(port, speed(loaded, baud), line_of(parity, stop_bits)) as opened:
-        engine = MasterEngine(
-            codec,
-            timing_of(codec, opened, slack=slack, attempts=attempts),
-            echo=echo_mode(loaded, echo),
-            accepts=matching(protocol),
+    if kind is RING:
+        from qlinkgen.cli.send_ring import send_into_ring  # noqa: PLC0415  # each kind loads its own
+
+        send_into_ring(loaded, codec, request, port, seconds=stay, count=count, baud=baud, line=line)
+    elif kind is HOST:
+        from qlinkgen.cli.send_host import send_to_chip  # noqa: PLC0415
+
+        send_to_chip(
+            loaded, found, request, port, axis=axis, checksum=checksum, check=check,
+            attempts=attempts, slack=slack, baud=baud, line=line,
+        )  # fmt: skip
+    else:
+        send_on_bus(
+            loaded, codec, request, port, baud=baud, line=line,
+            attempts=attempts, slack=slack, echo=echo, accepts=matching(protocol),
+        )  # fmt: skip
+
+
+def _own_codec(name: str, kind: Kind) -> ModuleType | None:
+    """The module that a host is written for; the others work with that of any schema."""
+    if kind is not HOST:
+        return None
+    if not is_shipped(name, "mc1231a"):
+        raise Failure(
+            f"{name} has one host and one device; of those `qlinkgen send` knows mc1231a alone, "
+            "since no schema says how to get back in step"
         )
-        reply = _transact(loaded, BlockingMaster(engine, opened), request)
-    if reply.response is not None:
-        click.echo(jsonlines.line(message_record(loaded, reply.response)))
+    from qlinkgen_codecs import mc1231a  # noqa: PLC0415  # for a chip set alone
 
-
-def _check_request(protocol: Protocol, message: Message) -> None:
-    requests = {command.request.name: command.name for command in protocol.commands}
-    if message.name in requests:
-        return
-    if message.command in requests.values():
-        raise Failure(f"{message.name} is what a node answers; send its request, {message.command}")
-    raise Failure(
-        f"{message.name} belongs to no command, so nothing says what answers it; "
-        f"`qlinkgen show {protocol.name}` lists the commands"
-    )
-
-
-def _transact(protocol: Protocol, master: BlockingMaster, request: Any) -> Reply:
-    """Ask; where that fails, show the good frames that came and were no answer."""
-    strays: list[Any] = []
-
-    def note(event: Event) -> None:
-        if isinstance(event, Stray):
-            strays.append(event.message)
-
-    master.on_event = note
-    try:
-        return master.transact(request)
-    except LinkError:
-        for stray in strays:
-            warn(f"this came, and is no answer: {jsonlines.line(message_record(protocol, stray))}")
-        raise
+    return mc1231a

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
-
 import click
 
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import crc_option, load_protocol
-from qlinkgen.cli.stopping import StopSignals
-from qlinkgen.cli.wire_options import check_master_slave, counted, is_qlink, parse_nodes, select_crc
-from qlinkgen.link.codec import Codec
-from qlinkgen.link.slave import SlaveEngine, Station
-from qlinkgen.sim import FaultPlan, FaultPlanError, Wire
+from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, kind_of, shipped_kind
+from qlinkgen.cli.simulating import plan_of
 
-#: Byte times from a request to its answer on a line that takes its time, so that the asker can stop sending.
-TURNAROUND = 1
+BELONGS: Belongs = {"nodes": (BUS,), "echo": (BUS,), "ring": (RING,), "crc": (BUS, RING)}
 
 
 @click.command("simulate")
 @click.argument("protocol")
 @click.option(
-    "--nodes", metavar="LIST", help="Numbers of the nodes: 3, 1-16 or 1,3,5-7; one node unless given."
+    "--nodes", metavar="LIST", help="Numbers of nodes on a bus: 3, 1-16 or 1,3,5-7; one node unless given."
+)
+@click.option(
+    "--ring",
+    metavar="LIST",
+    help="Nodes of a ring in their order, of coordinator, keypad and passive; one coordinator unless given.",
 )
 @click.option(
     "--link", type=click.Path(), metavar="PATH", help="Make a symbolic link to the port, under this name."
@@ -40,6 +38,7 @@ TURNAROUND = 1
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
     nodes: str | None,
+    ring: str | None,
     link: str | None,
     faults: str | None,
     seed: int | None,
@@ -56,92 +55,50 @@ def command(  # noqa: PLR0917  # click passes them by name
     path words after a node_start. Nodes of another PROTOCOL where one master asks and nodes answer send the
     defaults of each response, and repeat what it has to repeat.
 
+    trio is a ring: PORT is a place of its own between the last node and the first, which has address 1 then.
+    No program runs on a coordinator; it keeps what it is sent. A keypad sends nothing on before it has its
+    offset. mc1231a is a chip set with two axes that move.
+
     Faults are drop, flip, truncate, delay, late, duplicate, stray, noise and silent, each with its chance
     from 0 to 1 and, behind a colon, its extent; all=0.05 spreads 5 % over those not named; to=slaves or
-    to=master keeps to one direction.
+    to=master keeps to one direction. On a ring they happen on every fibre.
 
     \b
     qlinkgen simulate qlink --nodes 1-16 --link /tmp/qlink
     qlinkgen simulate qlink --nodes 1,3 --baud 115200 --faults drop=0.02,flip=0.01 --seed 7
     qlinkgen simulate thermostat.yaml --nodes 1-4
+    qlinkgen simulate trio --ring coordinator,keypad,coordinator --link /tmp/ring
+    qlinkgen simulate mc1231a --link /tmp/chip
     """  # noqa: D301  # click takes the character \b for "do not wrap"
-    plan = _plan(faults, seed)
-    codec, stations = _stations(protocol, nodes, crc)
-    bits = codec.BUS.bits_per_byte
-    # Byte by byte is how a line delivers; without a speed there is nothing to deliver in between.
-    wire = Wire(
-        baud=baud, bits_per_byte=bits, faults=plan, echo=echo, chunks="byte" if baud is not None else "frame"
-    )
-    turnaround = TURNAROUND * bits / baud if baud else 0.0
-    engines = [SlaveEngine(codec, station, turnaround=turnaround) for station in stations]
-    for engine in engines:
-        wire.attach(engine, f"node {engine.station.number}")
-    _run(wire, link, f"{counted(len(engines), 'node')} of {protocol}")
-    click.echo(f"qlinkgen: {_summary(engines, plan)}", err=True)
+    kind = _kind(protocol, crc)
+    plan = plan_of(faults, seed)
+    if kind is RING:
+        from qlinkgen.cli.simulate_ring import simulate_ring  # noqa: PLC0415  # each kind loads its own
+
+        simulate_ring(ring, link=link, baud=baud, plan=plan, crc=crc)
+    elif kind is HOST:
+        from qlinkgen.cli.simulate_host import simulate_host  # noqa: PLC0415
+
+        simulate_host(link=link, baud=baud, plan=plan)
+    else:
+        from qlinkgen.cli.simulate_bus import simulate_bus  # noqa: PLC0415
+
+        simulate_bus(protocol, nodes, link=link, baud=baud, plan=plan, echo=echo, crc=crc)
 
 
-def _plan(text: str | None, seed: int | None) -> FaultPlan | None:
-    if text is None:
-        return None
-    try:
-        plan = FaultPlan.parse(text)
-        if seed is None:
-            return plan
-        return FaultPlan.parse(f"{text},seed={seed}")
-    except FaultPlanError as error:
-        raise Failure(f"--faults {text}: {error}") from None
-
-
-def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[Station]]:
-    if is_qlink(name):
-        from qlinkgen_codecs import qlink  # noqa: PLC0415  # other protocols do without
-
-        select_crc(crc)
-        return qlink, _qlink_nodes(parse_nodes(nodes or "1", 1, 16))
-    from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does without the compiler
-    from qlinkgen.sim.generic import GenericNode  # noqa: PLC0415
-
+def _kind(name: str, crc: str | None) -> Kind:
+    """The kind of a protocol that can be simulated, and the options are those of this kind."""
+    shipped = shipped_kind(name)
+    if shipped is not None:
+        check_options(*shipped, BELONGS)
+        return shipped[1]
     protocol = load_protocol(name, crc)
-    check_master_slave(protocol, "simulate")
-    codec = load_codec(protocol)
-    if protocol.bus.nodes is None or protocol.address_name is None:
-        if nodes is not None:
-            raise Failure(f"the frames of {protocol.name} have no address; leave out --nodes {nodes}")
-        return codec, [GenericNode(codec)]
-    first, last = protocol.bus.nodes
-    numbers = parse_nodes(str(first) if nodes is None else nodes, first, last)
-    return codec, [GenericNode(codec, number) for number in numbers]
-
-
-def _qlink_nodes(numbers: Iterable[int]) -> list[Station]:
-    from qlinkgen.protocols.qlink import VirtualNode  # noqa: PLC0415  # other protocols do without
-    from qlinkgen_codecs.qlink import PositionType  # noqa: PLC0415
-
-    kind = PositionType.JVL_MACTALK  # a node without one tells no position
-    return [VirtualNode(number, position_type=kind, serial_number=1000 + number) for number in numbers]
-
-
-def _run(wire: Wire, link: str | None, what: str) -> None:
-    from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
-
-    bus = PtyBus(wire, link=link)
-    try:
-        with StopSignals(bus.request_stop):
-            click.echo(json.dumps({"port": bus.path}))
-            where = bus.path if link is None else f"{bus.path}, linked as {link}"
-            click.echo(f"qlinkgen: {what} on {where}; Ctrl-C ends it", err=True)
-            bus.run()
-    finally:
-        bus.close()
-
-
-def _summary(engines: list[SlaveEngine], plan: FaultPlan | None) -> str:
-    counters = [engine.counters for engine in engines]
-    answers = counted(sum(each.answers for each in counters), "answer")
-    requests = counted(sum(each.requests for each in counters), "request")
-    broadcasts = counted(max(each.broadcasts for each in counters), "broadcast")
-    text = f"{answers} to {requests}, {broadcasts}"
-    if plan is None:
-        return text
-    kinds = ", ".join(f"{kind} {plan.counts[kind]}" for kind in plan.rates if plan.counts[kind])
-    return f"{text}, {counted(plan.counts.total, 'fault')}{kinds and f' ({kinds})'}; seed {plan.seed}"
+    kind = kind_of(protocol)
+    if kind is not BUS:
+        known = "trio" if kind is RING else "mc1231a"
+        raise Failure(
+            f"{protocol.name}: of a schema of your own, `qlinkgen simulate` has nodes where one master "
+            f"asks and nodes answer (bus kind master_slave); of a {kind.value} it has {known} alone"
+        )
+    check_options(protocol.name, kind, BELONGS)
+    return kind

@@ -8,22 +8,18 @@ from typing import Any, NamedTuple, cast
 
 import click
 
-from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
-from qlinkgen.cli.common import find_schema
+from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.link.echo import PROBE, EchoMode
-from qlinkgen.link.master import Accepts
-from qlinkgen.model.frame import DelimitedFrame, PacketFrame
+from qlinkgen.link.transaction import Accepts
+from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import whole_number
 from qlinkgen.transport.opening import open_port
-from qlinkgen.transport.port import Port
+from qlinkgen.transport.port import Ability, Port
 
-_KINDS = {
-    "master_slave": "has answers that only make sense beside their request",
-    "ring": "is a ring",
-    "host": "has one host and one device",
-}
+#: Speed of a port on which bytes take no time, such as a pty: nothing depends on it.
+ANY_SPEED = 115200
 
 
 def seconds(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:  # noqa: ARG001
@@ -103,22 +99,31 @@ def open_line(name: str, baud: int, line: Line = Line()) -> Port:  # noqa: B008 
         raise Failure(str(error)) from None
 
 
+def open_usual(protocol: Protocol, name: str, baud: int | None, line: Line = Line()) -> Port:  # noqa: B008
+    """Open a port at the speed given, or that of the schema; otherwise as `open_line`."""
+    return open_line(name, speed(protocol, baud), line)
+
+
+def open_free(protocol: Protocol, name: str, baud: int | None, line: Line = Line()) -> Port:  # noqa: B008
+    """Open a port for a protocol of which no source names a speed: one must be given where it matters.
+
+    Raises PortError, and Failure where the speed is missing.
+    """
+    if baud is not None or protocol.bus.baud is not None:
+        return open_usual(protocol, name, baud, line)
+    port = open_line(name, ANY_SPEED, line)
+    if port.capabilities.paced is Ability.NO:
+        return port
+    port.close()
+    return open_usual(protocol, name, None, line)  # tells what is missing
+
+
 def speed(protocol: Protocol, given: int | None) -> int:
     """The speed of the line: what was given, else that of the schema."""
     baud = given or protocol.bus.baud
     if baud is None:
         raise Failure(f"the schema of {protocol.name} names no usual speed; give --baud N")
     return baud
-
-
-def check_master_slave(protocol: Protocol, command: str) -> None:
-    """Refuse a protocol that is not of the kind where one master asks and nodes answer."""
-    if protocol.bus.kind == "master_slave" and not isinstance(protocol.frame, PacketFrame):
-        return
-    raise Failure(
-        f"{protocol.name} {_KINDS[protocol.bus.kind]}; `qlinkgen {command}` works with protocols where one "
-        "master asks and nodes answer (bus kind master_slave): qlink, or a schema of your own"
-    )
 
 
 def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
@@ -134,28 +139,25 @@ def counted(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-def is_qlink(name: str) -> bool:
-    """Whether a PROTOCOL is the Q.link that ships, so that what was written for it alone can be used."""
-    return name == "qlink" or find_schema(name).resolve() == (schemas_dir() / "qlink.yaml").resolve()
-
-
 def matching(name: str) -> Mapping[str, Accepts] | None:
     """What is known of the answers of a PROTOCOL beyond their shape."""
-    if not is_qlink(name):
+    if not is_shipped(name, "qlink"):
         return None
     from qlinkgen.protocols.qlink.matching import ACCEPTS  # noqa: PLC0415  # for Q.link alone
 
     return ACCEPTS
 
 
-def select_crc(crc: str | None) -> None:
-    """Make the shipped Q.link use another checksum, if one is wanted."""
+def select_crc(crc: str | None, codec: Any = None) -> None:
+    """Make a codec that ships, Q.link's unless given, use another checksum, if one is wanted."""
     if crc is None:
         return
-    from qlinkgen_codecs import qlink  # noqa: PLC0415  # not every command on a port is for Q.link
+    if codec is None:
+        from qlinkgen_codecs import qlink  # noqa: PLC0415  # not every command on a port is for Q.link
 
+        codec = qlink
     try:
-        qlink.select_crc(crc)
+        codec.select_crc(crc)
     except ValueError as error:
         raise Failure(f"--set crc={crc}: {error}") from None
 

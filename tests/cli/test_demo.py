@@ -1,4 +1,4 @@
-"""`make demo` shows three outputs that agree, and a bus that moves."""
+"""`make demo` shows three outputs that agree, and a bus, a ring and a chip set that move."""
 
 from __future__ import annotations
 
@@ -37,3 +37,23 @@ def test_the_bus() -> None:
     assert "stands at 720" in done.stdout
     assert "a5 a5 04 03 03 75 6c" in done.stdout, "the frame that starts node 3"
     assert "0 timeouts" in done.stdout
+
+
+def test_the_ring() -> None:
+    done = demo(ENVIRONMENT, "ring.py")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "the keypad shows 'SPEED:   150', its key '5' came" in done.stdout
+    assert "8a 00 00 2a 00 00 00 00 00 00 00 00 00 35 29 88" in done.stdout, "what came round"
+
+
+def test_the_chip_set() -> None:
+    done = demo(ENVIRONMENT, "chip.py")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "stands at 3000" in done.stdout
+    assert "11 00 02 c0 00" in done.stdout, "the packet of 2.75 counts a sample"
+
+
+def test_make_runs_all_of_them() -> None:
+    text = (REPOSITORY / "Makefile").read_text("utf-8")
+    for name in ("demo.py", "bus.py", "ring.py", "chip.py"):
+        assert f"examples/{name}" in text

@@ -275,7 +275,8 @@ def test_two_at_one_port() -> None:
     ("arguments", "code", "text"),
     [
         (("/dev/not-there",), 1, "there is no port '/dev/not-there'"),
-        (("x", "--protocol", "trio"), 2, "`qlinkgen monitor` works with protocols where one master asks"),
+        (("x", "--protocol", "trio", "--slack", "1"), 2, "--slack goes with a bus with a master"),
+        (("x", "--protocol", "mc1231a"), 2, "`qlinkgen decode mc1231a --direction request --raw < x`"),
         (("x", "--protocol", "nope"), 2, "there is no schema 'nope'"),
         (("x", "--count", "0"), 2, "--count"),
         (("x", "--seconds", "soon"), 2, "--seconds soon: no number of seconds"),

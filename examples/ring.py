@@ -1,0 +1,73 @@
+"""A Trio ring without hardware: keypad, coordinator, a program at a pty, and every message on the wire.
+
+Run it with ``make demo``, or alone with ``python examples/ring.py``. The program is a Motion Coordinator of
+its own: it opens the pty by its name, as it would open /dev/ttyUSB0, and has its place between the last node
+and the first. So the keypad is 10, the other coordinator 11, and the program itself 12.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from qlinkgen.protocols.trio import CHR, VALUE, CoordinatorNode, KeypadNode, MotionCoordinator
+from qlinkgen.sim.port_ring import RingBus, ring_bus
+from qlinkgen_codecs import trio
+
+BAUD = 38400
+KEYPAD, OTHER, SELF = 10, 11, 12
+#: SEND's types, and the channel of GET for characters as they come.
+VARIABLE, OFFSET, CHARACTERS = 1, 2, 4
+#: Seconds; far more than a pty needs: the demo has to work on a machine that is busy with something else.
+PATIENCE = 30
+
+
+def main() -> int:
+    """Write on the display, read a key, set a variable, and show what went over the wire."""
+    keypad, other = KeypadNode(baud=BAUD), CoordinatorNode(baud=BAUD)
+    ring = ring_bus([keypad, other], baud=BAUD)
+    recorder = Recorder(ring)
+    with ring, MotionCoordinator.open(ring.path, BAUD) as mc:
+        print(f"a simulated ring at {ring.path}, {BAUD} baud: keypad, coordinator, and this program")
+        mc.send(KEYPAD, OFFSET, 11)  # its keys go two nodes on: from the keypad, that is this program
+        mc.print_(KEYPAD, CHR(12), "SPEED:", VALUE(150, 6, 0), end="")
+        mc.send(OTHER, VARIABLE, 7, -0.25)
+        mc.send(SELF, VARIABLE, 0, 42)  # once round: when it is here, all before it has arrived as well
+        mc.wait_until(lambda: mc.vr[0] == 42, PATIENCE)
+        ring.call(lambda: press(ring, keypad, "5"))
+        key = mc.get(CHARACTERS, PATIENCE)
+        status = int(mc.netstat)
+    print(f"  the keypad shows {keypad.display.lines[0]!r}, its key {chr(key)!r} came")
+    print(f"  VR(7) of the coordinator is {other.vr[7]}, the own VR(0) {mc.vr[0]:g}, NETSTAT {status}")
+    print("on the wire, each message on each fibre:")
+    print("\n".join(recorder.lines))
+    right = keypad.display.lines[0] == "SPEED:   150" and other.vr[7] == -0.25
+    return 0 if right and key == ord("5") and not status else 1
+
+
+def press(ring: RingBus, keypad: KeypadNode, key: str) -> None:
+    """Press a key of a simulated keypad, in the thread that runs the ring."""
+    keypad.press(key, ring.port.now())
+    ring.wire.wake(keypad.link)
+
+
+class Recorder:
+    """What a listener on each fibre of the ring has heard."""
+
+    def __init__(self, ring: RingBus) -> None:
+        self.lines: list[str] = []
+        self._decoders: dict[str, trio.StreamDecoder] = {}
+        self._names = {"node 0": "from keypad", "node 1": "from coordinator"}
+        self._start: float | None = None
+        ring.wire.taps.append(self._hear)
+
+    def _hear(self, at: float, source: str, data: bytes) -> None:
+        if self._start is None:
+            self._start = at
+        for found in self._decoders.setdefault(source, trio.StreamDecoder()).feed(data):
+            raw = found.raw if isinstance(found, trio.Fault) else found.to_frame()
+            when, who = (at - self._start) * 1e3, self._names.get(source, "from program")
+            self.lines.append(f"  {when:7.2f} ms  {who:16} {found!r}\n{'':14}{raw.hex(' ')}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

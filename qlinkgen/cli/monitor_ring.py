@@ -1,0 +1,71 @@
+"""``qlinkgen monitor`` on one fibre of a ring."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+import click
+
+from qlinkgen.cli.ring_hearing import RingPrinter, RingTeller
+from qlinkgen.cli.stopping import StopSignals
+from qlinkgen.cli.wire_options import counted
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.transport.port import Port
+
+#: Most seconds between two looks at whether to stop.
+LOOK = 0.1
+
+
+def monitor_ring(
+    protocol: Protocol,
+    codec: ModuleType,
+    port: Port,
+    signals: StopSignals,
+    *,
+    as_json: bool,
+    raw: bool,
+    count: int | None,
+    end: float,
+) -> None:
+    """Print what is on the fibre, until a time, a number of messages, or a signal; then a summary."""
+    teller = RingTeller(protocol, codec, port.now(), raw=raw)
+    session = _Session(codec, teller, RingPrinter(teller, as_json=as_json, count=count))
+    try:
+        session.listen(port, end, signals)
+    finally:
+        click.echo(f"qlinkgen: {session.summary()}", err=True)
+
+
+class _Session:
+    """Feeds a decoder from a port, and prints what it finds."""
+
+    def __init__(self, codec: Any, teller: RingTeller, printer: RingPrinter) -> None:
+        self._decoder = codec.StreamDecoder()
+        self._fault: type[Any] = codec.Fault
+        self._teller = teller
+        self._printer = printer
+        self._bytes = 0
+
+    def listen(self, port: Port, end: float, signals: StopSignals) -> None:
+        """Listen until a time, a number of messages, or a signal."""
+        while not self._printer.done and port.now() < end and not signals.stopped:
+            data = port.read(max(0.0, min(LOOK, end - port.now())))
+            self._bytes += len(data)
+            self._print(self._decoder.feed(data), port.now())
+        self._print(self._decoder.finish(), port.now())
+
+    def _print(self, found: list[Any], now: float) -> None:
+        for each in found:
+            if isinstance(each, self._fault):
+                told = self._teller.broken(now, each.kind, bytes(each.raw), each.message, offset=each.offset)
+            else:
+                told = self._teller.message(now, each, each.to_frame())
+            self._printer.show(now, told)
+        if found:
+            self._printer.flush()
+
+    def summary(self) -> str:
+        """What there was, in a line."""
+        skipped = self._decoder.counters.skipped
+        return f"{self._printer.summary()}; {skipped} of {counted(self._bytes, 'byte')} in no message"

@@ -1,0 +1,114 @@
+"""``qlinkgen ring``: a passive node of a ring, which sends everything on and prints it."""
+
+from __future__ import annotations
+
+import math
+
+import click
+
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.codec import load_codec
+from qlinkgen.cli.common import crc_option, load_protocol, warn
+from qlinkgen.cli.kinds import RING, kind_of
+from qlinkgen.cli.ring_hearing import RingPrinter, RingTeller
+from qlinkgen.cli.ring_place import RingPlace, netstat_text
+from qlinkgen.cli.stopping import StopSignals
+from qlinkgen.cli.wire_options import (
+    baud_option,
+    counted,
+    line_of,
+    open_free,
+    parity_option,
+    seconds,
+    stop_bits_option,
+)
+from qlinkgen.link.ring_events import RingEvent
+
+
+@click.command("ring")
+@click.argument("port")
+@click.option(
+    "--protocol", default="trio", show_default=True, metavar="PROTOCOL", help="What is spoken on the ring."
+)
+@click.option("--json", "as_json", is_flag=True, help="One object a line instead of text.")
+@click.option("--raw", is_flag=True, help="Add the bytes of each message, as they came.")
+@click.option("--count", type=click.IntRange(1), metavar="N", help="End after N messages, damaged ones too.")
+@click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End after this time.")
+@baud_option
+@parity_option
+@stop_bits_option
+@crc_option
+def command(  # noqa: PLR0917  # click passes them by name
+    port: str,
+    protocol: str,
+    as_json: bool,
+    raw: bool,
+    count: int | None,
+    length: float | None,
+    baud: int | None,
+    parity: str,
+    stop_bits: str,
+    crc: str | None,
+) -> None:
+    """Be a passive node of a ring: send everything on, and print it, until Ctrl-C.
+
+    PORT receives from the node before and transmits to the next one. A message is sent on while it still
+    comes; one that turns out damaged then is ended so that nobody takes it.
+
+    A line has seconds since the start, the address as it came (1 is this place; 2 the next node), message and
+    fields. With --json it is an object as decode prints it, with "at", and "sent_on"; a damaged message is
+    {"at", "error": {...}, "sent_on"}. Behind the end the ring is open at this place.
+
+    \b
+    qlinkgen ring /dev/ttyUSB0 --baud 38400
+    qlinkgen ring /dev/ttyUSB0 --baud 38400 --json --count 1000 > traffic.jsonl
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    loaded = load_protocol(protocol, crc)
+    if kind_of(loaded) is not RING:
+        raise Failure(f"{loaded.name} is no ring; listen with `qlinkgen monitor PORT --protocol {protocol}`")
+    codec = load_codec(loaded)
+    opened = open_free(loaded, port, baud, line_of(parity, stop_bits))
+    with StopSignals() as signals, RingPlace(opened, codec) as place:
+        teller = RingTeller(loaded, codec, place.start, raw=raw)
+        session = _Session(place, teller, RingPrinter(teller, as_json=as_json, count=count))
+        click.echo(f"qlinkgen: a node of the ring on {port}; Ctrl-C ends it", err=True)
+        try:
+            session.run(math.inf if length is None else place.start + length, signals)
+        finally:
+            session.say_summary()
+
+
+class _Session:
+    """Prints what a place of the ring sees."""
+
+    def __init__(self, place: RingPlace, teller: RingTeller, printer: RingPrinter) -> None:
+        self._place = place
+        self._teller = teller
+        self._printer = printer
+
+    def run(self, end: float, signals: StopSignals) -> None:
+        """Stay until a time, a number of messages, or a signal, and leave between two messages."""
+        place = self._place
+        while not self._printer.done and place.now() < end and not signals.stopped:
+            self._print(place.events(end))
+        self._print(place.leave())
+
+    def _print(self, events: list[RingEvent]) -> None:
+        for event in events:
+            telling = self._teller.event(event)
+            if telling is not None:
+                self._printer.show(event.at, telling)
+        if events:
+            self._printer.flush()
+
+    def say_summary(self) -> None:
+        """Say what there was, in a line, and whether all of it was shown."""
+        counters, printer = self._place.node.counters, self._printer
+        missing = counters.taken + counters.passed + counters.total_faults - printer.shown
+        if missing > 0 and not printer.done:
+            warn(f"{counted(missing, 'message')} came faster than they could be printed, and are not shown")
+        click.echo(
+            f"qlinkgen: {printer.summary()}; {counters.passed} sent on, {counters.taken} for this place, "
+            f"{counters.total_faults} broken on arrival; {netstat_text(self._place.node.netstat)}",
+            err=True,
+        )

@@ -1,0 +1,126 @@
+"""What is on a ring, as lines of text and as JSON: for a node of it, and for a listener on one fibre."""
+
+from __future__ import annotations
+
+import math
+import sys
+from types import ModuleType
+from typing import Any
+
+from qlinkgen.cli import jsonlines
+from qlinkgen.cli.decode import message_record
+from qlinkgen.cli.hearing import MOST, Telling, values_text
+from qlinkgen.cli.wire_options import counted
+from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
+from qlinkgen.model.protocol import Protocol
+
+
+class RingTeller:
+    """Puts what comes on a ring into words.
+
+    Args:
+        protocol: the protocol on the ring.
+        codec: its live module.
+        start: time that counts as 0.
+        raw: add the bytes of each message.
+    """
+
+    def __init__(self, protocol: Protocol, codec: ModuleType, start: float, *, raw: bool) -> None:
+        self._protocol = protocol
+        self._codec = codec
+        self._start = start
+        self._raw = raw
+        self.width = min(max(map(len, protocol.by_name)), MOST)
+
+    def line(self, at: float, telling: Telling) -> str:
+        """One thing as a line of text."""
+        return f"{self._seconds(at):12.6f}  {telling.line(self.width)}"
+
+    def event(self, event: RingEvent) -> Telling | None:
+        """What a node has seen; None for what is no message that came."""
+        if isinstance(event, Taken):
+            return self.message(event.at, event.message, event.frame, sent_on=False)
+        if isinstance(event, Passed):
+            return self._passed(event)
+        if isinstance(event, Broken):
+            return self.broken(event.at, event.kind, event.raw, event.text, sent_on=event.cut_short)
+        return None
+
+    def _passed(self, event: Passed) -> Telling:
+        try:
+            message = self._codec.decode(event.frame)
+        except self._codec.DecodeError as error:
+            return self.broken(event.at, error.kind, event.frame, str(error), sent_on=True)
+        return self.message(event.at, message, event.frame, sent_on=True)
+
+    def message(self, at: float, message: Any, frame: bytes, *, sent_on: bool | None = None) -> Telling:
+        """A message; `sent_on` is None where nobody is there to send anything on."""
+        name = self._protocol.address_name or "address"
+        record = {"at": self._seconds(at), **message_record(self._protocol, message)}
+        remarks = []
+        if sent_on is not None:
+            record["sent_on"] = sent_on
+        if self._raw:
+            record["raw"] = frame.hex()
+            remarks.append(frame.hex(" "))
+        who = f"{name} {getattr(message, name)}{', here' if sent_on is False else ''}"
+        return Telling(record, who, message.NAME, values_text(self._protocol, message), remarks)
+
+    def broken(
+        self,
+        at: float,
+        kind: str,
+        raw: bytes,
+        text: str,
+        *,
+        offset: int | None = None,
+        sent_on: bool | None = None,
+    ) -> Telling:
+        """Bytes that are no message."""
+        fault = {"kind": kind, "offset": offset, "raw": raw.hex(), "message": text}
+        record: dict[str, Any] = {"at": self._seconds(at), "error": fault}
+        if sent_on is not None:
+            record["sent_on"] = sent_on
+        remarks = ["sent on"] if sent_on else []
+        return Telling(record, "?", f"damaged ({kind})", f"{text}: {raw.hex(' ')}", remarks, wrong=True)
+
+    def _seconds(self, at: float) -> float:
+        return round(at - self._start, 6)
+
+
+class RingPrinter:
+    """Prints what a teller tells, and counts it.
+
+    Attributes:
+        shown: messages that were printed, broken ones too.
+        damaged: the broken ones among them.
+    """
+
+    def __init__(self, teller: RingTeller, *, as_json: bool, count: int | None) -> None:
+        """After `count` messages nothing is printed any more."""
+        self._teller = teller
+        self._as_json = as_json
+        self._most = math.inf if count is None else count
+        self.shown = self.damaged = 0
+
+    @property
+    def done(self) -> bool:
+        """As much was printed as was asked for."""
+        return self.shown >= self._most
+
+    def show(self, at: float, telling: Telling) -> None:
+        """Print one thing, unless enough was printed."""
+        if self.done:
+            return
+        self.shown += 1
+        self.damaged += telling.wrong
+        text = jsonlines.line(telling.record) if self._as_json else self._teller.line(at, telling)
+        sys.stdout.write(f"{text}\n")
+
+    def flush(self) -> None:
+        """Let whoever reads along see what was printed."""
+        sys.stdout.flush()
+
+    def summary(self) -> str:
+        """What was printed, in a few words."""
+        return f"{counted(self.shown, 'message')}, {self.damaged} of them damaged"

@@ -1,0 +1,61 @@
+"""``qlinkgen send`` for a chip set: one transaction, for an axis."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import click
+
+from qlinkgen.cli import jsonlines
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.decode import message_record
+from qlinkgen.cli.wire_options import Line, open_free
+from qlinkgen.link.host_rules import Packet
+from qlinkgen.model.message import Message
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.protocols.mc1231a import Host
+from qlinkgen.protocols.mc1231a.facts import AXES, SELECT
+from qlinkgen_stations.mc1231a import AxisCalls
+
+
+def send_to_chip(
+    protocol: Protocol,
+    message: Message,
+    request: Any,
+    port: str,
+    *,
+    axis: int | None,
+    checksum: Literal["always", "never"],
+    check: bool,
+    attempts: int,
+    slack: float | None,
+    baud: int | None,
+    line: Line,
+) -> None:
+    """Make the axis current if one is given, send the packet, and print the answer."""
+    _check_axis(message, axis)
+    axes = _checked_axes(message, request, axis) if check else []
+    context = None if axis is None else SELECT[axis]
+    with (
+        open_free(protocol, port, baud, line) as opened,
+        Host(opened, checksum=checksum, attempts=attempts, slack=slack) as host,
+    ):
+        response = host.transact(Packet(request, context)).response
+        if checksum == "always" or response.FIELDS:  # otherwise nobody has waited for anything to come
+            click.echo(jsonlines.line(message_record(protocol, response)))
+        for each in axes:
+            host.raise_command_error(each)
+
+
+def _check_axis(message: Message, axis: int | None) -> None:
+    if axis is not None and not hasattr(AxisCalls, message.command):
+        raise Failure(f"{message.command} does not act on the current axis; leave out --axis {axis}")
+
+
+def _checked_axes(message: Message, request: Any, axis: int | None) -> list[int]:
+    """The axes whose status word is read."""
+    if axis is not None:
+        return [axis]
+    if message.command == "multi_update":
+        return [each for each in AXES if request.axes >> (each - 1) & 1]
+    raise Failure("--check reads the status word of an axis; say which with --axis 1 or --axis 2")

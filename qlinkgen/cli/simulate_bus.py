@@ -1,0 +1,80 @@
+"""``qlinkgen simulate`` for protocols where one master asks: nodes that answer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.common import load_protocol
+from qlinkgen.cli.kinds import is_shipped
+from qlinkgen.cli.simulating import run_bus, say
+from qlinkgen.cli.wire_options import counted, parse_nodes, select_crc
+from qlinkgen.link.codec import Codec
+from qlinkgen.link.slave import SlaveEngine, Station
+from qlinkgen.sim import FaultPlan, Wire
+
+#: Byte times from a request to its answer on a line that takes its time, so that the asker can stop sending.
+TURNAROUND = 1
+
+
+def simulate_bus(
+    protocol: str,
+    nodes: str | None,
+    *,
+    link: str | None,
+    baud: int | None,
+    plan: FaultPlan | None,
+    echo: bool,
+    crc: str | None,
+) -> None:
+    """Put the nodes on a pty, until a signal comes."""
+    from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
+
+    codec, stations = _stations(protocol, nodes, crc)
+    bits = codec.BUS.bits_per_byte
+    # Byte by byte is how a line delivers; without a speed there is nothing to deliver in between.
+    wire = Wire(
+        baud=baud, bits_per_byte=bits, faults=plan, echo=echo, chunks="byte" if baud is not None else "frame"
+    )
+    turnaround = TURNAROUND * bits / baud if baud else 0.0
+    engines = [SlaveEngine(codec, station, turnaround=turnaround) for station in stations]
+    for engine in engines:
+        wire.attach(engine, f"node {engine.station.number}")
+    run_bus(PtyBus(wire, link=link), link, f"{counted(len(engines), 'node')} of {protocol}")
+    say(_summary(engines), plan)
+
+
+def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[Station]]:
+    if is_shipped(name, "qlink"):
+        from qlinkgen_codecs import qlink  # noqa: PLC0415  # other protocols do without
+
+        select_crc(crc)
+        return qlink, _qlink_nodes(parse_nodes(nodes or "1", 1, 16))
+    from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does without the compiler
+    from qlinkgen.sim.generic import GenericNode  # noqa: PLC0415
+
+    protocol = load_protocol(name, crc)
+    codec = load_codec(protocol)
+    if protocol.bus.nodes is None or protocol.address_name is None:
+        if nodes is not None:
+            raise Failure(f"the frames of {protocol.name} have no address; leave out --nodes {nodes}")
+        return codec, [GenericNode(codec)]
+    first, last = protocol.bus.nodes
+    numbers = parse_nodes(str(first) if nodes is None else nodes, first, last)
+    return codec, [GenericNode(codec, number) for number in numbers]
+
+
+def _qlink_nodes(numbers: Iterable[int]) -> list[Station]:
+    from qlinkgen.protocols.qlink import VirtualNode  # noqa: PLC0415  # other protocols do without
+    from qlinkgen_codecs.qlink import PositionType  # noqa: PLC0415
+
+    kind = PositionType.JVL_MACTALK  # a node without one tells no position
+    return [VirtualNode(number, position_type=kind, serial_number=1000 + number) for number in numbers]
+
+
+def _summary(engines: list[SlaveEngine]) -> str:
+    counters = [engine.counters for engine in engines]
+    answers = counted(sum(each.answers for each in counters), "answer")
+    requests = counted(sum(each.requests for each in counters), "request")
+    broadcasts = counted(max(each.broadcasts for each in counters), "broadcast")
+    return f"{answers} to {requests}, {broadcasts}"

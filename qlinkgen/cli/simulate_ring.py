@@ -1,0 +1,71 @@
+"""``qlinkgen simulate trio``: nodes of a ring, with the outside between the last and the first."""
+
+from __future__ import annotations
+
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.simulating import run_bus, say
+from qlinkgen.cli.wire_options import counted, select_crc
+from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
+from qlinkgen.protocols.trio.face import Node, engine_of
+from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.sim import FaultPlan, SimulationError
+
+#: What is on the ring unless somebody says what.
+RING = "coordinator"
+
+
+def simulate_ring(
+    ring: str | None, *, link: str | None, baud: int | None, plan: FaultPlan | None, crc: str | None
+) -> None:
+    """Put the ring behind a pty, until a signal comes."""
+    from qlinkgen.sim.port_ring import ring_bus  # noqa: PLC0415  # needs a system that has ptys
+    from qlinkgen_codecs import trio  # noqa: PLC0415  # as the others import theirs
+
+    if plan is not None and plan.to != "both":
+        raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; leave out to={plan.to}")
+    select_crc(crc, trio)
+    given = RING if ring is None else ring
+    try:
+        bus = ring_bus(given, link=link, baud=baud, faults=plan)
+    except SimulationError as error:
+        raise Failure(f"--ring {given}: {error}") from None
+    run_bus(bus, link, f"{counted(len(bus.nodes), 'node')} of trio")
+    for place, node in enumerate(bus.nodes, 1):
+        say(f"address {place}, {_account(node)}", None)
+    say(_summary(bus.nodes), plan)
+
+
+def _account(node: Node) -> str:
+    """What a node has seen, and what it has become by that."""
+    engine = engine_of(node)
+    counters = engine.counters
+    seen = f"{counters.taken} taken, {counters.passed} sent on, NETSTAT {int(engine.netstat)}"
+    if isinstance(node, CoordinatorNode):
+        return f"coordinator: {seen}{_received(node)}{_variables(node)}"
+    if isinstance(node, KeypadNode):
+        return f"keypad: {seen}{_state(node)}"
+    return f"passive: {seen}"
+
+
+def _received(node: CoordinatorNode) -> str:
+    return f"; received {''.join(node.received)!r}" if node.received else ""
+
+
+def _variables(node: CoordinatorNode) -> str:
+    changed = [f"; VR({number}) = {value:g}" for number, value in enumerate(node.vr) if value]
+    return "".join(changed)
+
+
+def _state(node: KeypadNode) -> str:
+    if node.offset is None:
+        return f"; it has no offset, so it let {counted(node.link.counters.blocked, 'message')} go no further"
+    rows = [row for row in node.display.lines if row.strip()]
+    shown = f"; it shows {' / '.join(map(repr, rows))}" if rows else ""
+    return f"; offset {node.offset}{shown}"
+
+
+def _summary(nodes: list[Node]) -> str:
+    counters = [engine_of(node).counters for node in nodes]
+    taken = counted(sum(each.taken for each in counters), "message")
+    wrong = counted(sum(each.total_faults for each in counters), "broken one")
+    return f"{taken} taken in all, {wrong}"

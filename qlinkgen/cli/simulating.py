@@ -1,0 +1,53 @@
+"""What `simulate` does whatever it simulates: faults from the command line, a pty, the end."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.stopping import StopSignals
+from qlinkgen.cli.wire_options import counted
+from qlinkgen.sim import FaultPlan, FaultPlanError
+
+if TYPE_CHECKING:
+    from qlinkgen.sim.pty_bus import PtyBus
+
+
+def plan_of(text: str | None, seed: int | None) -> FaultPlan | None:
+    """The faults of ``--faults`` and ``--seed``."""
+    if text is None:
+        return None
+    try:
+        plan = FaultPlan.parse(text)
+        if seed is None:
+            return plan
+        return FaultPlan.parse(f"{text},seed={seed}")
+    except FaultPlanError as error:
+        raise Failure(f"--faults {text}: {error}") from None
+
+
+def run_bus(bus: PtyBus, link: str | None, what: str) -> None:
+    """Say where the port is, run until a signal comes, and close the port."""
+    try:
+        with StopSignals(bus.request_stop):
+            click.echo(json.dumps({"port": bus.path}))
+            where = bus.path if link is None else f"{bus.path}, linked as {link}"
+            click.echo(f"qlinkgen: {what} on {where}; Ctrl-C ends it", err=True)
+            bus.run()
+    finally:
+        bus.close()
+
+
+def say(text: str, plan: FaultPlan | None) -> None:
+    """A line of the summary, and the faults behind it if there were to be any."""
+    click.echo(f"qlinkgen: {text}{_faults(plan)}", err=True)
+
+
+def _faults(plan: FaultPlan | None) -> str:
+    if plan is None:
+        return ""
+    kinds = ", ".join(f"{kind} {plan.counts[kind]}" for kind in plan.rates if plan.counts[kind])
+    return f", {counted(plan.counts.total, 'fault')}{kinds and f' ({kinds})'}; seed {plan.seed}"
