@@ -14,7 +14,7 @@ from qlinkgen.cli.common import on_terminal
 from qlinkgen.cli.diagnosis import Advice, Cost, Echo, advise, cost, probe
 from qlinkgen.cli.tables import Table
 from qlinkgen.cli.wire_options import open_line
-from qlinkgen.transport.conversation import ASSUMED_LATENCY, WAKE_UP
+from qlinkgen.transport.conversation import ASSUMED_LATENCY, OTHER_PROGRAM, WAKE_UP
 from qlinkgen.transport.port import Ability, Capabilities, Port
 
 _MEANINGS = {
@@ -133,7 +133,11 @@ def _terms(port: Port, total: Cost) -> Table:
     size = f"{total.longest} bytes, request and answer at their longest"
     table.add("on the wire", _time(total.on_wire), size)
     table.add("allowance", _time(total.allowance), "three byte times, in which a node begins to answer")
-    table.add("host slack", _time(total.host_slack), f"{held}, and {_time(WAKE_UP)} to wake this program")
+    other = f", {_time(OTHER_PROGRAM)} for the program at its other end" * (
+        port.capabilities.paced is Ability.NO
+    )
+    woken = f"{held}{other}, and {_time(WAKE_UP)} to wake this program"
+    table.add("host slack", _time(total.host_slack), woken)
     table.add("deadline", _time(total.deadline), "their sum: no answer until then, and it is asked again")
     return table
 

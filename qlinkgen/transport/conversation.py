@@ -16,6 +16,8 @@ from qlinkgen.transport.port import Ability, Port
 ASSUMED_LATENCY = 0.016
 #: A process that is not of real time may be woken so much later than it asked for.
 WAKE_UP = 0.004
+#: A pty or a socket leads to another program, which may have to wait for a processor before it answers.
+OTHER_PROGRAM = 0.02
 #: What has come since the last transaction is read away before the next; more of it is an endless stream,
 #: which the deadlines deal with.
 STALE_READS = 16
@@ -24,7 +26,8 @@ STALE_READS = 16
 def host_slack(port: Port) -> float:
     """Return the seconds that a port and the operating system may add to a transaction."""
     latency = port.capabilities.latency
-    return WAKE_UP + (ASSUMED_LATENCY if latency is None else latency)
+    woken = WAKE_UP + (OTHER_PROGRAM if port.capabilities.paced is Ability.NO else 0.0)
+    return woken + (ASSUMED_LATENCY if latency is None else latency)
 
 
 def timing_of(codec: Codec, port: Port, *, slack: float | None = None, attempts: int = 3) -> Timing:

@@ -20,8 +20,8 @@ from qlinkgen.protocols.qlink.matching import ACCEPTS
 from qlinkgen.transport import MemoryPort, Port, memory_pair
 from qlinkgen.transport.aio import AsyncMaster
 from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen.transport.conversation import ASSUMED_LATENCY, WAKE_UP, host_slack, timing_of
-from qlinkgen.transport.port import Capabilities
+from qlinkgen.transport.conversation import ASSUMED_LATENCY, OTHER_PROGRAM, WAKE_UP, host_slack, timing_of
+from qlinkgen.transport.port import Ability, Capabilities
 from qlinkgen.transport.serving import serve
 from qlinkgen_codecs import qlink
 from tests.link.line import Node, bus
@@ -668,4 +668,10 @@ def test_slack_is_that_of_the_port() -> None:
         assert host_slack(port) == pytest.approx(expected)
         assert timing_of(qlink, port).host_slack == pytest.approx(expected)
     assert timing_of(qlink, port, slack=0.5).host_slack == 0.5
+
+
+def test_behind_a_pty_another_program_has_to_be_woken_too() -> None:
+    _, port, _ = bus()
+    port.capabilities = Capabilities(latency=0.0, paced=Ability.NO)
+    assert host_slack(port) == pytest.approx(WAKE_UP + OTHER_PROGRAM)
     assert not timing_of(qlink, port).paced  # nobody knows, so nothing is taken for granted
