@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 
 from qlinkgen.link.slave import SlaveEngine
-from qlinkgen.transport import aio
 from qlinkgen.transport.port import Port
 
 #: Seconds after which a server looks whether it is to stop, while nothing comes.
@@ -26,6 +25,8 @@ def serve(port: Port, *slaves: SlaveEngine, stop: Callable[[], bool] = lambda: F
 
 async def serve_async(port: Port, *slaves: SlaveEngine, stop: Callable[[], bool] = lambda: False) -> None:
     """Do the same in an event loop, where a cancelled task stops it too."""
+    from qlinkgen.transport import aio  # noqa: PLC0415  # asyncio costs blocking servers 50 ms
+
     steps = _serving(port, slaves)
     timeout = next(steps)
     while not stop():

@@ -6,11 +6,16 @@
 
 from __future__ import annotations
 
-from qlinkgen.protocols.mc1231a.aio import AsyncAxis, AsyncHost
+from typing import TYPE_CHECKING
+
+from qlinkgen.protocols.faces import asyncio_face
 from qlinkgen.protocols.mc1231a.chip import ChipSet
 from qlinkgen.protocols.mc1231a.chip_engine import ChipCounters, ChipEngine
 from qlinkgen.protocols.mc1231a.host import Axis, Host
 from qlinkgen.protocols.mc1231a.usage import Checksum, UnconfirmedCommand
+
+if TYPE_CHECKING:
+    from qlinkgen.protocols.mc1231a.aio import AsyncAxis, AsyncHost
 
 __all__ = [
     "AsyncAxis",
@@ -23,3 +28,5 @@ __all__ = [
     "Host",
     "UnconfirmedCommand",
 ]
+
+__getattr__ = asyncio_face(__name__, ("AsyncAxis", "AsyncHost"))

@@ -5,13 +5,18 @@
 
 from __future__ import annotations
 
-from qlinkgen.protocols.qlink.aio import AsyncBus, AsyncNode
+from typing import TYPE_CHECKING
+
+from qlinkgen.protocols.faces import asyncio_face
 from qlinkgen.protocols.qlink.bus import Bus, Node
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
 from qlinkgen.protocols.qlink.motion import MotionProgress
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.protocols.qlink.survey import Found, NodeStatus
 from qlinkgen.protocols.qlink.virtual_node import VirtualNode
+
+if TYPE_CHECKING:
+    from qlinkgen.protocols.qlink.aio import AsyncBus, AsyncNode
 
 __all__ = [
     "AsyncBus",
@@ -27,3 +32,5 @@ __all__ = [
     "SyncTick",
     "VirtualNode",
 ]
+
+__getattr__ = asyncio_face(__name__, ("AsyncBus", "AsyncNode"))

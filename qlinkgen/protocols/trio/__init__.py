@@ -7,14 +7,19 @@ Each joins the ring at one port, and sends on what is for others. Messages and t
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from qlinkgen.link.ring_events import NetStat
-from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
+from qlinkgen.protocols.faces import asyncio_face
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.display import Display
 from qlinkgen.protocols.trio.errors import NoRoom, NothingCame
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.nodes import MembraneKeypad, MotionCoordinator, PassiveNode
 from qlinkgen.protocols.trio.printing import CHR, CURSOR, VALUE
+
+if TYPE_CHECKING:
+    from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
 
 __all__ = [
     "CHR",
@@ -32,3 +37,5 @@ __all__ = [
     "NothingCame",
     "PassiveNode",
 ]
+
+__getattr__ = asyncio_face(__name__, ("AsyncMembraneKeypad", "AsyncMotionCoordinator"))
