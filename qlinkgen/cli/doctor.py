@@ -14,6 +14,7 @@ from qlinkgen.cli.common import on_terminal
 from qlinkgen.cli.diagnosis import Advice, Cost, Echo, advise, cost, probe
 from qlinkgen.cli.tables import Table
 from qlinkgen.cli.wire_options import open_line
+from qlinkgen.protocols.qlink.facts import BAUD
 from qlinkgen.transport.conversation import ASSUMED_LATENCY, OTHER_PROGRAM, WAKE_UP
 from qlinkgen.transport.port import Ability, Capabilities, Port
 
@@ -46,7 +47,7 @@ _MEANINGS = {
 @click.option(
     "--baud",
     type=click.IntRange(1, 100_000_000),
-    default=115200,
+    default=BAUD,
     show_default=True,
     metavar="N",
     help="Speed to open it with.",

@@ -11,6 +11,7 @@ from qlinkgen.cli.simulating import run_bus, say
 from qlinkgen.cli.wire_options import counted, parse_nodes, select_crc
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.slave import SlaveEngine, Station
+from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.sim import FaultPlan, Wire
 
 #: Byte times from a request to its answer on a line that takes its time, so that the asker can stop sending.
@@ -49,7 +50,7 @@ def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, lis
         from qlinkgen_codecs import qlink  # noqa: PLC0415  # other protocols do without
 
         select_crc(crc)
-        return qlink, _qlink_nodes(parse_nodes(nodes or "1", 1, 16))
+        return qlink, _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
     from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does without the compiler
     from qlinkgen.sim.generic import GenericNode  # noqa: PLC0415
 

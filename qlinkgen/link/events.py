@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+#: Events that an engine keeps for one who does not fetch them after each transaction.
+EVENTS_KEPT = 4096
+
 
 class Sent(NamedTuple):
     """A request was handed to the port."""

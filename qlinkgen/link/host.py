@@ -33,21 +33,12 @@ from collections.abc import Collection
 from typing import Any
 
 from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
-from qlinkgen.link.events import Answered, Damaged, Failed, Sent, TimedOut
+from qlinkgen.link.events import EVENTS_KEPT, Answered, Damaged, Failed, Sent, TimedOut
 from qlinkgen.link.host_events import Filled, HostCounters, HostEvent, InStep, OutOfStep
-from qlinkgen.link.host_rules import Asked, HostCodec, HostRules, Packet, Plan, WayBack
+from qlinkgen.link.host_rules import Asked, HostCodec, HostRules, Packet, Plan, State, WayBack
 from qlinkgen.link.host_timing import ROUNDS, SILENT_ROUNDS, HostTiming
-from qlinkgen.link.master import EVENTS_KEPT
 from qlinkgen.link.timing import check_attempts
-from qlinkgen.link.transaction import Reply
-
-IDLE = "idle"
-READY = "ready"
-SELECTING = "selecting"
-WAITING = "waiting"
-GUARD = "guard"
-FILLING = "filling"
-PROVING = "proving"
+from qlinkgen.link.transaction import Reply, settled
 
 
 class HostEngine:
@@ -90,7 +81,7 @@ class HostEngine:
         self._check_size = self._plans[type(rules.proof)].check_size
         longest = max(command.request.MAX_WIRE_SIZE for command in codec.COMMANDS.values())
         self._most_fills = timing.fills(longest)
-        self._state = IDLE
+        self._state = State.IDLE
         self._outcome: Reply | LinkError | None = None
         # The packet of the transaction; what is asked at this moment: the same, a context, or the proof.
         self._packet = Packet(None)
@@ -121,7 +112,7 @@ class HostEngine:
     @property
     def busy(self) -> bool:
         """A transaction is under way."""
-        return self._state is not IDLE
+        return self._state is not State.IDLE
 
     @property
     def total(self) -> HostCounters:
@@ -145,7 +136,7 @@ class HostEngine:
             RuntimeError: another transaction is under way.
         """
         del trial
-        if self._state is not IDLE:
+        if self._state is not State.IDLE:
             raise RuntimeError("a transaction is under way; a host does one at a time")
         packet = request if type(request) is Packet else Packet(request)
         plan = self._plans.get(type(packet.request))
@@ -167,18 +158,18 @@ class HostEngine:
         if self._owed and now > self._owed_until:
             self._out_of_step(now, None, "checksums that were not to be read have not come")
         if self.in_step:
-            self._state = READY
+            self._state = State.READY
         else:
             self._guard(self._quiet_at, now)
 
     def bytes_to_send(self, now: float) -> bytes:
         """Return what the driver has to write now."""
         state = self._state
-        if state is READY:
+        if state is State.READY:
             return self._send(now)
-        if state is GUARD and now >= self._quiet_at:
+        if state is State.GUARD and now >= self._quiet_at:
             return self._send_fill(now)
-        if state is PROVING and not self._listening:
+        if state is State.PROVING and not self._listening:
             return self._ask(self._sendable(self._proving()), now, check=True)
         return b""
 
@@ -199,9 +190,9 @@ class HostEngine:
     def next_timer(self) -> float | None:
         """Return when the engine has to be called again although nothing came; None: not at all."""
         state = self._state
-        if state is IDLE:
+        if state is State.IDLE:
             return None
-        if state is GUARD:
+        if state is State.GUARD:
             return min(self._quiet_at, self._give_up_at)
         if self._listening:
             return self._deadline
@@ -209,7 +200,7 @@ class HostEngine:
 
     def handle_timer(self, now: float) -> None:
         """Do what is due."""
-        if self._state is GUARD:
+        if self._state is State.GUARD:
             if now < self._quiet_at and now >= self._give_up_at:
                 self._fail(BadReply, "the line does not get quiet: the device sends without being asked", now)
         elif self._listening and now >= self._deadline:
@@ -223,23 +214,18 @@ class HostEngine:
             BadReply: only damaged or wrong answers came.
             IllegalCommand: the device does not know the command.
         """
-        outcome = self._outcome
-        self._outcome = None
-        if isinstance(outcome, LinkError):
-            raise outcome
-        if outcome is None:
-            raise RuntimeError("no transaction has ended")
-        return outcome
+        outcome, self._outcome = self._outcome, None
+        return settled(outcome)
 
     def abort(self, now: float) -> None:
         """Give up the transaction under way: its answer may still come, and will answer nothing."""
         state = self._state
-        if state is IDLE:
+        if state is State.IDLE:
             return
         until = max(now, self._deadline) if self._listening else now
-        if state is not READY:
+        if state is not State.READY:
             self._out_of_step(now, self._packet.request, "a transaction was given up", until)
-        self._state = IDLE
+        self._state = State.IDLE
         self._outcome = None
 
     # Sending ------------------------------------------------------------------------------------------------
@@ -257,7 +243,7 @@ class HostEngine:
             self.count.contexts += 1
             selection = self._sendable(context)
             if check:
-                self._state = SELECTING
+                self._state = State.SELECTING
                 return self._ask(selection, now, check=True)
             first = self._send_off(selection, now)
         self._attempt += 1
@@ -265,7 +251,7 @@ class HostEngine:
             frame = self._send_off(wanted, now)
             self._succeed(plan.response and plan.response(), now)
             return first + frame
-        self._state = WAITING
+        self._state = State.WAITING
         if self._attempt > 1:
             self.count.repeats += 1
         return first + self._ask(wanted, now, check=check)
@@ -282,7 +268,7 @@ class HostEngine:
         self._sent_at = now
         self._deadline = self._line_up(asked, now)
         if self.verbose:
-            attempt = self._attempt if self._state is WAITING else 1
+            attempt = self._attempt if self._state is State.WAITING else 1
             self.events.append(Sent(now, None, asked.request, attempt, asked.frame))
         return asked.frame
 
@@ -324,7 +310,7 @@ class HostEngine:
 
     def _arrived(self, now: float) -> None:
         """What was to come has come, and perhaps more."""
-        if self._state is FILLING:
+        if self._state is State.FILLING:
             self._filled()
             return
         asked, data, size = self._asked, self._buffer, self._need
@@ -342,7 +328,7 @@ class HostEngine:
             self._owed_until = self._deadline
             rest = self._without_owed(rest)
         self._listening = False
-        if self._state is WAITING:
+        if self._state is State.WAITING:
             self._succeed(response, now)
             if rest:
                 self._unasked(rest, now)
@@ -353,13 +339,13 @@ class HostEngine:
 
     def _go_on(self, asked: Asked, now: float) -> None:
         """A context or the proof was answered as it must be."""
-        if self._state is PROVING and asked.request is self.rules.proof:
+        if self._state is State.PROVING and asked.request is self.rules.proof:
             self.in_step = True
             self.count.in_step += 1
             self.count.completed += self._way.completed
             self.events.append(InStep(now, self._way.fills, self._way.completed))
         if self.in_step:
-            self._state = READY
+            self._state = State.READY
 
     # Getting back in step -----------------------------------------------------------------------------------
 
@@ -382,7 +368,7 @@ class HostEngine:
     def _guard(self, quiet_at: float, now: float) -> None:
         """Wait for a quiet line, which it may be by now."""
         quiet = self.timing.quiet_after(self._way.silent)
-        self._state = GUARD
+        self._state = State.GUARD
         self._way.heard = False
         self._listening = False
         self._quiet_at = quiet_at
@@ -396,7 +382,7 @@ class HostEngine:
     def _send_fill(self, now: float) -> bytes:
         """A device that waits for the rest of a packet must get it, or it takes the next command for that."""
         byte = bytes((self._way.fill,))
-        self._state = FILLING
+        self._state = State.FILLING
         self._listening = True
         self._buffer = b""
         self._need = self._check_size
@@ -410,7 +396,7 @@ class HostEngine:
     def _filled(self) -> None:
         """The device has answered a filling byte, or none: either way it waits for nothing any more."""
         self._way.completed = bool(self._buffer) and self._buffer[: self._check_size] != self.rules.refusal
-        self._state = PROVING
+        self._state = State.PROVING
         self._listening = False  # the next call of bytes_to_send asks
         self._buffer = b""
 
@@ -438,7 +424,7 @@ class HostEngine:
         count.count_damaged(kind)
         count.illegal += kind == "illegal"
         self.events.append(Damaged(now, None, self.codec.Fault(kind, 0, data, text)))
-        if self._state is WAITING:
+        if self._state is State.WAITING:
             self._wrong.append((kind, data))
             self._attempt_failed(text, now, data)
         else:
@@ -446,9 +432,9 @@ class HostEngine:
 
     def _timed_out(self, now: float) -> None:
         state, data = self._state, self._buffer
-        if state is FILLING:
+        if state is State.FILLING:
             if self._way.fills < self._most_fills and not data:
-                self._state = GUARD  # the line is quiet: the next byte goes out at once
+                self._state = State.GUARD  # the line is quiet: the next byte goes out at once
                 self._listening = False
                 self._quiet_at = now
                 self._give_up_at = now + 2 * self.timing.quiet
@@ -456,12 +442,14 @@ class HostEngine:
                 self._filled()
             return
         self.count.timeouts += 1
-        self.events.append(TimedOut(now, None, self._asked.request, self._attempt if state is WAITING else 1))
+        self.events.append(
+            TimedOut(now, None, self._asked.request, self._attempt if state is State.WAITING else 1)
+        )
         if data:
             self.count.count_damaged("truncated")
             self.count.skipped += len(data)
         reason = f"{self._asked.NAME}: {len(data)} of {self._need} bytes came" if data else "no answer"
-        if state is WAITING:
+        if state is State.WAITING:
             if data == self.rules.refusal:  # a device that does not know the command knows no words of it
                 self._wrong.append(("illegal", data))
             elif data:
@@ -484,7 +472,7 @@ class HostEngine:
             self._fail(NoReply, "no answer", now)
 
     def _succeed(self, response: Any, now: float) -> None:
-        self._state = IDLE
+        self._state = State.IDLE
         elapsed = now - self._started
         self._outcome = Reply(response, self._attempt, elapsed, now, now - self._sent_at)
         self.count.answers += 1
@@ -507,6 +495,6 @@ class HostEngine:
         )
         if self.in_step:
             self._out_of_step(now, request, reason)
-        self._state = IDLE
+        self._state = State.IDLE
         self.count.failures += 1
         self.events.append(Failed(now, None, request, self._outcome))

@@ -10,6 +10,18 @@ from qlinkgen.link.codec import Codec
 from qlinkgen.link.host_timing import HostTiming
 
 
+class State:
+    """States of the engine; `qlinkgen.link.host` has the table of them."""
+
+    IDLE = "idle"
+    READY = "ready"
+    SELECTING = "selecting"
+    WAITING = "waiting"
+    GUARD = "guard"
+    FILLING = "filling"
+    PROVING = "proving"
+
+
 class HostCodec(Codec, Protocol):
     """A generated module of a protocol of the host kind, such as `qlinkgen_codecs.mc1231a`."""
 

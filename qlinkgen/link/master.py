@@ -36,6 +36,7 @@ from qlinkgen.link.codec import Codec, address_getter
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.echo import NOISE, PROBE, EchoCanceller, EchoMode
 from qlinkgen.link.events import (
+    EVENTS_KEPT,
     Answered,
     Damaged,
     EchoBroken,
@@ -50,10 +51,8 @@ from qlinkgen.link.events import (
 )
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.timing import Timing, check_attempts
-from qlinkgen.link.transaction import Accepts, Plan, Reply
+from qlinkgen.link.transaction import Accepts, Plan, Reply, settled
 
-#: Events that are kept for one who does not fetch them after each transaction.
-EVENTS_KEPT = 4096
 #: On a paced line nothing that is complete before the request has left can be its answer. Clocks of the two
 #: sides may differ by some percent.
 EARLY = 0.9
@@ -257,13 +256,8 @@ class MasterEngine:
             BadReply: only damaged or wrong answers came.
             Collision: the request came back changed.
         """
-        outcome = self._outcome
-        self._outcome = None
-        if isinstance(outcome, LinkError):
-            raise outcome
-        if outcome is None:
-            raise RuntimeError("no transaction has ended")
-        return outcome
+        outcome, self._outcome = self._outcome, None
+        return settled(outcome)
 
     def abort(self, now: float) -> None:
         """Give up the transaction under way: its answer may still come, and will answer nothing."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from qlinkgen.errors import LinkError
 from qlinkgen.link.timing import Timing
 
 
@@ -43,3 +44,12 @@ class Plan:
         self.allowance = timing.gap(command)
         self.answer_time = timing.deadline(command, 0)
         self.tries = timing.attempts_of(command)
+
+
+def settled(outcome: Reply | LinkError | None) -> Reply:
+    """Return the outcome of a transaction that has ended, or raise it."""
+    if isinstance(outcome, LinkError):
+        raise outcome
+    if outcome is None:
+        raise RuntimeError("no transaction has ended")
+    return outcome

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Sequence
-from types import TracebackType
 from typing import Any
 
 from qlinkgen.sim.errors import SimulationError
+from qlinkgen.transport.handing_over import HandOver
 
 
 class _Program(threading.Thread):
@@ -30,29 +30,15 @@ class _Program(threading.Thread):
 
     def run(self) -> None:
         self.baton.acquire()
-        with _HandOver(self):
+        with HandOver(self._failed):
             self.owner.check()
             self.result = self.function()
         self.ended = True
         self.owner.pass_on(self)
 
-
-class _HandOver:
-    """Ends a program without a traceback: what made it fail is raised by `Programs.run`."""
-
-    def __init__(self, program: _Program) -> None:
-        self._program = program
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool:
-        if error is not None:
-            self._program.failure = error
-            self._program.owner.stop()
-        return True
+    def _failed(self, error: BaseException) -> None:
+        self.failure = error
+        self.owner.stop()
 
 
 class Programs:

@@ -13,6 +13,7 @@ from typing import Self
 
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.wire import Wire
+from qlinkgen.transport.handing_over import HandOver
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.pty import open_pty
 
@@ -137,7 +138,7 @@ class PtyBus:
         return self
 
     def _run_thread(self) -> None:
-        with _HandOver(self):
+        with HandOver(self.fail):
             self.run()
 
     def stop(self) -> None:
@@ -172,23 +173,6 @@ class PtyBus:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-class _HandOver:
-    """Ends a thread without a traceback: its failure is raised where the bus is stopped."""
-
-    def __init__(self, bus: PtyBus) -> None:
-        self._bus = bus
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool:
-        if error is not None:
-            self._bus.fail(error)
-        return True
 
 
 def make_looker(*descriptors: int) -> Callable[[float | None], bool]:

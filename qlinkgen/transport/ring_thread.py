@@ -13,6 +13,7 @@ from typing import Protocol, Self, TypeVar
 
 from qlinkgen.errors import PortError, PortLost
 from qlinkgen.link.ring import RingNode
+from qlinkgen.transport.handing_over import HandOver
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring_driver import FLUSH, GIVE_WAY, LOOK, LOOK_OFTEN, NodeIo, OnEvent, RingDriver
 
@@ -60,7 +61,7 @@ class NodeThread(RingDriver):
     # the thread of the node
 
     def _run(self) -> None:
-        with _HandOver(self):
+        with HandOver(self.fail):
             data = b""
             while not self._closing:
                 with self._changed:
@@ -164,23 +165,6 @@ class NodeThread(RingDriver):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-class _HandOver:
-    """Ends a thread without a traceback: what made it fail is raised where the node is used."""
-
-    def __init__(self, driver: NodeThread) -> None:
-        self._driver = driver
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool:
-        if error is not None:
-            self._driver.fail(error)
-        return True
 
 
 def _waker(port: Port, driver: NodeThread) -> _Waker:

@@ -13,6 +13,7 @@ import pytest
 
 import qlinkgen as package
 from tests.cli.conftest import Run
+from tests.cli.full_disk import FULL_DISK
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "qlinkgen"]
@@ -69,9 +70,8 @@ def test_a_reader_that_goes_away() -> None:
     assert process.returncode == 141
 
 
+@FULL_DISK
 def test_a_full_disk() -> None:
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full here")
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run(
             [*COMMAND, "show", "qlink"], env=ENVIRONMENT, stdout=full, stderr=-1, text=True, check=False

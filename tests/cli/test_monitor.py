@@ -17,6 +17,7 @@ from qlinkgen.sim import FaultPlan
 from qlinkgen.transport import PtyPort, SerialPort, open_pty
 from qlinkgen_codecs import qlink
 from tests.cli.conftest import Run
+from tests.cli.full_disk import FULL_DISK
 from tests.cli.wire import (
     CALM,
     PATIENCE,
@@ -238,9 +239,8 @@ def test_a_port_that_goes_away() -> None:
     assert f"{port.path} was lost" in error
 
 
+@FULL_DISK
 def test_a_full_disk(tmp_path: Path) -> None:
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full here")
     with bus() as running, tapped(running) as ear:
         with Path("/dev/full").open("wb") as full, started("monitor", ear, stdout=full) as monitor:
             listening(monitor)

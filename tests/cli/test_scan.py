@@ -10,6 +10,7 @@ import pytest
 
 from qlinkgen.protocols.qlink import VirtualNode
 from tests.cli.conftest import Run
+from tests.cli.full_disk import FULL_DISK
 from tests.cli.wire import CALM, bus, call, on_terminal, simulated
 
 
@@ -81,9 +82,8 @@ def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str)
     assert text in result.err
 
 
+@FULL_DISK
 def test_a_full_disk_leaves_a_usable_bus() -> None:
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full here")
     with simulated("qlink") as (path, _):
         with Path("/dev/full").open("wb") as full:
             done = call("scan", path, "--nodes", "1", *CALM, stdout=full)

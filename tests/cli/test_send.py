@@ -19,6 +19,7 @@ from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import PtyPort, open_port, open_pty
 from qlinkgen_codecs import qlink
 from tests.cli.conftest import Run
+from tests.cli.full_disk import FULL_DISK
 from tests.cli.wire import CALM, PATIENCE, REPOSITORY, bus, call, objects, simulated
 
 SCHEMAS = REPOSITORY / "tests" / "schemas"
@@ -258,9 +259,8 @@ def test_no_search_for_an_echo_without_a_preamble(qlinkgen: Run, silent: PtyPort
     assert silent.read(0)[:4] == b"\0\0\xa5\xa5"
 
 
+@FULL_DISK
 def test_a_full_disk_leaves_a_usable_bus() -> None:
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full here")
     request = ("qlink", "motor_position", "--node", "1", *CALM)
     with simulated("qlink") as (path, _):
         with Path("/dev/full").open("wb") as full:

@@ -15,6 +15,7 @@ from qlinkgen.protocols.qlink import Bus
 from qlinkgen.transport import open_port
 from qlinkgen_codecs import qlink
 from tests.cli.conftest import Run
+from tests.cli.full_disk import FULL_DISK
 from tests.cli.wire import (
     CALM,
     COMMAND,
@@ -217,9 +218,8 @@ def test_a_link_that_cannot_be_made(qlinkgen: Run, tmp_path: Path) -> None:
     assert taken.read_text() == "mine"
 
 
+@FULL_DISK
 def test_nowhere_to_say_the_port(tmp_path: Path) -> None:
-    if not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full here")
     link = tmp_path / "bus"
     with Path("/dev/full").open("wb") as full:
         done = call("simulate", "qlink", "--link", link, stdout=full)

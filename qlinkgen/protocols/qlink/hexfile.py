@@ -26,13 +26,11 @@ from typing import Any
 
 from qlinkgen.errors import ExtraMissing, HexFileError
 from qlinkgen.protocols.qlink.arguments import whole
+from qlinkgen.protocols.qlink.facts import PIECE
 from qlinkgen.protocols.qlink.hex_image import SIZES, HexImage
-from qlinkgen_codecs import qlink
 
 __all__ = ["LINE_ENDS", "MOST_TEXT", "PIECE", "pieces", "read_hex"]
 
-#: Most bytes of program data that a request holds (section 7.6, settled question 5).
-PIECE = qlink.NodeProgramLoadRequest.MAX_SIZE - 1  # the counter is beside it
 #: Most bytes of text: some 6 MB of program, hours on the bus. More than that is another file.
 MOST_TEXT = 16 * 1024 * 1024
 LINE_ENDS = (b"\r\n", b"\n", b"\r")

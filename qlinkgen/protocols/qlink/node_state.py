@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from math import isfinite
 
 from qlinkgen.protocols.qlink.arguments import known, positive, whole
+from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.protocols.qlink.hex_image import HexImage
 from qlinkgen.protocols.qlink.io_image import ALL, IoImage
 from qlinkgen.protocols.qlink.motor import MotorRequests, echo
@@ -87,7 +88,7 @@ class NodeState:
         Raises:
             ValueError: one of them is out of range, or names no command.
         """
-        self.number = whole("number", number, 1, 16)
+        self.number = whole("number", number, NODES[0], NODES[-1])
         self.t1_delay = positive("t1_delay", t1_delay, "s", 25.5)
         self.t2_delay = positive("t2_delay", t2_delay, "s", 25.5)
         self.position_type = whole("position_type", position_type, 0, 255)
