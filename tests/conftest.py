@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 from collections.abc import Callable, Generator
 from typing import NoReturn
 
@@ -32,6 +33,11 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.ge
 def pytest_xdist_auto_num_workers() -> int:
     """Run one more than there are processors: a third of the time goes by waiting for other processes."""
     return (os.cpu_count() or 1) + 1
+
+
+def pytest_configure() -> None:
+    """Heed Ctrl-C: jobs in the background do not, and neither would the programs that tests start."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _missing(what: str, *, package: str) -> NoReturn:
