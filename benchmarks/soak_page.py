@@ -87,7 +87,7 @@ def as_page(results: Sequence[Result], seconds: Sequence[float], command: str) -
         slack=f"{1e3 * SLACK:.0f}",
         pty_slack=f"{1e3 * PTY_SLACK:.0f}",
         late=f"{1e3 * LATE[0]:.0f} to {1e3 * LATE[1]:.0f}",
-        pty_late=f"{1e3 * PTY_LATE[0]:.0f} to {1e3 * PTY_LATE[1]:.0f}",
+        pty_late=" to ".join(f"{1e3 * (PTY_SLACK + late):.0f}" for late in PTY_LATE),
     )
 
 

@@ -30,7 +30,8 @@ SLACK = 0.012
 LATE = (0.018, 0.024)
 #: On a pty the simulator may not run for a while, and only the slack makes up for it.
 PTY_SLACK = 0.05
-PTY_LATE = (0.062, 0.085)
+#: What is late then: so much later than the slack.
+PTY_LATE = (0.012, 0.035)
 #: Chance of each kind of fault in one transmission: nine of them hit 5 % of the answers.
 SHARE = 0.05 / 9
 #: Share of the damaged frames that may pass the CRC; by chance it is one in 65536.
@@ -219,12 +220,12 @@ def virtual(transactions: int, seed: int, rates: Mapping[str, RateLike] | None =
     return soak.run("virtual clock", port, SLACK, transactions)
 
 
-def pty(transactions: int, seed: int) -> Result:
+def pty(transactions: int, seed: int, slack: float = PTY_SLACK) -> Result:
     """Soak over a pty, in real time, with the simulated line in a thread."""
-    rates = faults(PTY_LATE)
+    rates = faults((slack + PTY_LATE[0], slack + PTY_LATE[1]))
     soak = Soak(rates, baud=None, seed=seed)
     with PtyBus(soak.wire) as line, open_port(line.path) as port:
-        return soak.run("pty", port, PTY_SLACK, transactions)
+        return soak.run("pty", port, slack, transactions)
 
 
 def faults(late: tuple[float, float]) -> dict[str, RateLike]:

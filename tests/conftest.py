@@ -36,8 +36,9 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_configure() -> None:
-    """Heed Ctrl-C: jobs in the background do not, and neither would the programs that tests start."""
+    """Heed Ctrl-C and hang-ups: background jobs may not, and neither would the programs that tests start."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def _missing(what: str, *, package: str) -> NoReturn:

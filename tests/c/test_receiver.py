@@ -15,7 +15,7 @@ from tests.support.cdriver import Driver, raw_text
 from tests.support.random_raw import damaged, random_address, random_values
 from tests.support.receiver_model import Event, receiver
 
-STREAMS = 150
+STREAMS = 80
 CASES = [
     (name, direction)
     for name in PROTOCOLS

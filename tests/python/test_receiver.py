@@ -77,7 +77,7 @@ def described(events: Iterable[Any]) -> list[tuple[object, ...]]:
 
 
 @pytest.mark.parametrize(("name", "direction"), STREAMS)
-@settings(max_examples=250)
+@settings(max_examples=100)
 @given(data=st.data())
 def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObject) -> None:
     wire = data.draw(streams(name, direction))

@@ -22,7 +22,7 @@ MESSAGES = [
 
 
 @pytest.mark.parametrize(("name", "called"), MESSAGES)
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_every_message_survives(name: str, called: str, data: st.DataObject) -> None:
     message = protocol(name).by_name[called]

@@ -34,7 +34,7 @@ def test_on_the_virtual_clock() -> None:
 
 
 def test_over_a_pty() -> None:
-    result = soak_run.pty(600, seed=11)
+    result = soak_run.pty(600, seed=11, slack=0.15)  # the machine may be busy with other tests
     assert result.complaints == []
     assert result.counts.total > 20
     assert result.words > 100

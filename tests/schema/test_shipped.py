@@ -132,18 +132,6 @@ def test_first_line_names_the_json_schema() -> None:
         assert (find(name).parent / line.partition("=")[2]).resolve().is_file()
 
 
-def test_loading_is_fast() -> None:
-    path = find("qlink")
-    best = min(_seconds(path) for _ in range(5))
-    assert best < 0.06, f"{best * 1000:.0f} ms"
-
-
-def _seconds(path: Path) -> float:
-    start = time.perf_counter()
-    load(path)
-    return time.perf_counter() - start
-
-
 def test_loading_is_linear() -> None:
     """A schema of 1,000 messages costs about ten times one of 100."""
     small, large = (_generated(count) for count in (100, 1000))
@@ -151,9 +139,9 @@ def test_loading_is_linear() -> None:
     for text in (small, large):
         best = 1e9
         for _ in range(3):
-            start = time.perf_counter()
+            start = time.process_time()
             protocol, faults = loads(text, "big.yaml")
-            best = min(best, time.perf_counter() - start)
+            best = min(best, time.process_time() - start)
             assert protocol, faults[:3]
         seconds.append(best)
     assert seconds[1] < 20 * seconds[0], seconds
