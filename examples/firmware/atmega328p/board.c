@@ -1,0 +1,160 @@
+/*
+ * ATmega328P. USART0 on PD0 and PD1, direction of the RS485 driver on PD2 (1: transmit).
+ * Inputs 1 to 6 are PC0 to PC5, with pull-ups: a contact to ground is a 1. Outputs 1 to 6 are PB0 to PB5.
+ */
+#include "board.h"
+
+#include <avr/interrupt.h>
+#include <avr/io.h>
+#include <avr/sleep.h>
+#include <util/atomic.h>
+
+#include "line.h"
+
+/* Double speed: eight clocks a bit. */
+#define BAUD_SETTING ((F_CPU + 4 * BOARD_BAUD) / (8 * BOARD_BAUD) - 1)
+#define BAUD_CLOCKS (8 * (BAUD_SETTING + 1) * BOARD_BAUD) /* F_CPU, if the rate were exact */
+#if BAUD_SETTING > 4095 || 50 * BAUD_CLOCKS > 51 * F_CPU || 50 * BAUD_CLOCKS < 49 * F_CPU
+#error "BOARD_BAUD cannot be made from F_CPU within 2 %: take a crystal for baud rates, such as 14.7456 MHz"
+#endif
+
+#define TICK_CLOCKS ((F_CPU + 500) / 1000) /* one millisecond */
+
+#define RING_SIZE 128u /* a power of two; the longest request has to fit */
+#define DRIVER _BV(PD2)
+#define PINS 0x3Fu /* of port B, and of port C */
+
+static uint8_t ring[RING_SIZE];
+static volatile uint8_t written; /* both count on and wrap; their difference is what waits */
+static volatile uint8_t taken;
+static volatile uint16_t overruns;
+static volatile uint32_t milliseconds;
+
+ISR(TIMER1_COMPA_vect)
+{
+    ++milliseconds;
+}
+
+static void count_lost(void)
+{
+    if (overruns != UINT16_MAX) {
+        ++overruns;
+    }
+}
+
+/* Reading UDR0 is the acknowledgement. A second byte that waits in the UART interrupts again. */
+ISR(USART_RX_vect)
+{
+    const uint8_t status = UCSR0A; /* first: it is that of the byte in UDR0 */
+    const uint8_t byte = UDR0;
+    const uint8_t place = written;
+    if ((status & _BV(DOR0)) != 0u) {
+        count_lost();
+    }
+    if ((uint8_t)(place - taken) == RING_SIZE) {
+        count_lost();
+    } else {
+        ring[place % RING_SIZE] = byte;
+        written = (uint8_t)(place + 1u);
+    }
+}
+
+void board_start(void)
+{
+    PORTC = PINS;
+    DDRB = PINS;
+    DDRD = DRIVER;
+    board_driver(false);
+
+    OCR1A = (uint16_t)(TICK_CLOCKS - 1); /* before the timer runs, or it would begin with a period of one clock */
+    TIMSK1 = _BV(OCIE1A);
+    TCCR1B = _BV(WGM12) | _BV(CS10);
+
+    UBRR0 = (uint16_t)BAUD_SETTING;
+    UCSR0A = _BV(U2X0);
+    UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
+    UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
+
+    SMCR = _BV(SE); /* sleep is idle: UART and timer go on */
+    sei();
+}
+
+bool board_receive(uint8_t *byte)
+{
+    const uint8_t place = taken;
+    if (place == written) {
+        return false;
+    }
+    *byte = ring[place % RING_SIZE];
+    taken = (uint8_t)(place + 1u);
+    return true;
+}
+
+void board_send(const uint8_t *bytes, size_t size)
+{
+    size_t index;
+    board_driver(true);
+    for (index = 0u; index < size; ++index) {
+        while ((UCSR0A & _BV(UDRE0)) == 0u) {
+        }
+        /* The flag of the last stop bit is cleared behind the byte, not before it: only the end of this one can set it
+         * again, and no interrupt comes between. */
+        ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+        {
+            UDR0 = bytes[index];
+            UCSR0A = _BV(TXC0) | _BV(U2X0);
+        }
+    }
+    while ((UCSR0A & _BV(TXC0)) == 0u) {
+    }
+    board_driver(false);
+}
+
+void board_wait(void)
+{
+    cli();
+    if (taken == written) {
+        sei(); /* takes effect behind the next instruction: no interrupt gets between the question and the sleep */
+        sleep_cpu();
+    }
+    sei();
+}
+
+uint32_t board_milliseconds(void)
+{
+    uint32_t now;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        now = milliseconds;
+    }
+    return now;
+}
+
+uint32_t board_inputs(void)
+{
+    return (uint8_t)~PINC & PINS;
+}
+
+void board_outputs(uint32_t outputs)
+{
+    PORTB = (uint8_t)outputs & PINS;
+}
+
+void board_driver(bool transmit)
+{
+    if (transmit) {
+        PORTD |= DRIVER;
+    } else {
+        PORTD &= (uint8_t)~DRIVER;
+    }
+}
+
+uint16_t board_overruns(void)
+{
+    uint16_t count;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        count = overruns;
+    }
+    return count;
+}

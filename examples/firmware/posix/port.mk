@@ -1,0 +1,8 @@
+# A process on a pty: Linux and macOS.
+SIZE = size
+SUFFIX =
+APPS = qlink_node trio_keypad
+PORT_SOURCES = posix/board.c
+ifeq ($(shell uname),Darwin)
+GC = -Wl,-dead_strip
+endif

@@ -1,0 +1,129 @@
+/*
+ * A look inside over the line, for tests and service, without a second one. A motor_request whose motor_data begins
+ * with 7E D1 is for the node itself: 7E D1, operation, arguments. The next motor_response_poll tells the answer,
+ * once: the operation and its data; FF and the operation where it is unknown or its arguments are wrong. A request of
+ * the motor that is under way is not disturbed. Numbers are big-endian. Neither message counts in any counter.
+ *
+ * -DNODE_DIAGNOSTICS=0 leaves out all of it: then 7E D1 goes to the motor like anything else.
+ */
+#ifndef DIAGNOSTICS_H
+#define DIAGNOSTICS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "motor.h"
+#include "options.h"
+#include "qlink.h"
+#include "settings.h"
+
+typedef struct node node_t;
+
+typedef enum diagnostics_operation {
+    /* requests u16, motions u16, duplicates u16, words u32, overruns of the FIFO u16, jumps u16 */
+    DIAGNOSTICS_MOTIONS = 0x01,
+    /* syncs u16, repeated u16, missed u32, motor requests u16, replaced u16, refused presets u16, resets u16 */
+    DIAGNOSTICS_OTHERS = 0x02,
+    /* loads u16, pieces u16, repeated u16, refused u16, state u8 (program_state_t), bytes u16, CRC of the text u16 */
+    DIAGNOSTICS_PROGRAM = 0x03,
+    /* offset u16, count u8 (24 at most) -> bytes of the program's image */
+    DIAGNOSTICS_IMAGE = 0x04,
+    /* CRC u16 over all path words queued since power-up, each big-endian, and their number u32 */
+    DIAGNOSTICS_WORDS = 0x05,
+    /* inputs u24, power-up u8: from now on the inputs are these and not the pins; with 1 there is no edge */
+    DIAGNOSTICS_INPUTS = 0x06,
+    /* outputs u24, inputs u24, position i32, waiting u8, started u8, running u8, milliseconds u32, lost bytes u16 */
+    DIAGNOSTICS_STATE = 0x07,
+    /* capacity u8, rate u32, started u8, T1 u8, T2 u8, position type u8, serial u32, number u8, motor ms u16: power-up
+     * with these settings, all counters 0. It happens when the answer has been told: until then the node is the old one
+     * and has its old number. */
+    DIAGNOSTICS_CONFIGURE = 0x08,
+    /* position i32 */
+    DIAGNOSTICS_POSITION = 0x09,
+    /* mask u32: from now on only commands whose bit is 1 are answered. Bit 0 is node_setup; they stand in the order of
+     * qlink_slave_t. The two commands that carry diagnostics are always answered. */
+    DIAGNOSTICS_COMMANDS = 0x0A,
+    /* 0: the motor answers with its request, 1: with its request backwards */
+    DIAGNOSTICS_MOTOR = 0x0B,
+    DIAGNOSTICS_WRONG = 0xFF
+} diagnostics_operation_t;
+
+#if NODE_DIAGNOSTICS
+
+/* Counts since power-up; a reset by command leaves them. */
+typedef struct counters {
+    uint16_t requests; /* for this node, those included that it does not answer */
+    uint16_t motions;
+    uint16_t duplicates; /* motions with the counter of the one before, answered but not taken again */
+    uint32_t words;
+    uint16_t overruns; /* motions with more words than fitted */
+    uint16_t jumps;    /* motions whose counter was not one up */
+    uint16_t syncs;
+    uint16_t repeated_syncs;
+    uint32_t missed_syncs;
+    uint16_t motor_requests;
+    uint16_t replaced_motor_requests;
+    uint16_t refused_presets;
+    uint16_t resets;
+    uint16_t program_loads;
+    uint16_t program_pieces;
+    uint16_t repeated_pieces;
+    uint16_t refused_pieces;
+} counters_t;
+
+typedef struct diagnostics {
+    counters_t counters;
+    uint16_t words_check;  /* register of the CRC over the path words */
+    uint16_t text_check;   /* and over the text of the program */
+    uint32_t inputs;       /* that take the place of the pins */
+    bool forced;           /* they do */
+    bool configuring;      /* power-up when the answer has been told */
+    uint8_t size;          /* of the answer that waits, 0 when there is none */
+    uint8_t answer[MOTOR_MAX_DATA];
+    node_settings_t settings; /* for that power-up */
+} diagnostics_t;
+
+/* Counts in a build with diagnostics, and does nothing in one without. */
+#define COUNT(node, counter) ((void)++(node)->diagnostics.counters.counter)
+#define COUNT_MORE(node, counter, number) ((void)((node)->diagnostics.counters.counter += (number)))
+
+void diagnostics_init(diagnostics_t *diagnostics);
+
+/* Counts a frame if it is a request to this node. */
+void diagnostics_frame(node_t *node, const qlink_frame_t *frame);
+
+/* Goes on with the CRC over the path words, and with that over the program's text (begun again by an opening). */
+void diagnostics_words(node_t *node, const uint16_t *words, uint8_t count);
+void diagnostics_text(node_t *node, const uint8_t *text, uint8_t size);
+void diagnostics_opened(node_t *node);
+
+/* Returns whether a motor request was for the node itself. */
+bool diagnostics_take(node_t *node, const qlink_motor_request_request_t *request);
+
+/* Returns whether there was an answer to tell. */
+bool diagnostics_poll(node_t *node, qlink_motor_response_poll_response_t *response);
+
+/* Does what was put off until the answer was made. */
+void diagnostics_settle(node_t *node);
+
+/* The inputs: those of the board, unless they are forced. */
+uint32_t diagnostics_inputs(const node_t *node, uint32_t inputs);
+
+#else
+
+typedef uint8_t diagnostics_t;
+#define COUNT(node, counter) ((void)(node))
+#define COUNT_MORE(node, counter, number) ((void)(node), (void)(number))
+#define diagnostics_init(diagnostics) ((void)(diagnostics))
+#define diagnostics_frame(node, frame) ((void)(node), (void)(frame))
+#define diagnostics_words(node, words, count) ((void)(node))
+#define diagnostics_text(node, text, size) ((void)(node))
+#define diagnostics_opened(node) ((void)(node))
+#define diagnostics_take(node, request) ((void)(node), false)
+#define diagnostics_poll(node, response) ((void)(node), false)
+#define diagnostics_settle(node) ((void)(node))
+#define diagnostics_inputs(node, inputs) ((void)(node), (inputs))
+
+#endif
+#endif

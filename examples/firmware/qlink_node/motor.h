@@ -1,0 +1,38 @@
+/*
+ * The motor's own protocol: requests passed through (sections 7.8 and 7.9). One request at a time is with the motor; a
+ * newer one takes the place of the older. This motor answers after a while with what it was asked: put the line to
+ * yours into motor_take and motor_advance.
+ */
+#ifndef MOTOR_H
+#define MOTOR_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "qlink.h"
+
+/* Bytes of an answer that fit into that of a poll, beside the completion. */
+#define MOTOR_MAX_DATA (QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MAX_SIZE - 1u)
+
+typedef struct motor {
+    uint8_t answer[MOTOR_MAX_DATA];
+    uint8_t size;
+    bool asked;     /* there is a request */
+    bool completed; /* and it is answered */
+    bool backwards; /* the answer is the request backwards, for tests */
+    uint32_t since; /* the millisecond of the request */
+    uint16_t delay; /* milliseconds from then on to the answer */
+} motor_t;
+
+void motor_init(motor_t *motor, uint16_t delay);
+
+/* Passes a request on. Returns whether it took the place of one that was not completed. */
+bool motor_take(motor_t *motor, const uint8_t *data, uint8_t size, uint32_t now);
+
+/* Lets the motor answer. */
+void motor_advance(motor_t *motor, uint32_t now);
+
+/* Drops the request and its answer. */
+void motor_forget(motor_t *motor);
+
+#endif

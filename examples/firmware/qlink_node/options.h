@@ -1,0 +1,62 @@
+/* What a build may choose, each by -DNAME=VALUE. The node numbers, delays and position type can be set on the line. */
+#ifndef OPTIONS_H
+#define OPTIONS_H
+
+#ifndef NODE_NUMBER
+#define NODE_NUMBER 1 /* 1..16 */
+#endif
+#ifndef NODE_T1_TENTHS
+#define NODE_T1_TENTHS 10 /* from input 1 going high to output 1 going high, 0..255 tenths of a second */
+#endif
+#ifndef NODE_T2_TENTHS
+#define NODE_T2_TENTHS 10 /* the same for going low */
+#endif
+#ifndef NODE_POSITION_TYPE
+#define NODE_POSITION_TYPE 0 /* QLINK_POSITION_TYPE_... */
+#endif
+#ifndef NODE_VERSION_MAJOR
+#define NODE_VERSION_MAJOR 1
+#endif
+#ifndef NODE_VERSION_MINOR
+#define NODE_VERSION_MINOR 0
+#endif
+#ifndef NODE_PRODUCT
+#define NODE_PRODUCT 0 /* 0..65535 */
+#endif
+#ifndef NODE_SERIAL
+#define NODE_SERIAL 0 /* 0..4294967295 */
+#endif
+
+#ifndef NODE_FIFO
+#define NODE_FIFO 48 /* path words that fit, 1..255; two bytes of RAM each */
+#endif
+#if NODE_FIFO < 1 || NODE_FIFO > 255
+#error "NODE_FIFO must be 1 to 255: a byte of the motion's answer tells how many words are free"
+#endif
+
+#ifndef NODE_RATE
+#define NODE_RATE 1000 /* path words a second; 0 for a motor that never moves */
+#endif
+#ifndef NODE_STARTED
+#define NODE_STARTED 0 /* 1: the motor takes words after power-up and reset without a node_start */
+#endif
+#ifndef NODE_MOTOR_MS
+#define NODE_MOTOR_MS 50 /* until the motor has done a request, 0..65535 */
+#endif
+
+#ifndef NODE_PROGRAM_SIZE /* bytes of a loaded program, from address 0 on; nine bits of RAM each */
+#ifdef __AVR__
+#define NODE_PROGRAM_SIZE 512
+#else
+#define NODE_PROGRAM_SIZE 4096
+#endif
+#endif
+#if NODE_PROGRAM_SIZE < 1 || NODE_PROGRAM_SIZE > 32767
+#error "NODE_PROGRAM_SIZE must be 1 to 32767"
+#endif
+
+#ifndef NODE_DIAGNOSTICS
+#define NODE_DIAGNOSTICS 1 /* 0 leaves out counters and diagnostics.c */
+#endif
+
+#endif

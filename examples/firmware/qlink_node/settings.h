@@ -1,0 +1,20 @@
+/* What a node is after power-up. */
+#ifndef SETTINGS_H
+#define SETTINGS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct node_settings {
+    uint8_t number;
+    uint8_t capacity; /* path words, up to NODE_FIFO */
+    uint32_t rate;    /* path words a second */
+    bool started;     /* takes words without a node_start, after a reset too */
+    uint8_t t1_tenths;
+    uint8_t t2_tenths;
+    uint8_t position_type;
+    uint32_t serial;
+    uint16_t motor_ms;
+} node_settings_t;
+
+#endif
