@@ -1,0 +1,251 @@
+/*
+ * Board: Stellaris LM3S6965 (Cortex-M3, 50 MHz), for example its evaluation board, which QEMU calls lm3s6965evb.
+ * Register and bit names are those of the data sheet.
+ *
+ * The FIFO of the UART asks for an interrupt with the second byte, or 32 bit times after the last one. Those would be
+ * more than the three byte times in which a Q.link slave answers, so a timer looks after each byte time as well, as
+ * long as bytes come.
+ */
+#include "board.h"
+
+#include "line.h"
+
+#define REGISTER(address) (*(volatile uint32_t *)(address))
+
+#define SYSCTL_RIS REGISTER(0x400FE050u)
+#define SYSCTL_RCC REGISTER(0x400FE060u)
+#define SYSCTL_RCGC1 REGISTER(0x400FE104u)
+#define SYSCTL_RCGC2 REGISTER(0x400FE108u)
+#define RIS_PLLLRIS (1u << 6)
+#define RCC_MOSCDIS (1u << 0)
+#define RCC_OSCSRC (3u << 4)
+#define RCC_XTAL (15u << 6)
+#define RCC_XTAL_8MHZ (14u << 6)
+#define RCC_BYPASS (1u << 11)
+#define RCC_PWRDN (1u << 13)
+#define RCC_USESYSDIV (1u << 22)
+#define RCC_SYSDIV (15u << 23)
+#define RCC_SYSDIV_4 (3u << 23)
+#define RCGC1_UART0 (1u << 0)
+#define RCGC1_TIMER0 (1u << 16)
+#define RCGC2_PORTS 0x33u /* A, B, E, F */
+
+#define UART_DR REGISTER(0x4000C000u)
+#define UART_FR REGISTER(0x4000C018u)
+#define UART_IBRD REGISTER(0x4000C024u)
+#define UART_FBRD REGISTER(0x4000C028u)
+#define UART_LCRH REGISTER(0x4000C02Cu)
+#define UART_CTL REGISTER(0x4000C030u)
+#define UART_IFLS REGISTER(0x4000C034u)
+#define UART_IM REGISTER(0x4000C038u)
+#define UART_ICR REGISTER(0x4000C044u)
+#define DR_OE (1u << 11)
+#define FR_BUSY (1u << 3)
+#define FR_RXFE (1u << 4)
+#define FR_TXFF (1u << 5)
+#define LCRH_FEN (1u << 4)
+#define LCRH_WLEN_8 (3u << 5)
+#define CTL_UARTEN (1u << 0)
+#define CTL_TXE (1u << 8)
+#define CTL_RXE (1u << 9)
+#define IM_RX (1u << 4)
+#define IM_RT (1u << 6)
+
+#define TIMER_TAMR REGISTER(0x40030004u)
+#define TIMER_CTL REGISTER(0x4003000Cu)
+#define TIMER_IMR REGISTER(0x40030018u)
+#define TIMER_ICR REGISTER(0x40030024u)
+#define TIMER_TAILR REGISTER(0x40030028u)
+#define TAMR_ONE_SHOT 1u
+#define CTL_TAEN 1u
+#define IMR_TATO 1u
+
+#define PORT_A 0x40004000u
+#define PORT_B 0x40005000u
+#define PORT_E 0x40024000u
+#define PORT_F 0x40025000u
+/* The address says which pins an access is for, so the others need not be read before. */
+#define GPIO_DATA(port, pins) REGISTER((port) + ((uint32_t)(pins) << 2))
+#define GPIO_DIR(port) REGISTER((port) + 0x400u)
+#define GPIO_AFSEL(port) REGISTER((port) + 0x420u)
+#define GPIO_PUR(port) REGISTER((port) + 0x510u)
+#define GPIO_DEN(port) REGISTER((port) + 0x51Cu)
+
+#define SYST_CSR REGISTER(0xE000E010u)
+#define SYST_RVR REGISTER(0xE000E014u)
+#define SYST_CVR REGISTER(0xE000E018u)
+#define NVIC_ISER0 REGISTER(0xE000E100u)
+#define IRQ_UART0 (1u << 5)
+#define IRQ_TIMER0A (1u << 19)
+
+/* Wiring. */
+#define PIN_RX_TX 0x03u     /* PA0, PA1 */
+#define PIN_DIRECTION 0x01u /* PB0: high while sending */
+#define PIN_BUTTONS 0x0Fu   /* PE0 to PE3: inputs 1 to 4, low when pressed */
+#define PIN_SELECT 0x02u    /* PF1: input 5, low when pressed */
+#define PIN_LEDS 0x0Du      /* PF0, PF2, PF3: outputs 1 to 3 */
+
+#define CLOCK 50000000ul
+#define DIVISOR ((8u * CLOCK / BOARD_BAUD + 1u) / 2u) /* of 16 times the baud, in steps of 1/64 */
+#define BYTE_TIME (10u * CLOCK / BOARD_BAUD)          /* in clocks */
+#define LOOKS 4u                                      /* byte times without a byte until the timer rests */
+
+static volatile uint8_t ring[256]; /* its indices wrap by themselves */
+static volatile uint8_t head;
+static volatile uint8_t tail;
+static volatile uint16_t overruns;
+static volatile uint32_t milliseconds;
+static uint8_t looks;
+
+static void start_clock(void)
+{
+    SYSCTL_RCC = (SYSCTL_RCC | RCC_BYPASS) & ~(RCC_USESYSDIV | RCC_MOSCDIS);
+    for (volatile uint32_t settle = 0u; settle < 0x8000u; ++settle) { /* the crystal needs some milliseconds */
+    }
+    SYSCTL_RCC = (SYSCTL_RCC & ~(RCC_XTAL | RCC_OSCSRC | RCC_PWRDN)) | RCC_XTAL_8MHZ;
+    SYSCTL_RCC = (SYSCTL_RCC & ~RCC_SYSDIV) | RCC_SYSDIV_4 | RCC_USESYSDIV; /* 200 MHz / 4 */
+    while ((SYSCTL_RIS & RIS_PLLLRIS) == 0u) {
+    }
+    SYSCTL_RCC &= ~RCC_BYPASS;
+    SYST_RVR = CLOCK / 1000u - 1u;
+    SYST_CVR = 0u;
+    SYST_CSR = 7u; /* on, interrupt, processor clock */
+}
+
+static void start_pins(void)
+{
+    SYSCTL_RCGC2 |= RCGC2_PORTS;
+    (void)SYSCTL_RCGC2; /* a port may be used three clocks after it was switched on */
+    GPIO_DATA(PORT_B, PIN_DIRECTION) = 0u;
+    GPIO_DIR(PORT_B) |= PIN_DIRECTION;
+    GPIO_DEN(PORT_B) |= PIN_DIRECTION;
+    GPIO_AFSEL(PORT_A) |= PIN_RX_TX;
+    GPIO_DEN(PORT_A) |= PIN_RX_TX;
+    GPIO_PUR(PORT_E) |= PIN_BUTTONS;
+    GPIO_DEN(PORT_E) |= PIN_BUTTONS;
+    GPIO_PUR(PORT_F) |= PIN_SELECT;
+    GPIO_DIR(PORT_F) |= PIN_LEDS;
+    GPIO_DEN(PORT_F) |= PIN_SELECT | PIN_LEDS;
+}
+
+static void start_uart(void)
+{
+    SYSCTL_RCGC1 |= RCGC1_UART0 | RCGC1_TIMER0;
+    (void)SYSCTL_RCGC1;
+    UART_IBRD = DIVISOR / 64u;
+    UART_FBRD = DIVISOR % 64u;
+    UART_LCRH = LCRH_WLEN_8 | LCRH_FEN;
+    UART_IFLS = 0u; /* 2 of 16 bytes */
+    UART_IM = IM_RX | IM_RT;
+    UART_CTL = CTL_UARTEN | CTL_TXE | CTL_RXE;
+    TIMER_TAMR = TAMR_ONE_SHOT;
+    TIMER_TAILR = BYTE_TIME;
+    TIMER_IMR = IMR_TATO;
+    NVIC_ISER0 = IRQ_UART0 | IRQ_TIMER0A;
+}
+
+void board_start(void)
+{
+    start_clock();
+    start_pins();
+    start_uart();
+}
+
+/* Where the ring is full the rest waits in the FIFO for the next look. */
+static void take_waiting(void)
+{
+    while ((UART_FR & FR_RXFE) == 0u) {
+        uint32_t data;
+        looks = LOOKS;
+        if ((uint8_t)(head + 1u) == tail) {
+            break;
+        }
+        data = UART_DR;
+        ring[head] = (uint8_t)data;
+        ++head;
+        if ((data & DR_OE) != 0u && overruns != UINT16_MAX) {
+            ++overruns; /* the FIFO was full before this byte */
+        }
+    }
+    if (looks > 0u) {
+        --looks;
+        TIMER_CTL = CTL_TAEN;
+    }
+}
+
+void uart0_interrupt(void)
+{
+    UART_ICR = IM_RX | IM_RT; /* first: a byte that comes from here on asks again */
+    take_waiting();
+}
+
+void timer0a_interrupt(void)
+{
+    TIMER_ICR = IMR_TATO;
+    take_waiting();
+}
+
+void systick_interrupt(void)
+{
+    ++milliseconds;
+}
+
+bool board_receive(uint8_t *byte)
+{
+    if (tail == head) {
+        return false;
+    }
+    *byte = ring[tail];
+    ++tail;
+    return true;
+}
+
+void board_send(const uint8_t *bytes, size_t size)
+{
+    board_driver(true);
+    for (size_t index = 0u; index < size; ++index) {
+        while ((UART_FR & FR_TXFF) != 0u) {
+        }
+        UART_DR = bytes[index];
+    }
+    while ((UART_FR & FR_BUSY) != 0u) { /* until the last stop bit has gone */
+    }
+    board_driver(false);
+}
+
+/* An interrupt wakes the processor although it is masked, and is taken behind cpsie: none is lost in between. */
+void board_wait(void)
+{
+    __asm volatile("cpsid i" ::: "memory");
+    if (tail == head) {
+        __asm volatile("wfi" ::: "memory");
+    }
+    __asm volatile("cpsie i" ::: "memory");
+}
+
+uint32_t board_milliseconds(void)
+{
+    return milliseconds;
+}
+
+uint32_t board_inputs(void)
+{
+    const uint32_t buttons = ~GPIO_DATA(PORT_E, PIN_BUTTONS) & PIN_BUTTONS;
+    const uint32_t select = ~GPIO_DATA(PORT_F, PIN_SELECT) & PIN_SELECT;
+    return buttons | (select << 3);
+}
+
+void board_outputs(uint32_t outputs)
+{
+    GPIO_DATA(PORT_F, PIN_LEDS) = (outputs & 1u) | ((outputs & 6u) << 1);
+}
+
+void board_driver(bool transmit)
+{
+    GPIO_DATA(PORT_B, PIN_DIRECTION) = transmit ? PIN_DIRECTION : 0u;
+}
+
+uint16_t board_overruns(void)
+{
+    return overruns;
+}

@@ -1,0 +1,63 @@
+/* From reset to main, without a library. The addresses come from lm3s6965.ld. */
+#include <stddef.h>
+#include <stdint.h>
+
+typedef void (*handler_t)(void);
+
+extern uint32_t stack_top[];
+extern const uint32_t data_image[];
+extern uint32_t data_start[];
+extern uint32_t data_end[];
+extern uint32_t bss_start[];
+extern uint32_t bss_end[];
+
+int main(void);
+void reset(void);
+void systick_interrupt(void);
+void uart0_interrupt(void);
+void timer0a_interrupt(void);
+
+void reset(void)
+{
+    const uint32_t *from = data_image;
+    for (uint32_t *to = data_start; to != data_end; ++to) {
+        *to = *from;
+        ++from;
+    }
+    for (uint32_t *to = bss_start; to != bss_end; ++to) {
+        *to = 0u;
+    }
+    (void)main();
+    for (;;) {
+    }
+}
+
+/* A fault, or an interrupt that nobody has asked for. A reset makes all pins inputs, so the line is released. */
+static void fault(void)
+{
+    *(volatile uint32_t *)0xE000ED0Cu = 0x05FA0004u; /* AIRCR: SYSRESETREQ */
+    for (;;) {
+    }
+}
+
+#define INTERRUPT(number) (15 + (number)) /* behind the stack and the exceptions 1 to 15 */
+
+struct vectors {
+    uint32_t *stack;
+    handler_t handlers[INTERRUPT(44)];
+};
+
+__attribute__((section(".vectors"), used)) static const struct vectors vectors = {
+    stack_top,
+    {
+        [0] = reset,
+        [1] = fault, /* NMI */
+        [2] = fault, /* hard fault */
+        [3] = fault, /* memory management */
+        [4] = fault, /* bus */
+        [5] = fault, /* usage */
+        [14] = systick_interrupt,
+        [INTERRUPT(5)] = uart0_interrupt,
+        [INTERRUPT(19)] = timer0a_interrupt,
+    },
+};

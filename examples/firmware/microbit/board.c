@@ -1,0 +1,218 @@
+/*
+ * Board: BBC micro:bit, first version (Nordic nRF51822, Cortex-M0, 16 MHz).
+ * Register names are those of the nRF51 Series Reference Manual.
+ */
+#include "board.h"
+
+#include "line.h"
+
+#define REGISTER(address) (*(volatile uint32_t *)(address))
+
+#define CLOCK_TASKS_HFCLKSTART REGISTER(0x40000000u)
+#define CLOCK_EVENTS_HFCLKSTARTED REGISTER(0x40000100u)
+
+#define UART_TASKS_STARTRX REGISTER(0x40002000u)
+#define UART_TASKS_STARTTX REGISTER(0x40002008u)
+#define UART_EVENTS_RXDRDY REGISTER(0x40002108u)
+#define UART_EVENTS_TXDRDY REGISTER(0x4000211Cu)
+#define UART_INTENSET REGISTER(0x40002304u)
+#define UART_INTENCLR REGISTER(0x40002308u)
+#define UART_ERRORSRC REGISTER(0x40002480u)
+#define UART_ENABLE REGISTER(0x40002500u)
+#define UART_PSELTXD REGISTER(0x4000250Cu)
+#define UART_PSELRXD REGISTER(0x40002514u)
+#define UART_RXD REGISTER(0x40002518u)
+#define UART_TXD REGISTER(0x4000251Cu)
+#define UART_BAUDRATE REGISTER(0x40002524u)
+#define INTEN_RXDRDY (1u << 2)
+#define ENABLE_ENABLED 4u
+#define ERRORSRC_OVERRUN 1u
+
+#define TIMER_TASKS_START REGISTER(0x40008000u)
+#define TIMER_EVENTS_COMPARE0 REGISTER(0x40008140u)
+#define TIMER_SHORTS REGISTER(0x40008200u)
+#define TIMER_INTENSET REGISTER(0x40008304u)
+#define TIMER_PRESCALER REGISTER(0x40008510u)
+#define TIMER_CC0 REGISTER(0x40008540u)
+#define SHORTS_COMPARE0_CLEAR 1u
+#define INTEN_COMPARE0 (1u << 16)
+
+#define GPIO_OUTSET REGISTER(0x50000508u)
+#define GPIO_OUTCLR REGISTER(0x5000050Cu)
+#define GPIO_IN REGISTER(0x50000510u)
+#define GPIO_DIRSET REGISTER(0x50000518u)
+#define GPIO_PIN_CNF(pin) REGISTER(0x50000700u + 4u * (pin))
+#define PIN_CNF_INPUT 0x0Cu /* input, connected, pull-up */
+
+#define NVIC_ISER REGISTER(0xE000E100u)
+#define IRQ_UART0 (1u << 2)
+#define IRQ_TIMER0 (1u << 8)
+
+/* Wiring: numbers of P0 pins. TXD and RXD go to the USB chip of the board unless told otherwise. */
+#ifndef BOARD_PIN_TXD
+#define BOARD_PIN_TXD 24u
+#endif
+#ifndef BOARD_PIN_RXD
+#define BOARD_PIN_RXD 25u
+#endif
+#define PIN_DIRECTION 16u /* P16 of the edge connector: high while sending */
+#define PIN_BUTTON_A 17u  /* input 1, low when pressed */
+#define PIN_BUTTON_B 26u  /* input 2, low when pressed */
+#define PIN_OUTPUT_1 3u   /* P0 of the edge connector */
+#define PIN_OUTPUT_2 2u   /* P1 */
+#define PIN_OUTPUT_3 1u   /* P2 */
+
+/* The baud rate in units of 16 MHz / 2^32, of which the chip takes the upper 20 bits. */
+#define BAUDRATE ((uint32_t)((((uint64_t)BOARD_BAUD << 32) / 16000000u + 0x800u) & 0xFFFFF000u))
+
+static volatile uint8_t ring[256]; /* its indices wrap by themselves */
+static volatile uint8_t head;
+static volatile uint8_t tail;
+static volatile uint16_t overruns;
+static volatile uint32_t milliseconds;
+
+static void start_clock(void)
+{
+    CLOCK_TASKS_HFCLKSTART = 1u; /* the crystal: the oscillator inside is too coarse for a UART */
+    while (CLOCK_EVENTS_HFCLKSTARTED == 0u) {
+    }
+    TIMER_PRESCALER = 4u; /* 1 MHz */
+    TIMER_CC0 = 1000u;
+    TIMER_SHORTS = SHORTS_COMPARE0_CLEAR;
+    TIMER_INTENSET = INTEN_COMPARE0;
+    TIMER_TASKS_START = 1u;
+}
+
+static void start_pins(void)
+{
+    const uint32_t outputs = (1u << PIN_OUTPUT_1) | (1u << PIN_OUTPUT_2) | (1u << PIN_OUTPUT_3);
+    GPIO_PIN_CNF(PIN_BUTTON_A) = PIN_CNF_INPUT;
+    GPIO_PIN_CNF(PIN_BUTTON_B) = PIN_CNF_INPUT;
+    GPIO_PIN_CNF(BOARD_PIN_RXD) = PIN_CNF_INPUT;
+    GPIO_OUTCLR = outputs | (1u << PIN_DIRECTION);
+    GPIO_OUTSET = 1u << BOARD_PIN_TXD; /* an idle line while the UART is off */
+    GPIO_DIRSET = outputs | (1u << PIN_DIRECTION) | (1u << BOARD_PIN_TXD);
+}
+
+static void start_uart(void)
+{
+    UART_PSELTXD = BOARD_PIN_TXD;
+    UART_PSELRXD = BOARD_PIN_RXD;
+    UART_BAUDRATE = BAUDRATE;
+    UART_ENABLE = ENABLE_ENABLED;
+    UART_EVENTS_RXDRDY = 0u;
+    UART_INTENSET = INTEN_RXDRDY;
+    UART_TASKS_STARTTX = 1u;
+    UART_TASKS_STARTRX = 1u;
+}
+
+void board_start(void)
+{
+    start_clock();
+    start_pins();
+    start_uart();
+    NVIC_ISER = IRQ_UART0 | IRQ_TIMER0;
+}
+
+static void count_overrun(void)
+{
+    if (overruns != UINT16_MAX) {
+        ++overruns;
+    }
+}
+
+/* The chip has a FIFO of six bytes behind RXD. Each byte that moves into RXD sets the event; cleared behind the
+ * reading, it would hide the next one. Where the ring is full the rest waits in the FIFO until board_receive. */
+void uart0_interrupt(void)
+{
+    while (UART_EVENTS_RXDRDY != 0u) {
+        if ((uint8_t)(head + 1u) == tail) {
+            UART_INTENCLR = INTEN_RXDRDY;
+            break;
+        }
+        UART_EVENTS_RXDRDY = 0u;
+        ring[head] = (uint8_t)UART_RXD;
+        ++head;
+    }
+    if ((UART_ERRORSRC & ERRORSRC_OVERRUN) != 0u) {
+        UART_ERRORSRC = ERRORSRC_OVERRUN;
+        count_overrun();
+    }
+}
+
+void timer0_interrupt(void)
+{
+    TIMER_EVENTS_COMPARE0 = 0u;
+    ++milliseconds;
+}
+
+bool board_receive(uint8_t *byte)
+{
+    if (tail == head) {
+        return false;
+    }
+    *byte = ring[tail];
+    ++tail;
+    UART_INTENSET = INTEN_RXDRDY; /* there is room again */
+    return true;
+}
+
+/* There is no buffer behind TXD: the event tells that a byte has been sent altogether. */
+void board_send(const uint8_t *bytes, size_t size)
+{
+    board_driver(true);
+    for (size_t index = 0u; index < size; ++index) {
+        UART_EVENTS_TXDRDY = 0u;
+        UART_TXD = bytes[index];
+        while (UART_EVENTS_TXDRDY == 0u) {
+        }
+    }
+    board_driver(false);
+}
+
+/* An interrupt wakes the processor although it is masked, and is taken behind cpsie: none is lost in between. */
+void board_wait(void)
+{
+    __asm volatile("cpsid i" ::: "memory");
+    if (tail == head) {
+        __asm volatile("wfi" ::: "memory");
+    }
+    __asm volatile("cpsie i" ::: "memory");
+}
+
+uint32_t board_milliseconds(void)
+{
+    return milliseconds;
+}
+
+uint32_t board_inputs(void)
+{
+    const uint32_t pressed = ~GPIO_IN;
+    return ((pressed >> PIN_BUTTON_A) & 1u) | (((pressed >> PIN_BUTTON_B) & 1u) << 1);
+}
+
+static void set_pin(uint32_t pin, bool high)
+{
+    if (high) {
+        GPIO_OUTSET = 1u << pin;
+    } else {
+        GPIO_OUTCLR = 1u << pin;
+    }
+}
+
+void board_outputs(uint32_t outputs)
+{
+    set_pin(PIN_OUTPUT_1, (outputs & 1u) != 0u);
+    set_pin(PIN_OUTPUT_2, (outputs & 2u) != 0u);
+    set_pin(PIN_OUTPUT_3, (outputs & 4u) != 0u);
+}
+
+void board_driver(bool transmit)
+{
+    set_pin(PIN_DIRECTION, transmit);
+}
+
+uint16_t board_overruns(void)
+{
+    return overruns;
+}

@@ -1,0 +1,8 @@
+# BBC micro:bit, first version: nRF51822 (Cortex-M0). Debian: gcc-arm-none-eabi libnewlib-arm-none-eabi.
+CC = arm-none-eabi-gcc
+SIZE = arm-none-eabi-size
+PORT_FLAGS = -mcpu=cortex-m0 -mthumb
+PORT_SOURCES = microbit/board.c microbit/startup.c
+# newlib gives memcpy and memset where the compiler calls them, and nothing else.
+PORT_LDFLAGS = -nostartfiles --specs=nano.specs -T microbit/nrf51822.ld
+APPS = qlink_node
