@@ -38,15 +38,20 @@ def _plain(name: str) -> tuple[Generate, Outputs]:
     return module.generate, module.shared()
 
 
-def _vectors() -> tuple[Generate, Outputs]:
+def _vectors_of(protocol: Protocol, options: Options) -> Outputs:
     """The vectors take the encoder that makes their bytes as an argument; it is construct's."""
-    vectors, construct = _backend("vectors"), _backend("construct")
+    outputs: Outputs = _backend("vectors").generate(protocol, options, _backend("construct").live(protocol))
+    return outputs
 
-    def generate(protocol: Protocol, options: Options) -> Outputs:
-        outputs: Outputs = vectors.generate(protocol, options, construct.live(protocol))
-        return outputs
 
-    return generate, vectors.shared()
+def _vectors() -> tuple[Generate, Outputs]:
+    return _vectors_of, _backend("vectors").shared()
+
+
+def _conformance() -> tuple[Generate, Outputs]:
+    """A kit holds the vectors, and is written against the header."""
+    kits = importlib.import_module("qlinkgen.cli.kits")
+    return partial(kits.generate, vectors=_vectors_of), _backend("conformance").shared()
 
 
 def _target(name: str, summary: str, backend: str = "") -> Target:
@@ -61,6 +66,9 @@ TARGETS = {
         _target("c", "self-contained C99 header"),
         _target("construct", "structures for the construct library"),
         Target("vectors", "test vectors as JSON", _vectors),
+        Target(
+            "conformance", "C program that holds a header against the vectors, on any target", _conformance
+        ),
     )
 }
 

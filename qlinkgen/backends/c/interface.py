@@ -1,0 +1,116 @@
+"""What a program written against a header has to know of it: its names, and the habits of its frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from qlinkgen.backends.c.dispatch import slave_entries, told_name
+from qlinkgen.backends.c.encode import count_member
+from qlinkgen.backends.c.frames import frame_section
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
+from qlinkgen.model.frame import DelimitedFrame
+from qlinkgen.model.message import Field, Message
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Scalar
+
+__all__ = ["Interface", "interface"]
+
+
+@dataclass(frozen=True)
+class Interface:
+    """The header of one protocol, as its user sees it.
+
+    Attributes:
+        prefix: what functions and types begin with; ``upper`` is that of macros.
+        id: member of the frame that holds the message id.
+        address: member of the frame that holds the address, "" if there is none.
+        address_bits: width of the address's C type, 0 if there is none.
+        directed: taking frames apart and receiving are told which direction is expected.
+        unpacks: taking a frame apart needs a buffer.
+        rescans: one byte can bring several events, and the end of a stream some more.
+        packets: an answer is taken apart by its message's own function, and nothing receives it.
+        listener: what the struct is called that is told of messages, "" where there is none.
+        sum_bits: width of the part of an answer's check value that its request makes, 0 if there is none.
+        check_bits: width of the check value's functions, 0 if there are none.
+    """
+
+    names: Names
+    id: str
+    address: str
+    address_bits: int
+    directed: bool
+    unpacks: bool
+    rescans: bool
+    packets: bool
+    listener: str
+    sum_bits: int
+    check_bits: int
+
+    @property
+    def prefix(self) -> str:
+        """The protocol's name."""
+        return self.names.prefix
+
+    @property
+    def upper(self) -> str:
+        """The protocol's name in macros."""
+        return self.names.upper
+
+    def stem(self, message: Message) -> str:
+        """A message's part of a name."""
+        return self.names.stem(message)
+
+    def function(self, message: Message) -> str:
+        """What a message's functions and its struct begin with."""
+        return self.names.function(message)
+
+    def constant(self, message: Message) -> str:
+        """What a message's macros begin with."""
+        return self.names.constant(message)
+
+    def count_member(self, field: Field) -> str:
+        """The struct member that says how much of a field of variable size there is."""
+        return count_member(field)
+
+    def slave_member(self, message: Message) -> str:
+        """The member of the slave's struct that handles a request."""
+        (entry,) = slave_entries(self.names, (message,))
+        return str(entry["name"])
+
+    def told_member(self, message: Message) -> str:
+        """The member of the listener's struct that is told of a message."""
+        return told_name(self.names, message)
+
+    def width(self, scalar: Scalar) -> int:
+        """Bytes of the struct member of an integer."""
+        return 1 if scalar_type(scalar) == "bool" else storage(scalar.bits) // 8
+
+    def count_width(self, most: int) -> int:
+        """Bytes of the struct member that counts up to ``most``."""
+        return _bits(count_type(most)) // 8
+
+
+def interface(protocol: Protocol) -> Interface:
+    """Describe the header of a protocol."""
+    frame, section = protocol.frame, frame_section(protocol, Layouts(protocol.name))
+    view = section.view
+    return Interface(
+        names=Names(protocol),
+        id=view["id"],
+        address=view["address"] or "",
+        address_bits=_bits(view.get("address_type", "")) if view["address"] else 0,
+        directed=view["needs_direction"],
+        unpacks=isinstance(frame, DelimitedFrame) and frame.stuffing is not None,
+        rescans=section.rescans,
+        packets=section.slave_only,
+        listener=""
+        if section.slave_only
+        else section.dispatch_view(protocol, protocol.name.upper())["listener"],
+        sum_bits=_bits(view.get("sum_type", "")),
+        check_bits=_bits(unsigned_type(section.check["width"])) if section.check else 0,
+    )
+
+
+def _bits(kind: str) -> int:
+    return int(kind.removeprefix("u").removeprefix("int").removesuffix("_t")) if kind else 0

@@ -1,0 +1,34 @@
+"""Conformance kits: one C program for each protocol that holds a header against the vectors, on any target.
+
+It prints TAP and needs nothing but the header. The header's names, the vectors and a receiver to compare with
+are arguments, as back-ends do not know each other: ``generate(protocol, options, sources)``.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import jinja2
+
+from qlinkgen.backends.base import Options, Outputs, environment
+from qlinkgen.backends.conformance.kit import Kit
+from qlinkgen.backends.conformance.sources import Header, Heard, Listener, Sources
+from qlinkgen.model.protocol import Protocol
+
+__all__ = ["Header", "Heard", "Listener", "Sources", "generate", "shared"]
+
+
+def generate(protocol: Protocol, options: Options, sources: Sources) -> Outputs:
+    """The kit of a protocol: path below the output folder to text."""
+    text = _template().render(Kit(protocol, options, sources).view())
+    return {f"conformance/{protocol.name}_conformance.c": text}
+
+
+def shared() -> Outputs:
+    """Nothing: a kit needs no other file but the header."""
+    return {}
+
+
+@functools.cache
+def _template() -> jinja2.Template:
+    return environment(__name__).get_template("templates/conformance.c.j2")

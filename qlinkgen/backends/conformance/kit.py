@@ -1,0 +1,100 @@
+"""Everything that a kit says, as strings and small integers for the templates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from qlinkgen.backends.base import Options, banner
+from qlinkgen.backends.conformance import streams
+from qlinkgen.backends.conformance.layout import numbers, wrapped
+from qlinkgen.backends.conformance.messages import ERRORS, Entries
+from qlinkgen.backends.conformance.rows import kinds_in, most_values, rows_of
+from qlinkgen.backends.conformance.sources import Sources
+from qlinkgen.errors import GenerationError
+from qlinkgen.model.checksum import Algorithm
+from qlinkgen.model.frame import DelimitedFrame, MarkedFrame
+from qlinkgen.model.protocol import Protocol
+
+#: Bits of a row's first byte that name kinds; the two above them say "by hand" and "refused".
+_KINDS = 6
+
+
+class Kit:
+    """Lowers the vectors of a protocol to the tables of a C file."""
+
+    def __init__(self, protocol: Protocol, options: Options, sources: Sources) -> None:
+        """What is kept is what the header keeps under the same options."""
+        self._protocol = protocol
+        self._header = sources.header
+        # The generated vectors are made under the same options, so they say which messages are kept.
+        kept = {entry["message"] for entry in sources.generated["vectors"]}
+        self._messages = tuple(message for message in protocol.messages if message.name in kept)
+        rows = rows_of(protocol, sources)
+        self._rows = {message.name: rows[message.name] for message in self._messages}
+        self._every = [row for each in self._rows.values() for row in each]
+        self._entries = Entries(protocol, options.role, sources, self._messages, self._rows)
+
+    def view(self) -> dict[str, Any]:
+        """What the templates place."""
+        header, entries = self._header, self._entries.views()
+        check, kinds, noise = self._check(), self._kinds(), streams.noise(self._protocol)
+        return {
+            "about": [piece for line in banner(self._protocol) for piece in wrapped(line)],
+            "p": header.prefix,
+            "P": header.upper,
+            **{name: getattr(header, name) for name in _HABITS},
+            "address_type": f"uint{header.address_bits}_t",
+            "address_bytes": header.address_bits // 8,
+            "marked": isinstance(self._protocol.frame, MarkedFrame),
+            "broadcast": header.address and self._protocol.bus.broadcast is not None,
+            "wide": self._entries.wide,
+            "check": check,
+            "kinds": [{"name": kind, "bit": f"0x{1 << bit:02X}"} for bit, kind in enumerate(kinds)],
+            "kind_mask": f"0x{(1 << _KINDS) - 1:02X}",
+            "kind_size": max(map(len, kinds)) + 1,
+            "errors": ERRORS,
+            "error_size": max(map(len, ERRORS)) + 1,
+            "noise": [numbers((len(piece), *piece)) for piece in noise],
+            "noise_size": max(map(len, noise)) + 1,
+            "most_wire": max(len(row.wire) for row in self._every),
+            "most_request": max(len(row.request) for row in self._every),
+            "most_values": max(1, *(most_values(header, message) for message in self._messages)),
+            "most_events": self._entries.most_events + 1,
+            "entries": entries,
+            "last": len(entries) - 1,
+            "tests": bool(check) + sum(entry[key] for entry in entries for key in _COUNTED),
+            "has_requests": bool(header.sum_bits and any(row.request for row in self._every)),
+            "refuses": any(entry["unsent_lines"] for entry in entries),
+            "encodes": any(entry["encoded"] for entry in entries),
+            "decodes": any(entry["decoded"] for entry in entries),
+            "receives": any(entry["received"] for entry in entries),
+            "asks": any(entry["slave_member"] for entry in entries),
+            "tells": any(entry["told_member"] for entry in entries),
+            "checks": sorted({entry["taken_as"] for entry in entries if entry["framed"]}),
+        }
+
+    def _kinds(self) -> tuple[str, ...]:
+        kinds = tuple(kinds_in(self._rows))
+        if len(kinds) > _KINDS:
+            raise GenerationError(
+                f"{self._protocol.name}: {len(kinds)} kinds of vectors; a kit holds {_KINDS}"
+            )
+        return kinds
+
+    def _check(self) -> dict[str, Any] | None:
+        """The check value of the nine characters 123456789, where it is a CRC."""
+        frame, bits = self._protocol.frame, self._header.check_bits
+        part = frame.part("checksum") if isinstance(frame, DelimitedFrame) else frame
+        checksum = part.checksum if part else None
+        if checksum is None or not bits or not isinstance(checksum.algorithm, Algorithm):
+            return None
+        algorithm = checksum.algorithm
+        suffix = {8: "u", 16: "u", 32: "ul", 64: "ull"}[bits]
+        value = f"0x{algorithm.check:0{bits // 4}X}"
+        return {"name": algorithm.name, "bits": bits, "value": value, "literal": value + suffix}
+
+
+#: What the templates ask of the header under its own name.
+_HABITS = ("id", "address", "directed", "unpacks", "rescans", "packets", "listener", "sum_bits")
+#: Numbers of tests of a message.
+_COUNTED = ("tests", "asked_tests", "told_tests")

@@ -1,0 +1,51 @@
+"""Bytes and comments as lines of C."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+#: Columns, the indentation of a table not counted.
+WIDTH = 112
+
+
+def numbers(data: Sequence[int]) -> str:
+    """Bytes of a table."""
+    return ", ".join(f"0x{byte:02X}" for byte in data)
+
+
+def wrapped(text: str) -> list[str]:
+    """Lines of a comment; what would end the comment is broken up."""
+    plain = " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
+    return textwrap.wrap(plain, WIDTH - 6, break_on_hyphens=False)
+
+
+def comment(text: str) -> list[str]:
+    """A comment of its own, none where there is nothing to say."""
+    lines = wrapped(text)
+    if not lines:
+        return []
+    framed = [f"/* {lines[0]}", *(f" * {line}" for line in lines[1:])]
+    return [*framed[:-1], f"{framed[-1]} */"]
+
+
+def folded(text: str) -> list[str]:
+    """A list that may need several lines."""
+    return textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)
+
+
+def row_lines(pieces: Sequence[str]) -> list[str]:
+    """One line where all pieces of a row fit, or else a line for each; what is still too long is folded."""
+    one = " ".join(pieces)
+    if len(one) <= WIDTH:
+        return [one]
+    lines = [line for piece in pieces for line in textwrap.wrap(piece, WIDTH - 4)]
+    return [lines[0], *(f"    {line}" for line in lines[1:])]
+
+
+def call(text: str) -> list[str]:
+    """A call that is broken behind its opening parenthesis where it is too long."""
+    if len(text) <= WIDTH:
+        return [text]
+    head, arguments = text.split("(", 1)
+    return [f"{head}(", f"    {arguments}"]

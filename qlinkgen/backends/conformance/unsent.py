@@ -1,0 +1,56 @@
+"""What an encoder has to refuse: a value or an address one step out of its range, as far as C can hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from qlinkgen.backends.conformance.rows import Right, number_bytes, value_sizes
+from qlinkgen.backends.conformance.sources import Header
+from qlinkgen.model.message import Message
+from qlinkgen.model.types import Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class Unsent:
+    """Values that are not sent, and what is wrong with them."""
+
+    what: str
+    address: int
+    values: bytes
+
+
+def unsent(header: Header, message: Message, right: Right) -> Iterator[Unsent]:
+    """Each number of a message, and its address, out of range by one; all else is as in a right vector."""
+    at = 0
+    for value, size in zip(message.values, value_sizes(header, message, right), strict=True):
+        if isinstance(value.type, Scalar):
+            for number in _outside(value.type, size):
+                values = right.values[:at] + number_bytes(number, size) + right.values[at + size :]
+                yield Unsent(f"{value.name} is {number}", right.address, values)
+        at += size
+    for address in _addresses(header, message):
+        yield Unsent(f"sent to {address}", address, right.values)
+
+
+def _outside(scalar: Scalar, size: int) -> Iterator[int]:
+    """The nearest numbers out of range that the struct can hold; a bool holds none."""
+    if scalar.meaning == "bool":
+        return
+    least, most = (
+        (-(1 << 8 * size - 1), (1 << 8 * size - 1) - 1) if scalar.signed else (0, (1 << 8 * size) - 1)
+    )
+    if scalar.minimum > least:
+        yield scalar.minimum - 1
+    if scalar.maximum < most:
+        yield scalar.maximum + 1
+
+
+def _addresses(header: Header, message: Message) -> Iterator[int]:
+    if not header.address or not message.addresses:
+        return
+    least, most = min(first for first, _ in message.addresses), max(last for _, last in message.addresses)
+    if least > 0:
+        yield least - 1
+    if most < (1 << header.address_bits) - 1:
+        yield most + 1

@@ -1,0 +1,144 @@
+"""What is in a kit, and how it reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+import pytest
+
+from qlinkgen.backends.base import Options
+from qlinkgen.cli import kits as cli_kits
+from qlinkgen.cli.targets import TARGETS
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.schema import find, load
+from tests.conformance import kits
+from tests.conformance.conftest import Write
+from tests.proof import cases
+
+WIDTH = 120
+ROLES: tuple[Literal["both", "master", "slave"], ...] = ("both", "slave", "master")
+
+
+def text_of(protocol: Protocol, options: Options | None = None) -> str:
+    generate, shared = TARGETS["conformance"].load()
+    assert not shared
+    (text,) = generate(protocol, options or Options()).values()
+    return text
+
+
+@pytest.mark.parametrize("name", [name for name in cases.PROTOCOLS if name != "mc1231a"])
+def test_it_reads_like_the_header(name: str) -> None:
+    for role in ROLES:
+        text = text_of(cases.protocol(name), Options(role=role))
+        assert not [
+            line
+            for line in text.splitlines()
+            if len(line) > WIDTH or line != line.rstrip() or "\t" in line or not line.isascii()
+        ]
+        assert "\n\n\n" not in text
+        assert text.startswith("/*\n * ")
+        assert cases.protocol(name).schema_hash in text.splitlines()[2]
+
+
+def test_values_out_of_range_are_not_to_be_sent(kit: Write) -> None:
+    """One step past each bound that the C type can hold; a constant, a bool or a full range has none."""
+    text = kit("qlink").read_text()
+    start = text.index("node_setup_request_unsent[] IN_FLASH = {\n")
+    assert text[start : text.index("};", start)].splitlines()[1:] == [
+        "    /* node_number is 0 */",
+        "    0x01, 4, 0x00, 0x0A, 0x0A, 0x00,",
+        "    /* node_number is 17 */",
+        "    0x01, 4, 0x11, 0x0A, 0x0A, 0x00,",
+        "    /* sent to 17 */",
+        "    0x11, 4, 0x01, 0x0A, 0x0A, 0x00,",
+    ]
+    parts = kit("kitchen_sink").read_text().split("_unsent[] IN_FLASH = {")[1:]
+    sink = "".join(part[: part.index("};")] for part in parts)
+    for each in (
+        "around_zero is -6",
+        "a_i24 is 8388608",
+        "gear is 8",
+        "level is 61",
+        "low is 0",
+        "sent to 32",
+    ):
+        assert f"/* {each} */" in sink
+    assert "/* yes is" not in sink
+    assert "/* a_u64 is" not in sink
+
+
+def test_vectors_by_hand_say_where_they_come_from(kit: Write) -> None:
+    text = " ".join(kit("qlink").read_text().replace("\n     * ", " ").split())
+    for row in [*cases.by_hand("qlink")["vectors"], *cases.by_hand("qlink")["faults"]]:
+        assert f"by hand, {row['source']}" in text
+    assert "1.0 s = 10 steps of 0.1 s = 0A; 2.5 s = 25 = 19; metronix = 2" in text
+
+
+def test_vectors_by_hand_are_those_of_the_shipped_schema_alone(tmp_path: Path) -> None:
+    """With another checksum, or in a schema that somebody has changed, their bytes are wrong."""
+    shipped = cases.protocol("trio")
+    assert cli_kits.by_hand(shipped) == cases.by_hand("trio")
+    assert cli_kits.by_hand(load(find("trio"), crc="crc-16/xmodem")) == {}
+    changed = tmp_path / "trio.yaml"
+    changed.write_text(find("trio").read_text().replace("keypad", "keyboard"))
+    assert cli_kits.by_hand(load(changed)) == {}
+    assert cli_kits.by_hand(cases.protocol("modbus_rtu")) == {}
+
+
+def run(protocol: Protocol, folder: Path, *compiler: str) -> kits.Report:
+    for target in ("c", "conformance"):
+        generate, _ = TARGETS[target].load()
+        for path, text in generate(protocol, Options()).items():
+            (folder / Path(path).name).write_text(text)
+    file = folder / f"{protocol.name}_conformance.c"
+    return kits.ran(kits.compiled(folder / "kit", *compiler, "-std=c99", kits.STDIO, file))
+
+
+def test_another_checksum_has_vectors_of_its_own(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    compiler = require_tool("clang", package="clang")
+    report = run(load(find("trio"), crc="crc-16/modbus"), tmp_path, compiler)
+    report.check()
+    assert report.names[0] == "check value crc-16/modbus"
+    assert not [each for each in report.names if "by-hand" in each]
+
+
+BARE = """
+qlinkgen: 1
+protocol: {name: bare, title: Bare, revision: "1", source: this test, doc: No preamble and no checksum.}
+byteorder: big
+frame:
+  parts:
+    id: {role: message, type: u8}
+    station: {role: address, type: u16}
+    size: {role: length, type: u8, counts: [data]}
+    data: {role: payload, size: 0..8}
+bus: {kind: master_slave, nodes: 1..2000, broadcast: 0, baud: 9600, response_within: 20 bytes}
+defaults: {addressing: node, repeat: safe}
+commands:
+  set:
+    id: 0x01
+    doc: Set a level.
+    request: {level: {type: u16, range: 0..1000}}
+    response: {done: bool}
+  noisy:
+    id: 0xFF
+    doc: What it begins with is noise to others.
+    request: {text: "bytes[3]"}
+    response: {}
+"""
+
+
+def test_where_noise_looks_like_a_frame_there_is_less_of_it(
+    tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    """A frame that breaks off is ended by what follows it, as nothing tells the two apart."""
+    (tmp_path / "bare.yaml").write_text(BARE)
+    protocol = load(tmp_path / "bare.yaml")
+    # A header without a check value has a variable that only its check would use.
+    report = run(protocol, tmp_path, require_tool("gcc", package="gcc"), "-Wno-unused-but-set-variable")
+    report.check()
+    text = (tmp_path / "bare_conformance.c").read_text()
+    assert set(report.by_verb) == {"encode", "decode", "refuse", "receive", "ask", "tell"}
+    assert "\n    REFUSED(E_TRUNCATED), 5, 0xFF, 0x00, 0x01, 0x03, 0x00, NOT_FED,\n" in text
