@@ -66,10 +66,11 @@ extern "C" {
 
 /* What the code relies on: bytes of eight bits, and two's complement where an unsigned number becomes a signed one. */
 typedef char mc1231a_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
-typedef char mc1231a_needs_twos_complement_[((int8_t)0xFFu == -1 && (int16_t)0xFFFFu == -1) ? 1 : -1];
+typedef char mc1231a_needs_twos_complement_[(((int8_t)0xFFU == -1) && ((int16_t)0xFFFFU == -1)) ? 1 : -1];
 typedef char mc1231a_needs_sizes_in_int_[(INT_MAX >= 6) ? 1 : -1];
 
-typedef enum mc1231a_status {
+/* What went wrong; functions return it as an int, which may also be a number of bytes. */
+enum {
     MC1231A_OK = 0,
     MC1231A_ERROR_CAPACITY = -1,  /* the buffer is too small */
     MC1231A_ERROR_LENGTH = -2,    /* a size or count that the message cannot have */
@@ -80,7 +81,8 @@ typedef enum mc1231a_status {
     MC1231A_ERROR_TRUNCATED = -7, /* the frame is not complete */
     MC1231A_ERROR_FRAME = -8,     /* preamble, header or end is wrong */
     MC1231A_ERROR_ILLEGAL = -9    /* the slave does not know the command */
-} mc1231a_status_t;
+};
+typedef int mc1231a_status_t;
 
 /* What a received byte completed. */
 typedef enum mc1231a_event {
@@ -94,16 +96,16 @@ typedef enum mc1231a_event {
     MC1231A_EVENT_FRAMING
 } mc1231a_event_t;
 
-#define MC1231A_MAX_PAYLOAD_SIZE 4u
-#define MC1231A_MAX_FRAME_SIZE 6u
-#define MC1231A_MAX_WIRE_SIZE 6u
-#define MC1231A_BITS_PER_BYTE 10u
+#define MC1231A_MAX_PAYLOAD_SIZE 4U
+#define MC1231A_MAX_FRAME_SIZE 6U
+#define MC1231A_MAX_WIRE_SIZE 6U
+#define MC1231A_BITS_PER_BYTE 10U
 
 /* Enum output_mode (section Host commands): Form of the motor output. */
 typedef uint16_t mc1231a_output_mode_t;
-#define MC1231A_OUTPUT_MODE_PWM 0u
-#define MC1231A_OUTPUT_MODE_NOT_USED 1u
-#define MC1231A_OUTPUT_MODE_DAC16 2u
+#define MC1231A_OUTPUT_MODE_PWM 0U
+#define MC1231A_OUTPUT_MODE_NOT_USED 1U
+#define MC1231A_OUTPUT_MODE_DAC16 2U
 
 static inline bool mc1231a_output_mode_is_valid(mc1231a_output_mode_t value)
 {
@@ -136,42 +138,42 @@ static inline const char *mc1231a_output_mode_name(mc1231a_output_mode_t value)
 /* Flags axis_status (section Axis status): Status of an axis. Bits 0-7 and 11 are events that stay set until they
  * are cleared, bits 8-10 are levels; bits 12-15 were not found in a source and are kept as received. */
 typedef uint16_t mc1231a_axis_status_t;
-#define MC1231A_AXIS_STATUS_MOTION_COMPLETE 0x0001u
-#define MC1231A_AXIS_STATUS_POSITION_WRAPPED 0x0002u
-#define MC1231A_AXIS_STATUS_BREAKPOINT_REACHED 0x0004u
-#define MC1231A_AXIS_STATUS_CAPTURE_RECEIVED 0x0008u /* Index or home capture received */
-#define MC1231A_AXIS_STATUS_MOTION_ERROR 0x0010u
-#define MC1231A_AXIS_STATUS_POSITIVE_LIMIT 0x0020u
-#define MC1231A_AXIS_STATUS_NEGATIVE_LIMIT 0x0040u
-#define MC1231A_AXIS_STATUS_COMMAND_ERROR 0x0080u
-#define MC1231A_AXIS_STATUS_MOTOR_ON 0x0100u
-#define MC1231A_AXIS_STATUS_AXIS_ON 0x0200u
-#define MC1231A_AXIS_STATUS_IN_MOTION 0x0400u
-#define MC1231A_AXIS_STATUS_COMMUTATION_ERROR 0x0800u /* Known from the interrupt mask only */
+#define MC1231A_AXIS_STATUS_MOTION_COMPLETE 0x0001U
+#define MC1231A_AXIS_STATUS_POSITION_WRAPPED 0x0002U
+#define MC1231A_AXIS_STATUS_BREAKPOINT_REACHED 0x0004U
+#define MC1231A_AXIS_STATUS_CAPTURE_RECEIVED 0x0008U /* Index or home capture received */
+#define MC1231A_AXIS_STATUS_MOTION_ERROR 0x0010U
+#define MC1231A_AXIS_STATUS_POSITIVE_LIMIT 0x0020U
+#define MC1231A_AXIS_STATUS_NEGATIVE_LIMIT 0x0040U
+#define MC1231A_AXIS_STATUS_COMMAND_ERROR 0x0080U
+#define MC1231A_AXIS_STATUS_MOTOR_ON 0x0100U
+#define MC1231A_AXIS_STATUS_AXIS_ON 0x0200U
+#define MC1231A_AXIS_STATUS_IN_MOTION 0x0400U
+#define MC1231A_AXIS_STATUS_COMMUTATION_ERROR 0x0800U /* Known from the interrupt mask only */
 
 /* Flags event_mask (section Interrupts): Events of the axis status word. */
 typedef uint16_t mc1231a_event_mask_t;
-#define MC1231A_EVENT_MASK_MOTION_COMPLETE 0x0001u
-#define MC1231A_EVENT_MASK_POSITION_WRAPPED 0x0002u
-#define MC1231A_EVENT_MASK_BREAKPOINT_REACHED 0x0004u
-#define MC1231A_EVENT_MASK_CAPTURE_RECEIVED 0x0008u
-#define MC1231A_EVENT_MASK_MOTION_ERROR 0x0010u
-#define MC1231A_EVENT_MASK_POSITIVE_LIMIT 0x0020u
-#define MC1231A_EVENT_MASK_NEGATIVE_LIMIT 0x0040u
-#define MC1231A_EVENT_MASK_COMMAND_ERROR 0x0080u
-#define MC1231A_EVENT_MASK_COMMUTATION_ERROR 0x0800u
+#define MC1231A_EVENT_MASK_MOTION_COMPLETE 0x0001U
+#define MC1231A_EVENT_MASK_POSITION_WRAPPED 0x0002U
+#define MC1231A_EVENT_MASK_BREAKPOINT_REACHED 0x0004U
+#define MC1231A_EVENT_MASK_CAPTURE_RECEIVED 0x0008U
+#define MC1231A_EVENT_MASK_MOTION_ERROR 0x0010U
+#define MC1231A_EVENT_MASK_POSITIVE_LIMIT 0x0020U
+#define MC1231A_EVENT_MASK_NEGATIVE_LIMIT 0x0040U
+#define MC1231A_EVENT_MASK_COMMAND_ERROR 0x0080U
+#define MC1231A_EVENT_MASK_COMMUTATION_ERROR 0x0800U
 
 /* Flags axes (section Axis addressing): Axes of the chip set. */
 typedef uint16_t mc1231a_axes_t;
-#define MC1231A_AXES_AXIS_1 0x0001u
-#define MC1231A_AXES_AXIS_2 0x0002u
+#define MC1231A_AXES_AXIS_1 0x0001U
+#define MC1231A_AXES_AXIS_2 0x0002U
 
 /* Flags limit_switches (section Host commands): Limit inputs, two bits for each axis. */
 typedef uint16_t mc1231a_limit_switches_t;
-#define MC1231A_LIMIT_SWITCHES_AXIS_1_POSITIVE 0x0001u
-#define MC1231A_LIMIT_SWITCHES_AXIS_1_NEGATIVE 0x0002u
-#define MC1231A_LIMIT_SWITCHES_AXIS_2_POSITIVE 0x0004u
-#define MC1231A_LIMIT_SWITCHES_AXIS_2_NEGATIVE 0x0008u
+#define MC1231A_LIMIT_SWITCHES_AXIS_1_POSITIVE 0x0001U
+#define MC1231A_LIMIT_SWITCHES_AXIS_1_NEGATIVE 0x0002U
+#define MC1231A_LIMIT_SWITCHES_AXIS_2_POSITIVE 0x0004U
+#define MC1231A_LIMIT_SWITCHES_AXIS_2_NEGATIVE 0x0008U
 
 /* ---- Bytes ---- */
 
@@ -211,18 +213,22 @@ static inline int mc1231a_nearest_uint32_(double steps, uint32_t least, uint32_t
 {
     uint32_t whole;
     double rest;
-    if (!(steps >= (double)least - 0.5 && steps <= (double)most + 0.5)) {
+    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
         return MC1231A_ERROR_RANGE;
     }
-    if (steps <= (double)least || steps >= (double)most) {
-        *raw = (steps <= (double)least) ? least : most;
+    if (steps <= (double)least) {
+        *raw = least;
+        return MC1231A_OK;
+    }
+    if (steps >= (double)most) {
+        *raw = most;
         return MC1231A_OK;
     }
     whole = (uint32_t)steps;
     rest = steps - (double)whole;
-    if (rest > 0.5 || (rest == 0.5 && (whole & 1) != 0)) {
+    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1U) != 0U))) {
         ++whole;
-    } else if (rest < -0.5 || (rest == -0.5 && (whole & 1) != 0)) {
+    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
         /* already the nearest */
@@ -234,18 +240,22 @@ static inline int mc1231a_nearest_int32_(double steps, int32_t least, int32_t mo
 {
     int32_t whole;
     double rest;
-    if (!(steps >= (double)least - 0.5 && steps <= (double)most + 0.5)) {
+    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
         return MC1231A_ERROR_RANGE;
     }
-    if (steps <= (double)least || steps >= (double)most) {
-        *raw = (steps <= (double)least) ? least : most;
+    if (steps <= (double)least) {
+        *raw = least;
+        return MC1231A_OK;
+    }
+    if (steps >= (double)most) {
+        *raw = most;
         return MC1231A_OK;
     }
     whole = (int32_t)steps;
     rest = steps - (double)whole;
-    if (rest > 0.5 || (rest == 0.5 && (whole & 1) != 0)) {
+    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1) != 0))) {
         ++whole;
-    } else if (rest < -0.5 || (rest == -0.5 && (whole & 1) != 0)) {
+    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1) != 0))) {
         --whole;
     } else {
         /* already the nearest */
@@ -257,18 +267,22 @@ static inline int mc1231a_nearest_uint16_(double steps, uint16_t least, uint16_t
 {
     uint16_t whole;
     double rest;
-    if (!(steps >= (double)least - 0.5 && steps <= (double)most + 0.5)) {
+    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
         return MC1231A_ERROR_RANGE;
     }
-    if (steps <= (double)least || steps >= (double)most) {
-        *raw = (steps <= (double)least) ? least : most;
+    if (steps <= (double)least) {
+        *raw = least;
+        return MC1231A_OK;
+    }
+    if (steps >= (double)most) {
+        *raw = most;
         return MC1231A_OK;
     }
     whole = (uint16_t)steps;
     rest = steps - (double)whole;
-    if (rest > 0.5 || (rest == 0.5 && (whole & 1) != 0)) {
+    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1U) != 0U))) {
         ++whole;
-    } else if (rest < -0.5 || (rest == -0.5 && (whole & 1) != 0)) {
+    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
         /* already the nearest */
@@ -567,7 +581,7 @@ static inline bool mc1231a_request_size_(uint8_t id, size_t *size)
     case MC1231A_GET_PHASE_CNTS_REQUEST_ID:
     case MC1231A_GET_PHASE_TIME_REQUEST_ID:
     case MC1231A_GET_PHASE_OFFSET_REQUEST_ID:
-        *size = 0u;
+        *size = 0U;
         return true;
     case MC1231A_SET_MAX_ACC_REQUEST_ID:
     case MC1231A_SET_KP_REQUEST_ID:
@@ -590,7 +604,7 @@ static inline bool mc1231a_request_size_(uint8_t id, size_t *size)
     case MC1231A_SET_PHASE_OFFSET_REQUEST_ID:
     case MC1231A_SET_PHASE_TIME_REQUEST_ID:
     case MC1231A_SET_PHASE_REQUEST_ID:
-        *size = 2u;
+        *size = 2U;
         return true;
     case MC1231A_SET_POS_REQUEST_ID:
     case MC1231A_SET_VEL_REQUEST_ID:
@@ -599,26 +613,27 @@ static inline bool mc1231a_request_size_(uint8_t id, size_t *size)
     case MC1231A_SET_RATIO_REQUEST_ID:
     case MC1231A_SET_BRK_PNT_REQUEST_ID:
     case MC1231A_SET_ACTL_POS_REQUEST_ID:
-        *size = 4u;
+        *size = 4U;
         return true;
     default:
-        *size = 0u;
+        *size = 0U;
         return false;
     }
 }
 
 /* The sum of words, the first byte of each the most significant. */
-static inline uint16_t mc1231a_sum_(uint16_t sum, const uint8_t *bytes, size_t size)
+static inline uint16_t mc1231a_sum_(uint16_t start, const uint8_t *bytes, size_t size)
 {
-    uint16_t word = 0u;
-    uint8_t taken = 0u;
-    for (size_t index = 0u; index < size; ++index) {
+    uint16_t sum = start;
+    uint16_t word = 0U;
+    uint8_t taken = 0U;
+    for (size_t index = 0U; index < size; ++index) {
         word = (uint16_t)((word << 8) | bytes[index]);
         ++taken;
-        if (taken == 2u) {
+        if (taken == 2U) {
             sum = (uint16_t)(sum + word);
-            word = 0u;
-            taken = 0u;
+            word = 0U;
+            taken = 0U;
         }
     }
     return (uint16_t)(sum + word);
@@ -632,7 +647,7 @@ static inline uint16_t mc1231a_frame_sum(const mc1231a_frame_t *frame)
 
 static inline uint16_t mc1231a_request_sum(const uint8_t *wire, size_t size)
 {
-    return (size == 0u) ? (uint16_t)0u : mc1231a_sum_(wire[0], wire + 1, size - 1u);
+    return (size == 0U) ? (uint16_t)0U : mc1231a_sum_(wire[0], &wire[1], size - 1U);
 }
 
 static inline uint16_t mc1231a_finish_sum_(uint16_t sum)
@@ -643,14 +658,15 @@ static inline uint16_t mc1231a_finish_sum_(uint16_t sum)
 /* Puts the check value behind the words of an answer. */
 static inline int mc1231a_close_(uint16_t request_sum, size_t size, uint8_t *wire, size_t capacity)
 {
-    uint8_t *const end = wire + size;
+    uint8_t *const end = &wire[size];
+    const size_t total = size + 2U;
     const uint16_t value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, size));
-    if (capacity - size < 2u) {
+    if (capacity < total) {
         return MC1231A_ERROR_CAPACITY;
     }
     end[0] = (uint8_t)(value >> 8);
     end[1] = (uint8_t)(value);
-    return (int)(size + 2u);
+    return (int)total;
 }
 
 /* Verifies the check value of an answer. */
@@ -658,12 +674,12 @@ static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_
 {
     const uint8_t *end;
     uint16_t value;
-    const uint16_t refused = 0u;
-    if (size < least + 2u) {
+    const uint16_t refused = 0U;
+    if (size < (least + 2U)) {
         return MC1231A_ERROR_TRUNCATED;
     }
-    end = wire + (size - 2u);
-    value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, size - 2u));
+    end = &wire[size - 2U];
+    value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, size - 2U));
     if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
         /* The value of a refusal, where it is not the right one by chance. */
         return ((end[0] != (uint8_t)(refused >> 8)) || (end[1] != (uint8_t)(refused))) ? MC1231A_ERROR_CRC :
@@ -673,73 +689,73 @@ static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_
 }
 
 /* The answer to a command that the slave does not support. */
-static inline size_t mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
+static inline int mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
 {
-    const uint16_t value = 0u;
-    uint8_t *const end = wire + size;
-    if (capacity < size + 2u) {
-        return 0u;
+    const uint16_t value = 0U;
+    uint8_t *const end = &wire[size];
+    const size_t total = size + 2U;
+    if (capacity < total) {
+        return MC1231A_ERROR_CAPACITY;
     }
-    for (size_t index = 0u; index < size; ++index) {
-        wire[index] = 0u;
+    for (size_t index = 0U; index < size; ++index) {
+        wire[index] = 0U;
     }
     end[0] = (uint8_t)(value >> 8);
     end[1] = (uint8_t)(value);
-    return size + 2u;
+    return (int)total;
 }
 
 /* Takes exactly one whole request apart. Its values are checked by mc1231a_request_check or by decoding it. */
 static inline int mc1231a_frame_decode(mc1231a_frame_t *frame, const uint8_t *wire, size_t size)
 {
     size_t expected;
-    if (size == 0u) {
+    if (size == 0U) {
         return MC1231A_ERROR_TRUNCATED;
     }
     frame->id = wire[0];
-    frame->size = size - 1u;
-    frame->payload = wire + 1;
+    frame->size = size - 1U;
+    frame->payload = &wire[1];
     if (!mc1231a_request_size_(wire[0], &expected)) {
         return MC1231A_ERROR_UNKNOWN;
     }
-    return (frame->size == expected) ? MC1231A_OK : (frame->size < expected) ? MC1231A_ERROR_TRUNCATED :
-        MC1231A_ERROR_LENGTH;
+    return (frame->size == expected) ? MC1231A_OK :
+        ((frame->size < expected) ? MC1231A_ERROR_TRUNCATED : MC1231A_ERROR_LENGTH);
 }
 
 /* ---- set_1.request, id 0x01 (section Host commands): Make axis 1 current and offer its status word. */
-#define MC1231A_SET_1_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_1_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_1_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_1_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_1_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_1_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_1_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_1_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_1_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_1_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_1.response, id 0x01 (section Host commands): Make axis 1 current and offer its status word.
  * Payload, 2 bytes:
  *      0  u16 be  status
  */
-#define MC1231A_SET_1_RESPONSE_MIN_SIZE 2u
-#define MC1231A_SET_1_RESPONSE_MAX_SIZE 2u
-#define MC1231A_SET_1_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_SET_1_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_SET_1_RESPONSE_MIN_SIZE 2U
+#define MC1231A_SET_1_RESPONSE_MAX_SIZE 2U
+#define MC1231A_SET_1_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_SET_1_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_set_1_response {
     uint16_t status; /* Status of the axis; flags axis_status */
 } mc1231a_set_1_response_t;
 
-#define MC1231A_SET_1_RESPONSE_INIT { 0u }
+#define MC1231A_SET_1_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_set_1_response_encode(
     const mc1231a_set_1_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->status);
@@ -748,7 +764,7 @@ static inline int mc1231a_set_1_response_encode(
 
 static inline int mc1231a_set_1_response_decode(mc1231a_set_1_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->status = mc1231a_get_u16_be_(payload);
@@ -769,44 +785,43 @@ static inline int mc1231a_set_1_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_set_1_response_decode(message, wire, size - 2u);
+    return mc1231a_set_1_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_2.request, id 0x02 (section Host commands): Make axis 2 current and offer its status word. */
-#define MC1231A_SET_2_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_2_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_2_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_2_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_2_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_2_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_2_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_2_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_2_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_2_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_2.response, id 0x02 (section Host commands): Make axis 2 current and offer its status word.
  * Payload, 2 bytes:
  *      0  u16 be  status
  */
-#define MC1231A_SET_2_RESPONSE_MIN_SIZE 2u
-#define MC1231A_SET_2_RESPONSE_MAX_SIZE 2u
-#define MC1231A_SET_2_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_SET_2_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_SET_2_RESPONSE_MIN_SIZE 2U
+#define MC1231A_SET_2_RESPONSE_MAX_SIZE 2U
+#define MC1231A_SET_2_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_SET_2_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_set_2_response {
     uint16_t status; /* Status of the axis; flags axis_status */
 } mc1231a_set_2_response_t;
 
-#define MC1231A_SET_2_RESPONSE_INIT { 0u }
+#define MC1231A_SET_2_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_set_2_response_encode(
     const mc1231a_set_2_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->status);
@@ -815,7 +830,7 @@ static inline int mc1231a_set_2_response_encode(
 
 static inline int mc1231a_set_2_response_decode(mc1231a_set_2_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->status = mc1231a_get_u16_be_(payload);
@@ -836,25 +851,24 @@ static inline int mc1231a_set_2_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_set_2_response_decode(message, wire, size - 2u);
+    return mc1231a_set_2_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_i.request, id 0x08 (section Host commands): Make the axis that raised the host interrupt current
  * and offer its status word.
  */
-#define MC1231A_SET_I_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_I_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_I_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_I_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_I_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_I_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_I_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_I_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_i_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_I_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_i.response, id 0x08 (section Host commands): Make the axis that raised the host interrupt
@@ -862,21 +876,21 @@ static inline int mc1231a_set_i_request_to_frame(uint8_t *wire, size_t capacity)
  * Payload, 2 bytes:
  *      0  u16 be  status
  */
-#define MC1231A_SET_I_RESPONSE_MIN_SIZE 2u
-#define MC1231A_SET_I_RESPONSE_MAX_SIZE 2u
-#define MC1231A_SET_I_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_SET_I_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_SET_I_RESPONSE_MIN_SIZE 2U
+#define MC1231A_SET_I_RESPONSE_MAX_SIZE 2U
+#define MC1231A_SET_I_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_SET_I_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_set_i_response {
     uint16_t status; /* Status of the axis; flags axis_status */
 } mc1231a_set_i_response_t;
 
-#define MC1231A_SET_I_RESPONSE_INIT { 0u }
+#define MC1231A_SET_I_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_set_i_response_encode(
     const mc1231a_set_i_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->status);
@@ -885,7 +899,7 @@ static inline int mc1231a_set_i_response_encode(
 
 static inline int mc1231a_set_i_response_decode(mc1231a_set_i_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->status = mc1231a_get_u16_be_(payload);
@@ -906,35 +920,33 @@ static inline int mc1231a_set_i_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_set_i_response_decode(message, wire, size - 2u);
+    return mc1231a_set_i_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_prfl_s_crv.request, id 0x0B (section Host commands): Select S-curve point-to-point profiling. */
-#define MC1231A_SET_PRFL_S_CRV_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_S_CRV_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_S_CRV_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_PRFL_S_CRV_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_PRFL_S_CRV_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_S_CRV_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_S_CRV_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_PRFL_S_CRV_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_prfl_s_crv_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PRFL_S_CRV_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_prfl_s_crv.response, id 0x0B (section Host commands): Select S-curve point-to-point profiling. */
-#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PRFL_S_CRV_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_prfl_s_crv_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_prfl_s_crv_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -943,37 +955,35 @@ static inline int mc1231a_set_prfl_s_crv_response_from_frame(uint16_t request_su
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_prfl_trap.request, id 0x09 (section Host commands): Select trapezoidal point-to-point profiling. */
-#define MC1231A_SET_PRFL_TRAP_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_TRAP_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_TRAP_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_PRFL_TRAP_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_PRFL_TRAP_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_TRAP_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_TRAP_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_PRFL_TRAP_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_prfl_trap_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PRFL_TRAP_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_prfl_trap.response, id 0x09 (section Host commands): Select trapezoidal point-to-point
  * profiling.
  */
-#define MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_TRAP_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_TRAP_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PRFL_TRAP_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_TRAP_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_TRAP_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PRFL_TRAP_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_prfl_trap_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_prfl_trap_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -982,35 +992,33 @@ static inline int mc1231a_set_prfl_trap_response_from_frame(uint16_t request_sum
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_prfl_vel.request, id 0x0A (section Host commands): Select velocity-contouring profiling. */
-#define MC1231A_SET_PRFL_VEL_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_VEL_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_VEL_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_PRFL_VEL_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_PRFL_VEL_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_VEL_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_VEL_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_PRFL_VEL_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_prfl_vel_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PRFL_VEL_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_prfl_vel.response, id 0x0A (section Host commands): Select velocity-contouring profiling. */
-#define MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_VEL_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_VEL_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PRFL_VEL_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_VEL_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_VEL_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PRFL_VEL_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_prfl_vel_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_prfl_vel_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1019,35 +1027,33 @@ static inline int mc1231a_set_prfl_vel_response_from_frame(uint16_t request_sum,
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_prfl_gear.request, id 0x0C (section Host commands): Select electronic-gear profiling. */
-#define MC1231A_SET_PRFL_GEAR_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_GEAR_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_GEAR_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_PRFL_GEAR_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_PRFL_GEAR_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_GEAR_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_GEAR_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_PRFL_GEAR_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_prfl_gear_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PRFL_GEAR_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_prfl_gear.response, id 0x0C (section Host commands): Select electronic-gear profiling. */
-#define MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PRFL_GEAR_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PRFL_GEAR_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PRFL_GEAR_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PRFL_GEAR_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PRFL_GEAR_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PRFL_GEAR_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_prfl_gear_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_prfl_gear_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1056,31 +1062,31 @@ static inline int mc1231a_set_prfl_gear_response_from_frame(uint16_t request_sum
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_pos.request, id 0x10 (section Host commands): Load destination position.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_SET_POS_REQUEST_MIN_SIZE 4u
-#define MC1231A_SET_POS_REQUEST_MAX_SIZE 4u
-#define MC1231A_SET_POS_REQUEST_MAX_FRAME_SIZE 5u
-#define MC1231A_SET_POS_REQUEST_MAX_WIRE_SIZE 5u
+#define MC1231A_SET_POS_REQUEST_MIN_SIZE 4U
+#define MC1231A_SET_POS_REQUEST_MAX_SIZE 4U
+#define MC1231A_SET_POS_REQUEST_MAX_FRAME_SIZE 5U
+#define MC1231A_SET_POS_REQUEST_MAX_WIRE_SIZE 5U
 
 typedef struct mc1231a_set_pos_request {
     int32_t value; /* Destination position; in counts; -1073741824..1073741823; not confirmed */
 } mc1231a_set_pos_request_t;
 
-#define MC1231A_SET_POS_REQUEST_INIT { 0l }
+#define MC1231A_SET_POS_REQUEST_INIT { 0L }
 
 static inline int mc1231a_set_pos_request_encode(
     const mc1231a_set_pos_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->value < -1073741824l) || (message->value > 1073741823l)) {
+    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -1090,11 +1096,11 @@ static inline int mc1231a_set_pos_request_encode(
 static inline int mc1231a_set_pos_request_decode(
     mc1231a_set_pos_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    if ((message->value < -1073741824l) || (message->value > 1073741823l)) {
+    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -1103,25 +1109,25 @@ static inline int mc1231a_set_pos_request_decode(
 static inline int mc1231a_set_pos_request_to_frame(
     const mc1231a_set_pos_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_POS_REQUEST_ID;
-    size = mc1231a_set_pos_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_pos_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_pos.response, id 0x10 (section Host commands): Load destination position. */
-#define MC1231A_SET_POS_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_POS_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_POS_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_POS_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_POS_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_POS_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_POS_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_POS_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_pos_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_pos_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1130,32 +1136,32 @@ static inline int mc1231a_set_pos_response_from_frame(uint16_t request_sum, cons
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_vel.request, id 0x11 (section Host commands): Load velocity limit for the move.
  * Payload, 4 bytes:
  *      0  u32 be  value
  */
-#define MC1231A_SET_VEL_REQUEST_MIN_SIZE 4u
-#define MC1231A_SET_VEL_REQUEST_MAX_SIZE 4u
-#define MC1231A_SET_VEL_REQUEST_MAX_FRAME_SIZE 5u
-#define MC1231A_SET_VEL_REQUEST_MAX_WIRE_SIZE 5u
+#define MC1231A_SET_VEL_REQUEST_MIN_SIZE 4U
+#define MC1231A_SET_VEL_REQUEST_MAX_SIZE 4U
+#define MC1231A_SET_VEL_REQUEST_MAX_FRAME_SIZE 5U
+#define MC1231A_SET_VEL_REQUEST_MAX_WIRE_SIZE 5U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
 #define MC1231A_SET_VEL_REQUEST_VALUE_FACTOR 1
 #define MC1231A_SET_VEL_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR 65536l
+#define MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_vel_request {
     uint32_t value; /* Velocity limit of the move; in steps of 1/2^16 counts/sample */
 } mc1231a_set_vel_request_t;
 
-#define MC1231A_SET_VEL_REQUEST_INIT { 0ul }
+#define MC1231A_SET_VEL_REQUEST_INIT { 0UL }
 
 static inline int mc1231a_set_vel_request_encode(
     const mc1231a_set_vel_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, message->value);
@@ -1165,7 +1171,7 @@ static inline int mc1231a_set_vel_request_encode(
 static inline int mc1231a_set_vel_request_decode(
     mc1231a_set_vel_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u32_be_(payload);
@@ -1175,42 +1181,42 @@ static inline int mc1231a_set_vel_request_decode(
 static inline int mc1231a_set_vel_request_to_frame(
     const mc1231a_set_vel_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_VEL_REQUEST_ID;
-    size = mc1231a_set_vel_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_vel_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_set_vel_request_value_physical(uint32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_SET_VEL_REQUEST_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_SET_VEL_REQUEST_VALUE_FACTOR) +
         (double)MC1231A_SET_VEL_REQUEST_VALUE_BIAS;
     return scaled / (double)MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_set_vel_request_value_raw(double physical, uint32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR) -
         (double)MC1231A_SET_VEL_REQUEST_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_SET_VEL_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0ul, 4294967295ul, raw);
+    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
 }
 #endif
 
 /* ---- set_vel.response, id 0x11 (section Host commands): Load velocity limit for the move. */
-#define MC1231A_SET_VEL_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_VEL_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_VEL_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_VEL_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_VEL_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_VEL_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_VEL_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_VEL_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_vel_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_vel_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1219,7 +1225,7 @@ static inline int mc1231a_set_vel_response_from_frame(uint16_t request_sum, cons
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_acc.request, id 0x12 (section Host commands): Load acceleration (trapezoidal and velocity
@@ -1227,14 +1233,14 @@ static inline int mc1231a_set_vel_response_from_frame(uint16_t request_sum, cons
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_SET_ACC_REQUEST_MIN_SIZE 4u
-#define MC1231A_SET_ACC_REQUEST_MAX_SIZE 4u
-#define MC1231A_SET_ACC_REQUEST_MAX_FRAME_SIZE 5u
-#define MC1231A_SET_ACC_REQUEST_MAX_WIRE_SIZE 5u
+#define MC1231A_SET_ACC_REQUEST_MIN_SIZE 4U
+#define MC1231A_SET_ACC_REQUEST_MAX_SIZE 4U
+#define MC1231A_SET_ACC_REQUEST_MAX_FRAME_SIZE 5U
+#define MC1231A_SET_ACC_REQUEST_MAX_WIRE_SIZE 5U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
 #define MC1231A_SET_ACC_REQUEST_VALUE_FACTOR 1
 #define MC1231A_SET_ACC_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR 65536l
+#define MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_acc_request {
     /* Acceleration; unsigned in trapezoidal mode, signed in velocity mode; in steps of 1/2^16 counts/sample^2;
@@ -1242,15 +1248,15 @@ typedef struct mc1231a_set_acc_request {
     int32_t value;
 } mc1231a_set_acc_request_t;
 
-#define MC1231A_SET_ACC_REQUEST_INIT { 0l }
+#define MC1231A_SET_ACC_REQUEST_INIT { 0L }
 
 static inline int mc1231a_set_acc_request_encode(
     const mc1231a_set_acc_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->value < -1073741824l) || (message->value > 1073741823l)) {
+    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -1260,11 +1266,11 @@ static inline int mc1231a_set_acc_request_encode(
 static inline int mc1231a_set_acc_request_decode(
     mc1231a_set_acc_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    if ((message->value < -1073741824l) || (message->value > 1073741823l)) {
+    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -1273,44 +1279,44 @@ static inline int mc1231a_set_acc_request_decode(
 static inline int mc1231a_set_acc_request_to_frame(
     const mc1231a_set_acc_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_ACC_REQUEST_ID;
-    size = mc1231a_set_acc_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_acc_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_set_acc_request_value_physical(int32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_SET_ACC_REQUEST_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_SET_ACC_REQUEST_VALUE_FACTOR) +
         (double)MC1231A_SET_ACC_REQUEST_VALUE_BIAS;
     return scaled / (double)MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_set_acc_request_value_raw(double physical, int32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR) -
         (double)MC1231A_SET_ACC_REQUEST_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_SET_ACC_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, -1073741824l, 1073741823l, raw);
+    return mc1231a_nearest_int32_(steps, -1073741824L, 1073741823L, raw);
 }
 #endif
 
 /* ---- set_acc.response, id 0x12 (section Host commands): Load acceleration (trapezoidal and velocity
  * modes).
  */
-#define MC1231A_SET_ACC_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_ACC_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_ACC_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_ACC_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_ACC_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_ACC_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_ACC_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_ACC_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_acc_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_acc_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1319,32 +1325,32 @@ static inline int mc1231a_set_acc_response_from_frame(uint16_t request_sum, cons
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_max_acc.request, id 0x15 (section Host commands): Load peak acceleration (S-curve mode).
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_MAX_ACC_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_MAX_ACC_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_MAX_ACC_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_MAX_ACC_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_MAX_ACC_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_MAX_ACC_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_MAX_ACC_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_MAX_ACC_REQUEST_MAX_WIRE_SIZE 3U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
 #define MC1231A_SET_MAX_ACC_REQUEST_VALUE_FACTOR 1
 #define MC1231A_SET_MAX_ACC_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR 65536l
+#define MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_max_acc_request {
     uint16_t value; /* Peak acceleration (S-curve mode); in steps of 1/2^16 counts/sample^2 */
 } mc1231a_set_max_acc_request_t;
 
-#define MC1231A_SET_MAX_ACC_REQUEST_INIT { 0u }
+#define MC1231A_SET_MAX_ACC_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_max_acc_request_encode(
     const mc1231a_set_max_acc_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -1354,7 +1360,7 @@ static inline int mc1231a_set_max_acc_request_encode(
 static inline int mc1231a_set_max_acc_request_decode(
     mc1231a_set_max_acc_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -1364,42 +1370,42 @@ static inline int mc1231a_set_max_acc_request_decode(
 static inline int mc1231a_set_max_acc_request_to_frame(
     const mc1231a_set_max_acc_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_MAX_ACC_REQUEST_ID;
-    size = mc1231a_set_max_acc_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_max_acc_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_set_max_acc_request_value_physical(uint16_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_FACTOR) +
         (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_BIAS;
     return scaled / (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_set_max_acc_request_value_raw(double physical, uint16_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR) -
         (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_uint16_(steps, 0u, 65535u, raw);
+    return mc1231a_nearest_uint16_(steps, 0U, 65535U, raw);
 }
 #endif
 
 /* ---- set_max_acc.response, id 0x15 (section Host commands): Load peak acceleration (S-curve mode). */
-#define MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_MAX_ACC_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_MAX_ACC_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_MAX_ACC_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_MAX_ACC_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_MAX_ACC_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_MAX_ACC_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_max_acc_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_max_acc_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1408,32 +1414,32 @@ static inline int mc1231a_set_max_acc_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_jerk.request, id 0x13 (section Host commands): Load jerk (S-curve mode).
  * Payload, 4 bytes:
  *      0  u32 be  value
  */
-#define MC1231A_SET_JERK_REQUEST_MIN_SIZE 4u
-#define MC1231A_SET_JERK_REQUEST_MAX_SIZE 4u
-#define MC1231A_SET_JERK_REQUEST_MAX_FRAME_SIZE 5u
-#define MC1231A_SET_JERK_REQUEST_MAX_WIRE_SIZE 5u
+#define MC1231A_SET_JERK_REQUEST_MIN_SIZE 4U
+#define MC1231A_SET_JERK_REQUEST_MAX_SIZE 4U
+#define MC1231A_SET_JERK_REQUEST_MAX_FRAME_SIZE 5U
+#define MC1231A_SET_JERK_REQUEST_MAX_WIRE_SIZE 5U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^3 */
 #define MC1231A_SET_JERK_REQUEST_VALUE_FACTOR 1
 #define MC1231A_SET_JERK_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR 4294967296ll
+#define MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR 4294967296LL
 
 typedef struct mc1231a_set_jerk_request {
     uint32_t value; /* Jerk (S-curve mode); in steps of 1/2^32 counts/sample^3 */
 } mc1231a_set_jerk_request_t;
 
-#define MC1231A_SET_JERK_REQUEST_INIT { 0ul }
+#define MC1231A_SET_JERK_REQUEST_INIT { 0UL }
 
 static inline int mc1231a_set_jerk_request_encode(
     const mc1231a_set_jerk_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, message->value);
@@ -1443,7 +1449,7 @@ static inline int mc1231a_set_jerk_request_encode(
 static inline int mc1231a_set_jerk_request_decode(
     mc1231a_set_jerk_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u32_be_(payload);
@@ -1453,42 +1459,42 @@ static inline int mc1231a_set_jerk_request_decode(
 static inline int mc1231a_set_jerk_request_to_frame(
     const mc1231a_set_jerk_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_JERK_REQUEST_ID;
-    size = mc1231a_set_jerk_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_jerk_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_set_jerk_request_value_physical(uint32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_SET_JERK_REQUEST_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_SET_JERK_REQUEST_VALUE_FACTOR) +
         (double)MC1231A_SET_JERK_REQUEST_VALUE_BIAS;
     return scaled / (double)MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_set_jerk_request_value_raw(double physical, uint32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR) -
         (double)MC1231A_SET_JERK_REQUEST_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_SET_JERK_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0ul, 4294967295ul, raw);
+    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
 }
 #endif
 
 /* ---- set_jerk.response, id 0x13 (section Host commands): Load jerk (S-curve mode). */
-#define MC1231A_SET_JERK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_JERK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_JERK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_JERK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_JERK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_JERK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_JERK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_JERK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_jerk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_jerk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1497,7 +1503,7 @@ static inline int mc1231a_set_jerk_response_from_frame(uint16_t request_sum, con
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_ratio.request, id 0x14 (section Host commands): Load electronic gear ratio.
@@ -1505,25 +1511,25 @@ static inline int mc1231a_set_jerk_response_from_frame(uint16_t request_sum, con
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_SET_RATIO_REQUEST_MIN_SIZE 4u
-#define MC1231A_SET_RATIO_REQUEST_MAX_SIZE 4u
-#define MC1231A_SET_RATIO_REQUEST_MAX_FRAME_SIZE 5u
-#define MC1231A_SET_RATIO_REQUEST_MAX_WIRE_SIZE 5u
+#define MC1231A_SET_RATIO_REQUEST_MIN_SIZE 4U
+#define MC1231A_SET_RATIO_REQUEST_MAX_SIZE 4U
+#define MC1231A_SET_RATIO_REQUEST_MAX_FRAME_SIZE 5U
+#define MC1231A_SET_RATIO_REQUEST_MAX_WIRE_SIZE 5U
 /* value = (raw * FACTOR + BIAS) / DIVISOR */
 #define MC1231A_SET_RATIO_REQUEST_VALUE_FACTOR 1
 #define MC1231A_SET_RATIO_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR 65536l
+#define MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_ratio_request {
     int32_t value; /* Electronic gear ratio; in steps of 1/2^16 */
 } mc1231a_set_ratio_request_t;
 
-#define MC1231A_SET_RATIO_REQUEST_INIT { 0l }
+#define MC1231A_SET_RATIO_REQUEST_INIT { 0L }
 
 static inline int mc1231a_set_ratio_request_encode(
     const mc1231a_set_ratio_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -1533,7 +1539,7 @@ static inline int mc1231a_set_ratio_request_encode(
 static inline int mc1231a_set_ratio_request_decode(
     mc1231a_set_ratio_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -1543,44 +1549,44 @@ static inline int mc1231a_set_ratio_request_decode(
 static inline int mc1231a_set_ratio_request_to_frame(
     const mc1231a_set_ratio_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_RATIO_REQUEST_ID;
-    size = mc1231a_set_ratio_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_ratio_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_set_ratio_request_value_physical(int32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_SET_RATIO_REQUEST_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_SET_RATIO_REQUEST_VALUE_FACTOR) +
         (double)MC1231A_SET_RATIO_REQUEST_VALUE_BIAS;
     return scaled / (double)MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_set_ratio_request_value_raw(double physical, int32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR) -
         (double)MC1231A_SET_RATIO_REQUEST_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_SET_RATIO_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647l, raw);
+    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
 }
 #endif
 
 /* ---- set_ratio.response, id 0x14 (section Host commands): Load electronic gear ratio.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_RATIO_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_RATIO_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_RATIO_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_RATIO_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_RATIO_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_RATIO_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_RATIO_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_RATIO_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_ratio_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_ratio_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1589,39 +1595,37 @@ static inline int mc1231a_set_ratio_response_from_frame(uint16_t request_sum, co
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- stop.request, id 0x46 (section Host commands): Stop abruptly at the next update, known as clr_prfl
  * in older manuals.
  */
-#define MC1231A_STOP_REQUEST_MIN_SIZE 0u
-#define MC1231A_STOP_REQUEST_MAX_SIZE 0u
-#define MC1231A_STOP_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_STOP_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_STOP_REQUEST_MIN_SIZE 0U
+#define MC1231A_STOP_REQUEST_MAX_SIZE 0U
+#define MC1231A_STOP_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_STOP_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_stop_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_STOP_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- stop.response, id 0x46 (section Host commands): Stop abruptly at the next update, known as clr_prfl
  * in older manuals.
  */
-#define MC1231A_STOP_RESPONSE_MIN_SIZE 0u
-#define MC1231A_STOP_RESPONSE_MAX_SIZE 0u
-#define MC1231A_STOP_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_STOP_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_STOP_RESPONSE_MIN_SIZE 0U
+#define MC1231A_STOP_RESPONSE_MAX_SIZE 0U
+#define MC1231A_STOP_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_STOP_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_stop_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_stop_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1630,39 +1634,37 @@ static inline int mc1231a_stop_response_from_frame(uint16_t request_sum, const u
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- smooth_stop.request, id 0x4E (section Host commands): Stop with deceleration at the next update,
  * without effect in gear mode.
  */
-#define MC1231A_SMOOTH_STOP_REQUEST_MIN_SIZE 0u
-#define MC1231A_SMOOTH_STOP_REQUEST_MAX_SIZE 0u
-#define MC1231A_SMOOTH_STOP_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SMOOTH_STOP_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SMOOTH_STOP_REQUEST_MIN_SIZE 0U
+#define MC1231A_SMOOTH_STOP_REQUEST_MAX_SIZE 0U
+#define MC1231A_SMOOTH_STOP_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SMOOTH_STOP_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_smooth_stop_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SMOOTH_STOP_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- smooth_stop.response, id 0x4E (section Host commands): Stop with deceleration at the next update,
  * without effect in gear mode.
  */
-#define MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SMOOTH_STOP_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SMOOTH_STOP_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SMOOTH_STOP_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SMOOTH_STOP_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SMOOTH_STOP_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SMOOTH_STOP_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_smooth_stop_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_smooth_stop_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1671,39 +1673,37 @@ static inline int mc1231a_smooth_stop_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- synch_prfl.request, id 0x47 (section Host commands): At next update make target position equal
  * actual position.
  */
-#define MC1231A_SYNCH_PRFL_REQUEST_MIN_SIZE 0u
-#define MC1231A_SYNCH_PRFL_REQUEST_MAX_SIZE 0u
-#define MC1231A_SYNCH_PRFL_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SYNCH_PRFL_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SYNCH_PRFL_REQUEST_MIN_SIZE 0U
+#define MC1231A_SYNCH_PRFL_REQUEST_MAX_SIZE 0U
+#define MC1231A_SYNCH_PRFL_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SYNCH_PRFL_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_synch_prfl_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SYNCH_PRFL_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- synch_prfl.response, id 0x47 (section Host commands): At next update make target position equal
  * actual position.
  */
-#define MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SYNCH_PRFL_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SYNCH_PRFL_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SYNCH_PRFL_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SYNCH_PRFL_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SYNCH_PRFL_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SYNCH_PRFL_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_synch_prfl_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_synch_prfl_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -1712,25 +1712,24 @@ static inline int mc1231a_synch_prfl_response_from_frame(uint16_t request_sum, c
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_pos.request, id 0x4A (section Host commands): Read back buffered destination position.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_POS_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_POS_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_POS_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_POS_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_POS_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_POS_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_POS_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_POS_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_pos_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_POS_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_pos.response, id 0x4A (section Host commands): Read back buffered destination position.
@@ -1738,21 +1737,21 @@ static inline int mc1231a_get_pos_request_to_frame(uint8_t *wire, size_t capacit
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_POS_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_POS_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_POS_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_POS_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_POS_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_POS_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_POS_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_pos_response {
     int32_t value; /* Buffered destination position; in counts */
 } mc1231a_get_pos_response_t;
 
-#define MC1231A_GET_POS_RESPONSE_INIT { 0l }
+#define MC1231A_GET_POS_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_pos_response_encode(
     const mc1231a_get_pos_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -1762,7 +1761,7 @@ static inline int mc1231a_get_pos_response_encode(
 static inline int mc1231a_get_pos_response_decode(
     mc1231a_get_pos_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -1783,25 +1782,24 @@ static inline int mc1231a_get_pos_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_pos_response_decode(message, wire, size - 2u);
+    return mc1231a_get_pos_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_vel.request, id 0x4B (section Host commands): Read back buffered velocity.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_VEL_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_VEL_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_VEL_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_VEL_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_VEL_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_VEL_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_VEL_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_VEL_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_vel_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_VEL_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_vel.response, id 0x4B (section Host commands): Read back buffered velocity.
@@ -1809,25 +1807,25 @@ static inline int mc1231a_get_vel_request_to_frame(uint8_t *wire, size_t capacit
  * Payload, 4 bytes:
  *      0  u32 be  value
  */
-#define MC1231A_GET_VEL_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_VEL_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_VEL_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_VEL_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_VEL_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_VEL_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_VEL_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_VEL_RESPONSE_MAX_WIRE_SIZE 6U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
 #define MC1231A_GET_VEL_RESPONSE_VALUE_FACTOR 1
 #define MC1231A_GET_VEL_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR 65536l
+#define MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_get_vel_response {
     uint32_t value; /* Buffered velocity; in steps of 1/2^16 counts/sample */
 } mc1231a_get_vel_response_t;
 
-#define MC1231A_GET_VEL_RESPONSE_INIT { 0ul }
+#define MC1231A_GET_VEL_RESPONSE_INIT { 0UL }
 
 static inline int mc1231a_get_vel_response_encode(
     const mc1231a_get_vel_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, message->value);
@@ -1837,7 +1835,7 @@ static inline int mc1231a_get_vel_response_encode(
 static inline int mc1231a_get_vel_response_decode(
     mc1231a_get_vel_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u32_be_(payload);
@@ -1858,42 +1856,41 @@ static inline int mc1231a_get_vel_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_vel_response_decode(message, wire, size - 2u);
+    return mc1231a_get_vel_response_decode(message, wire, size - 2U);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_get_vel_response_value_physical(uint32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_GET_VEL_RESPONSE_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_GET_VEL_RESPONSE_VALUE_FACTOR) +
         (double)MC1231A_GET_VEL_RESPONSE_VALUE_BIAS;
     return scaled / (double)MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_get_vel_response_value_raw(double physical, uint32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR) -
         (double)MC1231A_GET_VEL_RESPONSE_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_GET_VEL_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0ul, 4294967295ul, raw);
+    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
 }
 #endif
 
 /* ---- get_acc.request, id 0x4C (section Host commands): Read back buffered acceleration.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_ACC_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_ACC_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_ACC_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_ACC_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_ACC_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_ACC_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_ACC_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_ACC_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_acc_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_ACC_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_acc.response, id 0x4C (section Host commands): Read back buffered acceleration.
@@ -1901,26 +1898,26 @@ static inline int mc1231a_get_acc_request_to_frame(uint8_t *wire, size_t capacit
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_ACC_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_ACC_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_ACC_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_ACC_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_ACC_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_ACC_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_ACC_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_ACC_RESPONSE_MAX_WIRE_SIZE 6U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
 #define MC1231A_GET_ACC_RESPONSE_VALUE_FACTOR 1
 #define MC1231A_GET_ACC_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR 65536l
+#define MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_get_acc_response {
     /* Acceleration; unsigned in trapezoidal mode, signed in velocity mode; in steps of 1/2^16 counts/sample^2 */
     int32_t value;
 } mc1231a_get_acc_response_t;
 
-#define MC1231A_GET_ACC_RESPONSE_INIT { 0l }
+#define MC1231A_GET_ACC_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_acc_response_encode(
     const mc1231a_get_acc_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -1930,7 +1927,7 @@ static inline int mc1231a_get_acc_response_encode(
 static inline int mc1231a_get_acc_response_decode(
     mc1231a_get_acc_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -1951,65 +1948,64 @@ static inline int mc1231a_get_acc_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_acc_response_decode(message, wire, size - 2u);
+    return mc1231a_get_acc_response_decode(message, wire, size - 2U);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_get_acc_response_value_physical(int32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_GET_ACC_RESPONSE_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_GET_ACC_RESPONSE_VALUE_FACTOR) +
         (double)MC1231A_GET_ACC_RESPONSE_VALUE_BIAS;
     return scaled / (double)MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_get_acc_response_value_raw(double physical, int32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR) -
         (double)MC1231A_GET_ACC_RESPONSE_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_GET_ACC_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647l, raw);
+    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
 }
 #endif
 
 /* ---- get_max_acc.request, id 0x4F (section Host commands): Read back buffered S-curve acceleration. */
-#define MC1231A_GET_MAX_ACC_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_MAX_ACC_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_MAX_ACC_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_MAX_ACC_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_MAX_ACC_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_MAX_ACC_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_MAX_ACC_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_MAX_ACC_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_max_acc_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_MAX_ACC_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_max_acc.response, id 0x4F (section Host commands): Read back buffered S-curve acceleration.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_MAX_ACC_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_MAX_ACC_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_MAX_ACC_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_MAX_ACC_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_MAX_ACC_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_MAX_ACC_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_MAX_ACC_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_MAX_ACC_RESPONSE_MAX_WIRE_SIZE 4U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
 #define MC1231A_GET_MAX_ACC_RESPONSE_VALUE_FACTOR 1
 #define MC1231A_GET_MAX_ACC_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR 65536l
+#define MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_get_max_acc_response {
     uint16_t value; /* Buffered S-curve acceleration; in steps of 1/2^16 counts/sample^2 */
 } mc1231a_get_max_acc_response_t;
 
-#define MC1231A_GET_MAX_ACC_RESPONSE_INIT { 0u }
+#define MC1231A_GET_MAX_ACC_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_max_acc_response_encode(
     const mc1231a_get_max_acc_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2019,7 +2015,7 @@ static inline int mc1231a_get_max_acc_response_encode(
 static inline int mc1231a_get_max_acc_response_decode(
     mc1231a_get_max_acc_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -2040,65 +2036,64 @@ static inline int mc1231a_get_max_acc_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_max_acc_response_decode(message, wire, size - 2u);
+    return mc1231a_get_max_acc_response_decode(message, wire, size - 2U);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_get_max_acc_response_value_physical(uint16_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_FACTOR) +
         (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_BIAS;
     return scaled / (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_get_max_acc_response_value_raw(double physical, uint16_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR) -
         (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_uint16_(steps, 0u, 65535u, raw);
+    return mc1231a_nearest_uint16_(steps, 0U, 65535U, raw);
 }
 #endif
 
 /* ---- get_jerk.request, id 0x58 (section Host commands): Read back buffered jerk. */
-#define MC1231A_GET_JERK_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_JERK_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_JERK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_JERK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_JERK_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_JERK_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_JERK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_JERK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_jerk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_JERK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_jerk.response, id 0x58 (section Host commands): Read back buffered jerk.
  * Payload, 4 bytes:
  *      0  u32 be  value
  */
-#define MC1231A_GET_JERK_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_JERK_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_JERK_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_JERK_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_JERK_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_JERK_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_JERK_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_JERK_RESPONSE_MAX_WIRE_SIZE 6U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^3 */
 #define MC1231A_GET_JERK_RESPONSE_VALUE_FACTOR 1
 #define MC1231A_GET_JERK_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR 4294967296ll
+#define MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR 4294967296LL
 
 typedef struct mc1231a_get_jerk_response {
     uint32_t value; /* Buffered jerk; in steps of 1/2^32 counts/sample^3 */
 } mc1231a_get_jerk_response_t;
 
-#define MC1231A_GET_JERK_RESPONSE_INIT { 0ul }
+#define MC1231A_GET_JERK_RESPONSE_INIT { 0UL }
 
 static inline int mc1231a_get_jerk_response_encode(
     const mc1231a_get_jerk_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, message->value);
@@ -2108,7 +2103,7 @@ static inline int mc1231a_get_jerk_response_encode(
 static inline int mc1231a_get_jerk_response_decode(
     mc1231a_get_jerk_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u32_be_(payload);
@@ -2129,65 +2124,64 @@ static inline int mc1231a_get_jerk_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_jerk_response_decode(message, wire, size - 2u);
+    return mc1231a_get_jerk_response_decode(message, wire, size - 2U);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_get_jerk_response_value_physical(uint32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_GET_JERK_RESPONSE_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_GET_JERK_RESPONSE_VALUE_FACTOR) +
         (double)MC1231A_GET_JERK_RESPONSE_VALUE_BIAS;
     return scaled / (double)MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_get_jerk_response_value_raw(double physical, uint32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR) -
         (double)MC1231A_GET_JERK_RESPONSE_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_GET_JERK_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0ul, 4294967295ul, raw);
+    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
 }
 #endif
 
 /* ---- get_ratio.request, id 0x59 (section Host commands): Read back buffered gear ratio. */
-#define MC1231A_GET_RATIO_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_RATIO_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_RATIO_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_RATIO_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_RATIO_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_RATIO_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_RATIO_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_RATIO_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_ratio_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_RATIO_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_ratio.response, id 0x59 (section Host commands): Read back buffered gear ratio.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_RATIO_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_RATIO_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_RATIO_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_RATIO_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_RATIO_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_RATIO_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_RATIO_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_RATIO_RESPONSE_MAX_WIRE_SIZE 6U
 /* value = (raw * FACTOR + BIAS) / DIVISOR */
 #define MC1231A_GET_RATIO_RESPONSE_VALUE_FACTOR 1
 #define MC1231A_GET_RATIO_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR 65536l
+#define MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_get_ratio_response {
     int32_t value; /* Buffered gear ratio; in steps of 1/2^16 */
 } mc1231a_get_ratio_response_t;
 
-#define MC1231A_GET_RATIO_RESPONSE_INIT { 0l }
+#define MC1231A_GET_RATIO_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_ratio_response_encode(
     const mc1231a_get_ratio_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -2197,7 +2191,7 @@ static inline int mc1231a_get_ratio_response_encode(
 static inline int mc1231a_get_ratio_response_decode(
     mc1231a_get_ratio_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -2218,61 +2212,60 @@ static inline int mc1231a_get_ratio_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_ratio_response_decode(message, wire, size - 2u);
+    return mc1231a_get_ratio_response_decode(message, wire, size - 2U);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_get_ratio_response_value_physical(int32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_GET_RATIO_RESPONSE_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_GET_RATIO_RESPONSE_VALUE_FACTOR) +
         (double)MC1231A_GET_RATIO_RESPONSE_VALUE_BIAS;
     return scaled / (double)MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_get_ratio_response_value_raw(double physical, int32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR) -
         (double)MC1231A_GET_RATIO_RESPONSE_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_GET_RATIO_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647l, raw);
+    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
 }
 #endif
 
 /* ---- get_trgt_pos.request, id 0x1D (section Host commands): Read instantaneous profile target position. */
-#define MC1231A_GET_TRGT_POS_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_TRGT_POS_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_TRGT_POS_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_TRGT_POS_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_TRGT_POS_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_TRGT_POS_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_TRGT_POS_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_TRGT_POS_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_trgt_pos_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_TRGT_POS_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_trgt_pos.response, id 0x1D (section Host commands): Read instantaneous profile target position.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_TRGT_POS_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_TRGT_POS_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_TRGT_POS_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_TRGT_POS_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_TRGT_POS_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_TRGT_POS_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_TRGT_POS_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_TRGT_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_trgt_pos_response {
     int32_t value; /* Profile target position; in counts */
 } mc1231a_get_trgt_pos_response_t;
 
-#define MC1231A_GET_TRGT_POS_RESPONSE_INIT { 0l }
+#define MC1231A_GET_TRGT_POS_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_trgt_pos_response_encode(
     const mc1231a_get_trgt_pos_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -2282,7 +2275,7 @@ static inline int mc1231a_get_trgt_pos_response_encode(
 static inline int mc1231a_get_trgt_pos_response_decode(
     mc1231a_get_trgt_pos_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -2303,25 +2296,24 @@ static inline int mc1231a_get_trgt_pos_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_trgt_pos_response_decode(message, wire, size - 2u);
+    return mc1231a_get_trgt_pos_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_trgt_vel.request, id 0x1E (section Host commands): Read instantaneous profile target velocity.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_TRGT_VEL_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_TRGT_VEL_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_TRGT_VEL_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_TRGT_VEL_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_TRGT_VEL_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_TRGT_VEL_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_TRGT_VEL_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_TRGT_VEL_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_trgt_vel_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_TRGT_VEL_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_trgt_vel.response, id 0x1E (section Host commands): Read instantaneous profile target velocity.
@@ -2329,25 +2321,25 @@ static inline int mc1231a_get_trgt_vel_request_to_frame(uint8_t *wire, size_t ca
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_TRGT_VEL_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_TRGT_VEL_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_WIRE_SIZE 6U
 /* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
 #define MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_FACTOR 1
 #define MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR 65536l
+#define MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_get_trgt_vel_response {
     int32_t value; /* Profile target velocity; in steps of 1/2^16 counts/sample */
 } mc1231a_get_trgt_vel_response_t;
 
-#define MC1231A_GET_TRGT_VEL_RESPONSE_INIT { 0l }
+#define MC1231A_GET_TRGT_VEL_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_trgt_vel_response_encode(
     const mc1231a_get_trgt_vel_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -2357,7 +2349,7 @@ static inline int mc1231a_get_trgt_vel_response_encode(
 static inline int mc1231a_get_trgt_vel_response_decode(
     mc1231a_get_trgt_vel_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -2378,23 +2370,23 @@ static inline int mc1231a_get_trgt_vel_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_trgt_vel_response_decode(message, wire, size - 2u);
+    return mc1231a_get_trgt_vel_response_decode(message, wire, size - 2U);
 }
 
 #if MC1231A_ENABLE_FLOAT
 static inline double mc1231a_get_trgt_vel_response_value_physical(int32_t raw)
 {
-    const double scaled = (double)raw * (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_FACTOR) +
         (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_BIAS;
     return scaled / (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR;
 }
 
 static inline int mc1231a_get_trgt_vel_response_value_raw(double physical, int32_t *raw)
 {
-    const double scaled = physical * (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR -
+    const double scaled = (physical * (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR) -
         (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_BIAS;
     const double steps = scaled / (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647l, raw);
+    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
 }
 #endif
 
@@ -2402,24 +2394,24 @@ static inline int mc1231a_get_trgt_vel_response_value_raw(double physical, int32
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_KP_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_KP_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_KP_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_KP_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_KP_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_KP_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_KP_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_KP_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_kp_request {
     uint16_t value; /* Proportional gain; 0..32767 */
 } mc1231a_set_kp_request_t;
 
-#define MC1231A_SET_KP_REQUEST_INIT { 0u }
+#define MC1231A_SET_KP_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_kp_request_encode(
     const mc1231a_set_kp_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2428,11 +2420,11 @@ static inline int mc1231a_set_kp_request_encode(
 
 static inline int mc1231a_set_kp_request_decode(mc1231a_set_kp_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -2441,25 +2433,25 @@ static inline int mc1231a_set_kp_request_decode(mc1231a_set_kp_request_t *messag
 static inline int mc1231a_set_kp_request_to_frame(
     const mc1231a_set_kp_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_KP_REQUEST_ID;
-    size = mc1231a_set_kp_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_kp_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_kp.response, id 0x25 (section Host commands): Load proportional gain. */
-#define MC1231A_SET_KP_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_KP_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_KP_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_KP_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_KP_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_KP_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_KP_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_KP_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_kp_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_kp_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2468,31 +2460,31 @@ static inline int mc1231a_set_kp_response_from_frame(uint16_t request_sum, const
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_kd.request, id 0x27 (section Host commands): Load derivative gain.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_KD_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_KD_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_KD_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_KD_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_KD_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_KD_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_KD_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_KD_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_kd_request {
     uint16_t value; /* Derivative gain; 0..32767 */
 } mc1231a_set_kd_request_t;
 
-#define MC1231A_SET_KD_REQUEST_INIT { 0u }
+#define MC1231A_SET_KD_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_kd_request_encode(
     const mc1231a_set_kd_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2501,11 +2493,11 @@ static inline int mc1231a_set_kd_request_encode(
 
 static inline int mc1231a_set_kd_request_decode(mc1231a_set_kd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -2514,25 +2506,25 @@ static inline int mc1231a_set_kd_request_decode(mc1231a_set_kd_request_t *messag
 static inline int mc1231a_set_kd_request_to_frame(
     const mc1231a_set_kd_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_KD_REQUEST_ID;
-    size = mc1231a_set_kd_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_kd_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_kd.response, id 0x27 (section Host commands): Load derivative gain. */
-#define MC1231A_SET_KD_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_KD_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_KD_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_KD_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_KD_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_KD_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_KD_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_KD_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_kd_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_kd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2541,31 +2533,31 @@ static inline int mc1231a_set_kd_response_from_frame(uint16_t request_sum, const
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_ki.request, id 0x26 (section Host commands): Load integral gain.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_KI_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_KI_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_KI_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_KI_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_KI_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_KI_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_KI_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_KI_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_ki_request {
     uint16_t value; /* Integral gain; 0..32767 */
 } mc1231a_set_ki_request_t;
 
-#define MC1231A_SET_KI_REQUEST_INIT { 0u }
+#define MC1231A_SET_KI_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_ki_request_encode(
     const mc1231a_set_ki_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2574,11 +2566,11 @@ static inline int mc1231a_set_ki_request_encode(
 
 static inline int mc1231a_set_ki_request_decode(mc1231a_set_ki_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -2587,25 +2579,25 @@ static inline int mc1231a_set_ki_request_decode(mc1231a_set_ki_request_t *messag
 static inline int mc1231a_set_ki_request_to_frame(
     const mc1231a_set_ki_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_KI_REQUEST_ID;
-    size = mc1231a_set_ki_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_ki_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_ki.response, id 0x26 (section Host commands): Load integral gain. */
-#define MC1231A_SET_KI_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_KI_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_KI_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_KI_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_KI_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_KI_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_KI_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_KI_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_ki_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2614,7 +2606,7 @@ static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_kvff.request, id 0x2B (section Host commands): Load velocity feed-forward gain.
@@ -2622,24 +2614,24 @@ static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_KVFF_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_KVFF_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_KVFF_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_KVFF_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_KVFF_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_KVFF_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_KVFF_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_KVFF_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_kvff_request {
     uint16_t value; /* Velocity feed-forward gain; 0..32767 */
 } mc1231a_set_kvff_request_t;
 
-#define MC1231A_SET_KVFF_REQUEST_INIT { 0u }
+#define MC1231A_SET_KVFF_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_kvff_request_encode(
     const mc1231a_set_kvff_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2649,11 +2641,11 @@ static inline int mc1231a_set_kvff_request_encode(
 static inline int mc1231a_set_kvff_request_decode(
     mc1231a_set_kvff_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -2662,27 +2654,27 @@ static inline int mc1231a_set_kvff_request_decode(
 static inline int mc1231a_set_kvff_request_to_frame(
     const mc1231a_set_kvff_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_KVFF_REQUEST_ID;
-    size = mc1231a_set_kvff_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_kvff_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_kvff.response, id 0x2B (section Host commands): Load velocity feed-forward gain.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_KVFF_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_KVFF_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_KVFF_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_KVFF_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_KVFF_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_KVFF_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_KVFF_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_KVFF_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_kvff_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_kvff_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2691,31 +2683,31 @@ static inline int mc1231a_set_kvff_response_from_frame(uint16_t request_sum, con
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_i_lm.request, id 0x28 (section Host commands): Load integration limit.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_I_LM_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_I_LM_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_I_LM_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_I_LM_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_I_LM_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_I_LM_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_I_LM_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_I_LM_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_i_lm_request {
     uint16_t value; /* Integration limit; 0..32767 */
 } mc1231a_set_i_lm_request_t;
 
-#define MC1231A_SET_I_LM_REQUEST_INIT { 0u }
+#define MC1231A_SET_I_LM_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_i_lm_request_encode(
     const mc1231a_set_i_lm_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2725,11 +2717,11 @@ static inline int mc1231a_set_i_lm_request_encode(
 static inline int mc1231a_set_i_lm_request_decode(
     mc1231a_set_i_lm_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -2738,25 +2730,25 @@ static inline int mc1231a_set_i_lm_request_decode(
 static inline int mc1231a_set_i_lm_request_to_frame(
     const mc1231a_set_i_lm_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_I_LM_REQUEST_ID;
-    size = mc1231a_set_i_lm_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_i_lm_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_i_lm.response, id 0x28 (section Host commands): Load integration limit. */
-#define MC1231A_SET_I_LM_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_I_LM_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_I_LM_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_I_LM_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_I_LM_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_I_LM_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_I_LM_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_I_LM_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_i_lm_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_i_lm_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2765,7 +2757,7 @@ static inline int mc1231a_set_i_lm_response_from_frame(uint16_t request_sum, con
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_mtr_lmt.request, id 0x06 (section Host commands): Set the ceiling of the filter output; takes
@@ -2773,24 +2765,24 @@ static inline int mc1231a_set_i_lm_response_from_frame(uint16_t request_sum, con
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_MTR_LMT_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_MTR_LMT_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_MTR_LMT_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_MTR_LMT_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_MTR_LMT_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_MTR_LMT_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_MTR_LMT_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_MTR_LMT_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_mtr_lmt_request {
     uint16_t value; /* Ceiling of the filter output; 0..32767 */
 } mc1231a_set_mtr_lmt_request_t;
 
-#define MC1231A_SET_MTR_LMT_REQUEST_INIT { 0u }
+#define MC1231A_SET_MTR_LMT_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_mtr_lmt_request_encode(
     const mc1231a_set_mtr_lmt_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2800,11 +2792,11 @@ static inline int mc1231a_set_mtr_lmt_request_encode(
 static inline int mc1231a_set_mtr_lmt_request_decode(
     mc1231a_set_mtr_lmt_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -2813,27 +2805,27 @@ static inline int mc1231a_set_mtr_lmt_request_decode(
 static inline int mc1231a_set_mtr_lmt_request_to_frame(
     const mc1231a_set_mtr_lmt_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_MTR_LMT_REQUEST_ID;
-    size = mc1231a_set_mtr_lmt_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_mtr_lmt_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_mtr_lmt.response, id 0x06 (section Host commands): Set the ceiling of the filter output; takes
  * effect at once, closed loop only.
  */
-#define MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_MTR_LMT_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_MTR_LMT_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_MTR_LMT_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_MTR_LMT_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_MTR_LMT_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_MTR_LMT_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_mtr_lmt_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_mtr_lmt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2842,7 +2834,7 @@ static inline int mc1231a_set_mtr_lmt_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_mtr_bias.request, id 0x0F (section Host commands): Set the DC offset added to the filter output;
@@ -2850,10 +2842,10 @@ static inline int mc1231a_set_mtr_lmt_response_from_frame(uint16_t request_sum, 
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_SET_MTR_BIAS_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_MTR_BIAS_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_MTR_BIAS_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_MTR_BIAS_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_MTR_BIAS_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_MTR_BIAS_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_MTR_BIAS_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_MTR_BIAS_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_mtr_bias_request {
     int16_t value; /* DC offset added to the filter output; -32767..32767 */
@@ -2867,7 +2859,7 @@ static inline int mc1231a_set_mtr_bias_request_encode(
     if (message->value < -32767) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -2877,7 +2869,7 @@ static inline int mc1231a_set_mtr_bias_request_encode(
 static inline int mc1231a_set_mtr_bias_request_decode(
     mc1231a_set_mtr_bias_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -2890,27 +2882,27 @@ static inline int mc1231a_set_mtr_bias_request_decode(
 static inline int mc1231a_set_mtr_bias_request_to_frame(
     const mc1231a_set_mtr_bias_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_MTR_BIAS_REQUEST_ID;
-    size = mc1231a_set_mtr_bias_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_mtr_bias_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_mtr_bias.response, id 0x0F (section Host commands): Set the DC offset added to the filter
  * output; takes effect at once.
  */
-#define MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_MTR_BIAS_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_MTR_BIAS_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_MTR_BIAS_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_MTR_BIAS_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_MTR_BIAS_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_MTR_BIAS_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_mtr_bias_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2919,7 +2911,7 @@ static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum,
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_pos_err.request, id 0x29 (section Host commands): Set position-error limit that raises motion
@@ -2928,24 +2920,24 @@ static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum,
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_POS_ERR_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_POS_ERR_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_POS_ERR_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_POS_ERR_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_POS_ERR_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_POS_ERR_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_POS_ERR_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_POS_ERR_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_pos_err_request {
     uint16_t value; /* Position-error limit that raises motion error; 0..32767 */
 } mc1231a_set_pos_err_request_t;
 
-#define MC1231A_SET_POS_ERR_REQUEST_INIT { 0u }
+#define MC1231A_SET_POS_ERR_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_pos_err_request_encode(
     const mc1231a_set_pos_err_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -2955,11 +2947,11 @@ static inline int mc1231a_set_pos_err_request_encode(
 static inline int mc1231a_set_pos_err_request_decode(
     mc1231a_set_pos_err_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -2968,28 +2960,28 @@ static inline int mc1231a_set_pos_err_request_decode(
 static inline int mc1231a_set_pos_err_request_to_frame(
     const mc1231a_set_pos_err_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_POS_ERR_REQUEST_ID;
-    size = mc1231a_set_pos_err_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_pos_err_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_pos_err.response, id 0x29 (section Host commands): Set position-error limit that raises motion
  * error.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_POS_ERR_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_POS_ERR_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_POS_ERR_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_POS_ERR_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_POS_ERR_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_POS_ERR_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_pos_err_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_pos_err_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -2998,25 +2990,24 @@ static inline int mc1231a_set_pos_err_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_kp.request, id 0x50 (section Host commands): Read back buffered proportional gain.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_KP_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_KP_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_KP_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_KP_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_KP_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_KP_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_KP_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_KP_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_kp_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_KP_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_kp.response, id 0x50 (section Host commands): Read back buffered proportional gain.
@@ -3024,21 +3015,21 @@ static inline int mc1231a_get_kp_request_to_frame(uint8_t *wire, size_t capacity
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_KP_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_KP_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_KP_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_KP_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_KP_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_KP_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_KP_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_KP_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_kp_response {
     uint16_t value; /* Buffered proportional gain */
 } mc1231a_get_kp_response_t;
 
-#define MC1231A_GET_KP_RESPONSE_INIT { 0u }
+#define MC1231A_GET_KP_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_kp_response_encode(
     const mc1231a_get_kp_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -3048,7 +3039,7 @@ static inline int mc1231a_get_kp_response_encode(
 static inline int mc1231a_get_kp_response_decode(
     mc1231a_get_kp_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -3069,25 +3060,24 @@ static inline int mc1231a_get_kp_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_kp_response_decode(message, wire, size - 2u);
+    return mc1231a_get_kp_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_kd.request, id 0x52 (section Host commands): Read back buffered derivative gain.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_KD_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_KD_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_KD_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_KD_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_KD_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_KD_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_KD_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_KD_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_kd_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_KD_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_kd.response, id 0x52 (section Host commands): Read back buffered derivative gain.
@@ -3095,21 +3085,21 @@ static inline int mc1231a_get_kd_request_to_frame(uint8_t *wire, size_t capacity
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_KD_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_KD_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_KD_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_KD_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_KD_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_KD_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_KD_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_KD_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_kd_response {
     uint16_t value; /* Buffered derivative gain */
 } mc1231a_get_kd_response_t;
 
-#define MC1231A_GET_KD_RESPONSE_INIT { 0u }
+#define MC1231A_GET_KD_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_kd_response_encode(
     const mc1231a_get_kd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -3119,7 +3109,7 @@ static inline int mc1231a_get_kd_response_encode(
 static inline int mc1231a_get_kd_response_decode(
     mc1231a_get_kd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -3140,44 +3130,43 @@ static inline int mc1231a_get_kd_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_kd_response_decode(message, wire, size - 2u);
+    return mc1231a_get_kd_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_ki.request, id 0x51 (section Host commands): Read back buffered integral gain. */
-#define MC1231A_GET_KI_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_KI_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_KI_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_KI_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_KI_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_KI_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_KI_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_KI_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_ki_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_KI_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_ki.response, id 0x51 (section Host commands): Read back buffered integral gain.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_KI_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_KI_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_KI_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_KI_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_KI_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_KI_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_KI_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_KI_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_ki_response {
     uint16_t value; /* Buffered integral gain */
 } mc1231a_get_ki_response_t;
 
-#define MC1231A_GET_KI_RESPONSE_INIT { 0u }
+#define MC1231A_GET_KI_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_ki_response_encode(
     const mc1231a_get_ki_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -3187,7 +3176,7 @@ static inline int mc1231a_get_ki_response_encode(
 static inline int mc1231a_get_ki_response_decode(
     mc1231a_get_ki_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -3208,44 +3197,43 @@ static inline int mc1231a_get_ki_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_ki_response_decode(message, wire, size - 2u);
+    return mc1231a_get_ki_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_kvff.request, id 0x54 (section Host commands): Read back buffered velocity feed-forward gain. */
-#define MC1231A_GET_KVFF_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_KVFF_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_KVFF_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_KVFF_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_KVFF_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_KVFF_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_KVFF_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_KVFF_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_kvff_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_KVFF_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_kvff.response, id 0x54 (section Host commands): Read back buffered velocity feed-forward gain.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_KVFF_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_KVFF_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_KVFF_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_KVFF_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_KVFF_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_KVFF_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_KVFF_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_KVFF_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_kvff_response {
     uint16_t value; /* Buffered velocity feed-forward gain */
 } mc1231a_get_kvff_response_t;
 
-#define MC1231A_GET_KVFF_RESPONSE_INIT { 0u }
+#define MC1231A_GET_KVFF_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_kvff_response_encode(
     const mc1231a_get_kvff_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -3255,7 +3243,7 @@ static inline int mc1231a_get_kvff_response_encode(
 static inline int mc1231a_get_kvff_response_decode(
     mc1231a_get_kvff_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -3276,44 +3264,43 @@ static inline int mc1231a_get_kvff_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_kvff_response_decode(message, wire, size - 2u);
+    return mc1231a_get_kvff_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_i_lm.request, id 0x53 (section Host commands): Read back buffered integration limit. */
-#define MC1231A_GET_I_LM_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_I_LM_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_I_LM_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_I_LM_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_I_LM_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_I_LM_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_I_LM_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_I_LM_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_i_lm_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_I_LM_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_i_lm.response, id 0x53 (section Host commands): Read back buffered integration limit.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_I_LM_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_I_LM_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_I_LM_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_I_LM_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_I_LM_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_I_LM_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_I_LM_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_I_LM_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_i_lm_response {
     uint16_t value; /* Buffered integration limit */
 } mc1231a_get_i_lm_response_t;
 
-#define MC1231A_GET_I_LM_RESPONSE_INIT { 0u }
+#define MC1231A_GET_I_LM_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_i_lm_response_encode(
     const mc1231a_get_i_lm_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -3323,7 +3310,7 @@ static inline int mc1231a_get_i_lm_response_encode(
 static inline int mc1231a_get_i_lm_response_decode(
     mc1231a_get_i_lm_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -3344,47 +3331,46 @@ static inline int mc1231a_get_i_lm_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_i_lm_response_decode(message, wire, size - 2u);
+    return mc1231a_get_i_lm_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_mtr_lmt.request, id 0x07 (section Host commands): Read back filter output ceiling. */
-#define MC1231A_GET_MTR_LMT_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_MTR_LMT_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_MTR_LMT_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_MTR_LMT_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_MTR_LMT_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_MTR_LMT_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_MTR_LMT_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_MTR_LMT_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_mtr_lmt_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_MTR_LMT_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_mtr_lmt.response, id 0x07 (section Host commands): Read back filter output ceiling.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_MTR_LMT_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_MTR_LMT_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_MTR_LMT_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_MTR_LMT_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_MTR_LMT_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_MTR_LMT_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_MTR_LMT_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_MTR_LMT_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_mtr_lmt_response {
     uint16_t value; /* Filter output ceiling; 0..32767 */
 } mc1231a_get_mtr_lmt_response_t;
 
-#define MC1231A_GET_MTR_LMT_RESPONSE_INIT { 0u }
+#define MC1231A_GET_MTR_LMT_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_mtr_lmt_response_encode(
     const mc1231a_get_mtr_lmt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -3394,11 +3380,11 @@ static inline int mc1231a_get_mtr_lmt_response_encode(
 static inline int mc1231a_get_mtr_lmt_response_decode(
     mc1231a_get_mtr_lmt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767u) {
+    if (message->value > 32767U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -3418,33 +3404,32 @@ static inline int mc1231a_get_mtr_lmt_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_mtr_lmt_response_decode(message, wire, size - 2u);
+    return mc1231a_get_mtr_lmt_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_mtr_bias.request, id 0x2D (section Host commands): Read back filter DC offset. */
-#define MC1231A_GET_MTR_BIAS_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_MTR_BIAS_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_MTR_BIAS_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_MTR_BIAS_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_MTR_BIAS_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_MTR_BIAS_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_MTR_BIAS_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_MTR_BIAS_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_mtr_bias_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_MTR_BIAS_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_mtr_bias.response, id 0x2D (section Host commands): Read back filter DC offset.
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_GET_MTR_BIAS_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_MTR_BIAS_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_mtr_bias_response {
     int16_t value; /* Filter DC offset; -32767..32767 */
@@ -3458,7 +3443,7 @@ static inline int mc1231a_get_mtr_bias_response_encode(
     if (message->value < -32767) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -3468,7 +3453,7 @@ static inline int mc1231a_get_mtr_bias_response_encode(
 static inline int mc1231a_get_mtr_bias_response_decode(
     mc1231a_get_mtr_bias_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -3492,25 +3477,24 @@ static inline int mc1231a_get_mtr_bias_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_mtr_bias_response_decode(message, wire, size - 2u);
+    return mc1231a_get_mtr_bias_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_pos_err.request, id 0x55 (section Host commands): Read back position-error limit.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_POS_ERR_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_POS_ERR_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_POS_ERR_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_POS_ERR_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_POS_ERR_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_POS_ERR_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_POS_ERR_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_POS_ERR_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_pos_err_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_POS_ERR_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_pos_err.response, id 0x55 (section Host commands): Read back position-error limit.
@@ -3518,21 +3502,21 @@ static inline int mc1231a_get_pos_err_request_to_frame(uint8_t *wire, size_t cap
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_POS_ERR_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_POS_ERR_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_POS_ERR_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_POS_ERR_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_POS_ERR_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_POS_ERR_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_POS_ERR_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_POS_ERR_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_pos_err_response {
     uint16_t value; /* Position-error limit */
 } mc1231a_get_pos_err_response_t;
 
-#define MC1231A_GET_POS_ERR_RESPONSE_INIT { 0u }
+#define MC1231A_GET_POS_ERR_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_pos_err_response_encode(
     const mc1231a_get_pos_err_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -3542,7 +3526,7 @@ static inline int mc1231a_get_pos_err_response_encode(
 static inline int mc1231a_get_pos_err_response_decode(
     mc1231a_get_pos_err_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -3563,25 +3547,24 @@ static inline int mc1231a_get_pos_err_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_pos_err_response_decode(message, wire, size - 2u);
+    return mc1231a_get_pos_err_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_intgr.request, id 0x2E (section Host commands): Read the accumulated integral term.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_INTGR_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_INTGR_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_INTGR_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_INTGR_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_INTGR_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_INTGR_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_INTGR_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_INTGR_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_intgr_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_INTGR_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_intgr.response, id 0x2E (section Host commands): Read the accumulated integral term.
@@ -3589,10 +3572,10 @@ static inline int mc1231a_get_intgr_request_to_frame(uint8_t *wire, size_t capac
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_GET_INTGR_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_INTGR_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_INTGR_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_INTGR_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_INTGR_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_INTGR_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_INTGR_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_INTGR_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_intgr_response {
     int16_t value; /* Accumulated integral; its scaling was not found */
@@ -3603,7 +3586,7 @@ typedef struct mc1231a_get_intgr_response {
 static inline int mc1231a_get_intgr_response_encode(
     const mc1231a_get_intgr_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -3613,7 +3596,7 @@ static inline int mc1231a_get_intgr_response_encode(
 static inline int mc1231a_get_intgr_response_decode(
     mc1231a_get_intgr_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -3634,25 +3617,24 @@ static inline int mc1231a_get_intgr_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_intgr_response_decode(message, wire, size - 2u);
+    return mc1231a_get_intgr_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_actl_pos_err.request, id 0x60 (section Host commands): Read instantaneous position error.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_ACTL_POS_ERR_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_actl_pos_err_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_ACTL_POS_ERR_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_actl_pos_err.response, id 0x60 (section Host commands): Read instantaneous position error.
@@ -3660,10 +3642,10 @@ static inline int mc1231a_get_actl_pos_err_request_to_frame(uint8_t *wire, size_
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_actl_pos_err_response {
     int16_t value; /* Position error; in counts */
@@ -3674,7 +3656,7 @@ typedef struct mc1231a_get_actl_pos_err_response {
 static inline int mc1231a_get_actl_pos_err_response_encode(
     const mc1231a_get_actl_pos_err_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -3684,7 +3666,7 @@ static inline int mc1231a_get_actl_pos_err_response_encode(
 static inline int mc1231a_get_actl_pos_err_response_decode(
     mc1231a_get_actl_pos_err_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -3705,39 +3687,37 @@ static inline int mc1231a_get_actl_pos_err_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_actl_pos_err_response_decode(message, wire, size - 2u);
+    return mc1231a_get_actl_pos_err_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_auto_stop_on.request, id 0x45 (section Host commands): Turn motor off automatically on motion
  * error.
  */
-#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_AUTO_STOP_ON_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_auto_stop_on_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_AUTO_STOP_ON_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_auto_stop_on.response, id 0x45 (section Host commands): Turn motor off automatically on motion
  * error.
  */
-#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_auto_stop_on_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_auto_stop_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -3746,39 +3726,37 @@ static inline int mc1231a_set_auto_stop_on_response_from_frame(uint16_t request_
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_auto_stop_off.request, id 0x44 (section Host commands): Keep motor on after motion error.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_auto_stop_off_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_AUTO_STOP_OFF_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_auto_stop_off.response, id 0x44 (section Host commands): Keep motor on after motion error.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_auto_stop_off_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_auto_stop_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -3787,39 +3765,37 @@ static inline int mc1231a_set_auto_stop_off_response_from_frame(uint16_t request
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_time_brk.request, id 0x17 (section Host commands): Arm time breakpoint.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_TIME_BRK_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_TIME_BRK_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_TIME_BRK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_TIME_BRK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_TIME_BRK_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_TIME_BRK_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_TIME_BRK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_TIME_BRK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_time_brk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_TIME_BRK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_time_brk.response, id 0x17 (section Host commands): Arm time breakpoint.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_TIME_BRK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_TIME_BRK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_TIME_BRK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_TIME_BRK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_TIME_BRK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_TIME_BRK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_time_brk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_time_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -3828,41 +3804,39 @@ static inline int mc1231a_set_time_brk_response_from_frame(uint16_t request_sum,
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_pos_brk.request, id 0x18 (section Host commands): Arm breakpoint on target position reached
  * going positive.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_POS_BRK_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_POS_BRK_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_POS_BRK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_POS_BRK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_POS_BRK_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_POS_BRK_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_POS_BRK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_POS_BRK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_pos_brk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_POS_BRK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_pos_brk.response, id 0x18 (section Host commands): Arm breakpoint on target position reached
  * going positive.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_POS_BRK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_POS_BRK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_POS_BRK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_POS_BRK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_POS_BRK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_POS_BRK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_pos_brk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_pos_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -3871,41 +3845,39 @@ static inline int mc1231a_set_pos_brk_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_neg_brk.request, id 0x19 (section Host commands): Arm breakpoint on target position reached
  * going negative.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_NEG_BRK_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_NEG_BRK_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_NEG_BRK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_NEG_BRK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_NEG_BRK_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_NEG_BRK_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_NEG_BRK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_NEG_BRK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_neg_brk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_NEG_BRK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_neg_brk.response, id 0x19 (section Host commands): Arm breakpoint on target position reached
  * going negative.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_NEG_BRK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_NEG_BRK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_NEG_BRK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_NEG_BRK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_NEG_BRK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_NEG_BRK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_neg_brk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_neg_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -3914,41 +3886,39 @@ static inline int mc1231a_set_neg_brk_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_actl_pos_brk.request, id 0x1B (section Host commands): Arm breakpoint on actual position reached
  * going positive.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_ACTL_POS_BRK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_actl_pos_brk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_ACTL_POS_BRK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_actl_pos_brk.response, id 0x1B (section Host commands): Arm breakpoint on actual position
  * reached going positive.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_actl_pos_brk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_actl_pos_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -3957,41 +3927,39 @@ static inline int mc1231a_set_actl_pos_brk_response_from_frame(uint16_t request_
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_actl_neg_brk.request, id 0x1C (section Host commands): Arm breakpoint on actual position reached
  * going negative.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_actl_neg_brk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_ACTL_NEG_BRK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_actl_neg_brk.response, id 0x1C (section Host commands): Arm breakpoint on actual position
  * reached going negative.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_actl_neg_brk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_actl_neg_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4000,41 +3968,39 @@ static inline int mc1231a_set_actl_neg_brk_response_from_frame(uint16_t request_
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_mtn_cmplt_brk.request, id 0x35 (section Host commands): Arm breakpoint on motion complete,
  * without a compare value.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_mtn_cmplt_brk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_MTN_CMPLT_BRK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_mtn_cmplt_brk.response, id 0x35 (section Host commands): Arm breakpoint on motion complete,
  * without a compare value.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_mtn_cmplt_brk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_mtn_cmplt_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4043,41 +4009,39 @@ static inline int mc1231a_set_mtn_cmplt_brk_response_from_frame(uint16_t request
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_ext_brk.request, id 0x5E (section Host commands): Arm breakpoint on an external signal, without
  * a compare value.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_EXT_BRK_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_EXT_BRK_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_EXT_BRK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_EXT_BRK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_EXT_BRK_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_EXT_BRK_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_EXT_BRK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_EXT_BRK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_ext_brk_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_EXT_BRK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_ext_brk.response, id 0x5E (section Host commands): Arm breakpoint on an external signal, without
  * a compare value.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_EXT_BRK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_EXT_BRK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_EXT_BRK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_EXT_BRK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_EXT_BRK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_EXT_BRK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_ext_brk_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_ext_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4086,35 +4050,33 @@ static inline int mc1231a_set_ext_brk_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_brk_off.request, id 0x6D (section Host commands): Disarm any pending breakpoint. */
-#define MC1231A_SET_BRK_OFF_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_BRK_OFF_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_BRK_OFF_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_BRK_OFF_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_BRK_OFF_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_BRK_OFF_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_BRK_OFF_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_BRK_OFF_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_brk_off_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_BRK_OFF_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_brk_off.response, id 0x6D (section Host commands): Disarm any pending breakpoint. */
-#define MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_BRK_OFF_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_BRK_OFF_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_BRK_OFF_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_BRK_OFF_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_BRK_OFF_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_BRK_OFF_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_brk_off_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_brk_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4123,28 +4085,28 @@ static inline int mc1231a_set_brk_off_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_brk_pnt.request, id 0x16 (section Host commands): Load breakpoint compare value.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_SET_BRK_PNT_REQUEST_MIN_SIZE 4u
-#define MC1231A_SET_BRK_PNT_REQUEST_MAX_SIZE 4u
-#define MC1231A_SET_BRK_PNT_REQUEST_MAX_FRAME_SIZE 5u
-#define MC1231A_SET_BRK_PNT_REQUEST_MAX_WIRE_SIZE 5u
+#define MC1231A_SET_BRK_PNT_REQUEST_MIN_SIZE 4U
+#define MC1231A_SET_BRK_PNT_REQUEST_MAX_SIZE 4U
+#define MC1231A_SET_BRK_PNT_REQUEST_MAX_FRAME_SIZE 5U
+#define MC1231A_SET_BRK_PNT_REQUEST_MAX_WIRE_SIZE 5U
 
 typedef struct mc1231a_set_brk_pnt_request {
     int32_t value; /* Cycles for a time breakpoint, else counts */
 } mc1231a_set_brk_pnt_request_t;
 
-#define MC1231A_SET_BRK_PNT_REQUEST_INIT { 0l }
+#define MC1231A_SET_BRK_PNT_REQUEST_INIT { 0L }
 
 static inline int mc1231a_set_brk_pnt_request_encode(
     const mc1231a_set_brk_pnt_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -4154,7 +4116,7 @@ static inline int mc1231a_set_brk_pnt_request_encode(
 static inline int mc1231a_set_brk_pnt_request_decode(
     mc1231a_set_brk_pnt_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -4164,25 +4126,25 @@ static inline int mc1231a_set_brk_pnt_request_decode(
 static inline int mc1231a_set_brk_pnt_request_to_frame(
     const mc1231a_set_brk_pnt_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_BRK_PNT_REQUEST_ID;
-    size = mc1231a_set_brk_pnt_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_brk_pnt_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_brk_pnt.response, id 0x16 (section Host commands): Load breakpoint compare value. */
-#define MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_BRK_PNT_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_BRK_PNT_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_BRK_PNT_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_BRK_PNT_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_BRK_PNT_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_BRK_PNT_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_brk_pnt_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_brk_pnt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4191,35 +4153,33 @@ static inline int mc1231a_set_brk_pnt_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- update.request, id 0x1A (section Host commands): Make all buffered values active now. */
-#define MC1231A_UPDATE_REQUEST_MIN_SIZE 0u
-#define MC1231A_UPDATE_REQUEST_MAX_SIZE 0u
-#define MC1231A_UPDATE_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_UPDATE_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_UPDATE_REQUEST_MIN_SIZE 0U
+#define MC1231A_UPDATE_REQUEST_MAX_SIZE 0U
+#define MC1231A_UPDATE_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_UPDATE_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_update_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_UPDATE_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- update.response, id 0x1A (section Host commands): Make all buffered values active now. */
-#define MC1231A_UPDATE_RESPONSE_MIN_SIZE 0u
-#define MC1231A_UPDATE_RESPONSE_MAX_SIZE 0u
-#define MC1231A_UPDATE_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_UPDATE_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_UPDATE_RESPONSE_MIN_SIZE 0U
+#define MC1231A_UPDATE_RESPONSE_MAX_SIZE 0U
+#define MC1231A_UPDATE_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_UPDATE_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_update_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_update_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4228,28 +4188,28 @@ static inline int mc1231a_update_response_from_frame(uint16_t request_sum, const
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- multi_update.request, id 0x5B (section Host commands): Update several axes at the same instant.
  * Payload, 2 bytes:
  *      0  u16 be  axes
  */
-#define MC1231A_MULTI_UPDATE_REQUEST_MIN_SIZE 2u
-#define MC1231A_MULTI_UPDATE_REQUEST_MAX_SIZE 2u
-#define MC1231A_MULTI_UPDATE_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_MULTI_UPDATE_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_MULTI_UPDATE_REQUEST_MIN_SIZE 2U
+#define MC1231A_MULTI_UPDATE_REQUEST_MAX_SIZE 2U
+#define MC1231A_MULTI_UPDATE_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_MULTI_UPDATE_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_multi_update_request {
     uint16_t axes; /* Axes to update; bit 0 is axis 1; flags axes; not confirmed */
 } mc1231a_multi_update_request_t;
 
-#define MC1231A_MULTI_UPDATE_REQUEST_INIT { 0u }
+#define MC1231A_MULTI_UPDATE_REQUEST_INIT { 0U }
 
 static inline int mc1231a_multi_update_request_encode(
     const mc1231a_multi_update_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->axes);
@@ -4259,7 +4219,7 @@ static inline int mc1231a_multi_update_request_encode(
 static inline int mc1231a_multi_update_request_decode(
     mc1231a_multi_update_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->axes = mc1231a_get_u16_be_(payload);
@@ -4269,25 +4229,25 @@ static inline int mc1231a_multi_update_request_decode(
 static inline int mc1231a_multi_update_request_to_frame(
     const mc1231a_multi_update_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_MULTI_UPDATE_REQUEST_ID;
-    size = mc1231a_multi_update_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_multi_update_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- multi_update.response, id 0x5B (section Host commands): Update several axes at the same instant. */
-#define MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE 0u
-#define MC1231A_MULTI_UPDATE_RESPONSE_MAX_SIZE 0u
-#define MC1231A_MULTI_UPDATE_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_MULTI_UPDATE_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE 0U
+#define MC1231A_MULTI_UPDATE_RESPONSE_MAX_SIZE 0U
+#define MC1231A_MULTI_UPDATE_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_MULTI_UPDATE_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_multi_update_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_multi_update_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4296,35 +4256,33 @@ static inline int mc1231a_multi_update_response_from_frame(uint16_t request_sum,
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_auto_update_on.request, id 0x5C (section Host commands): Let breakpoints cause an update. */
-#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_AUTO_UPDATE_ON_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_auto_update_on_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_AUTO_UPDATE_ON_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_auto_update_on.response, id 0x5C (section Host commands): Let breakpoints cause an update. */
-#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_auto_update_on_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_auto_update_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4333,41 +4291,39 @@ static inline int mc1231a_set_auto_update_on_response_from_frame(uint16_t reques
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_auto_update_off.request, id 0x5D (section Host commands): Stop breakpoints from causing an
  * update.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_auto_update_off_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_auto_update_off.response, id 0x5D (section Host commands): Stop breakpoints from causing an
  * update.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_auto_update_off_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_auto_update_off_response_from_frame(
@@ -4377,44 +4333,43 @@ static inline int mc1231a_set_auto_update_off_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_brk_pnt.request, id 0x57 (section Host commands): Read back breakpoint compare value. */
-#define MC1231A_GET_BRK_PNT_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_BRK_PNT_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_BRK_PNT_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_BRK_PNT_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_BRK_PNT_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_BRK_PNT_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_BRK_PNT_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_BRK_PNT_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_brk_pnt_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_BRK_PNT_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_brk_pnt.response, id 0x57 (section Host commands): Read back breakpoint compare value.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_BRK_PNT_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_BRK_PNT_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_BRK_PNT_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_BRK_PNT_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_BRK_PNT_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_BRK_PNT_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_BRK_PNT_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_BRK_PNT_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_brk_pnt_response {
     int32_t value; /* Cycles for a time breakpoint, else counts */
 } mc1231a_get_brk_pnt_response_t;
 
-#define MC1231A_GET_BRK_PNT_RESPONSE_INIT { 0l }
+#define MC1231A_GET_BRK_PNT_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_brk_pnt_response_encode(
     const mc1231a_get_brk_pnt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -4424,7 +4379,7 @@ static inline int mc1231a_get_brk_pnt_response_encode(
 static inline int mc1231a_get_brk_pnt_response_decode(
     mc1231a_get_brk_pnt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -4445,7 +4400,7 @@ static inline int mc1231a_get_brk_pnt_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_brk_pnt_response_decode(message, wire, size - 2u);
+    return mc1231a_get_brk_pnt_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_intrpt_mask.request, id 0x2F (section Host commands): Choose which events raise the host
@@ -4453,21 +4408,21 @@ static inline int mc1231a_get_brk_pnt_response_from_frame(
  * Payload, 2 bytes:
  *      0  u16 be  mask
  */
-#define MC1231A_SET_INTRPT_MASK_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_INTRPT_MASK_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_INTRPT_MASK_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_INTRPT_MASK_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_INTRPT_MASK_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_INTRPT_MASK_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_INTRPT_MASK_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_INTRPT_MASK_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_intrpt_mask_request {
     uint16_t mask; /* Events that may interrupt: 1 lets one through; flags event_mask; not confirmed */
 } mc1231a_set_intrpt_mask_request_t;
 
-#define MC1231A_SET_INTRPT_MASK_REQUEST_INIT { 0u }
+#define MC1231A_SET_INTRPT_MASK_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_intrpt_mask_request_encode(
     const mc1231a_set_intrpt_mask_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->mask);
@@ -4477,7 +4432,7 @@ static inline int mc1231a_set_intrpt_mask_request_encode(
 static inline int mc1231a_set_intrpt_mask_request_decode(
     mc1231a_set_intrpt_mask_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->mask = mc1231a_get_u16_be_(payload);
@@ -4487,27 +4442,27 @@ static inline int mc1231a_set_intrpt_mask_request_decode(
 static inline int mc1231a_set_intrpt_mask_request_to_frame(
     const mc1231a_set_intrpt_mask_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_INTRPT_MASK_REQUEST_ID;
-    size = mc1231a_set_intrpt_mask_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_intrpt_mask_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_intrpt_mask.response, id 0x2F (section Host commands): Choose which events raise the host
  * interrupt.
  */
-#define MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_INTRPT_MASK_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_INTRPT_MASK_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_INTRPT_MASK_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_INTRPT_MASK_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_INTRPT_MASK_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_INTRPT_MASK_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_intrpt_mask_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_intrpt_mask_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4516,44 +4471,43 @@ static inline int mc1231a_set_intrpt_mask_response_from_frame(uint16_t request_s
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_intrpt.request, id 0x30 (section Host commands): Read status of the axis that interrupted. */
-#define MC1231A_GET_INTRPT_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_INTRPT_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_INTRPT_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_INTRPT_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_INTRPT_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_INTRPT_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_INTRPT_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_INTRPT_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_intrpt_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_INTRPT_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_intrpt.response, id 0x30 (section Host commands): Read status of the axis that interrupted.
  * Payload, 2 bytes:
  *      0  u16 be  status
  */
-#define MC1231A_GET_INTRPT_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_INTRPT_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_INTRPT_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_INTRPT_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_INTRPT_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_INTRPT_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_INTRPT_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_INTRPT_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_intrpt_response {
     uint16_t status; /* Status of the axis; flags axis_status */
 } mc1231a_get_intrpt_response_t;
 
-#define MC1231A_GET_INTRPT_RESPONSE_INIT { 0u }
+#define MC1231A_GET_INTRPT_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_intrpt_response_encode(
     const mc1231a_get_intrpt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->status);
@@ -4563,7 +4517,7 @@ static inline int mc1231a_get_intrpt_response_encode(
 static inline int mc1231a_get_intrpt_response_decode(
     mc1231a_get_intrpt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->status = mc1231a_get_u16_be_(payload);
@@ -4584,7 +4538,7 @@ static inline int mc1231a_get_intrpt_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_intrpt_response_decode(message, wire, size - 2u);
+    return mc1231a_get_intrpt_response_decode(message, wire, size - 2U);
 }
 
 /* ---- rst_intrpt.request, id 0x32 (section Host commands): Clear event bits of interrupting axis and
@@ -4592,21 +4546,21 @@ static inline int mc1231a_get_intrpt_response_from_frame(
  * Payload, 2 bytes:
  *      0  u16 be  mask
  */
-#define MC1231A_RST_INTRPT_REQUEST_MIN_SIZE 2u
-#define MC1231A_RST_INTRPT_REQUEST_MAX_SIZE 2u
-#define MC1231A_RST_INTRPT_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_RST_INTRPT_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_RST_INTRPT_REQUEST_MIN_SIZE 2U
+#define MC1231A_RST_INTRPT_REQUEST_MAX_SIZE 2U
+#define MC1231A_RST_INTRPT_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_RST_INTRPT_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_rst_intrpt_request {
     uint16_t mask; /* Events to keep: 0 clears one; flags event_mask */
 } mc1231a_rst_intrpt_request_t;
 
-#define MC1231A_RST_INTRPT_REQUEST_INIT { 0u }
+#define MC1231A_RST_INTRPT_REQUEST_INIT { 0U }
 
 static inline int mc1231a_rst_intrpt_request_encode(
     const mc1231a_rst_intrpt_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->mask);
@@ -4616,7 +4570,7 @@ static inline int mc1231a_rst_intrpt_request_encode(
 static inline int mc1231a_rst_intrpt_request_decode(
     mc1231a_rst_intrpt_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->mask = mc1231a_get_u16_be_(payload);
@@ -4626,27 +4580,27 @@ static inline int mc1231a_rst_intrpt_request_decode(
 static inline int mc1231a_rst_intrpt_request_to_frame(
     const mc1231a_rst_intrpt_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_RST_INTRPT_REQUEST_ID;
-    size = mc1231a_rst_intrpt_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_rst_intrpt_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- rst_intrpt.response, id 0x32 (section Host commands): Clear event bits of interrupting axis and
  * release HostIntrpt.
  */
-#define MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE 0u
-#define MC1231A_RST_INTRPT_RESPONSE_MAX_SIZE 0u
-#define MC1231A_RST_INTRPT_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_RST_INTRPT_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE 0U
+#define MC1231A_RST_INTRPT_RESPONSE_MAX_SIZE 0U
+#define MC1231A_RST_INTRPT_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_RST_INTRPT_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_rst_intrpt_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_rst_intrpt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4655,44 +4609,43 @@ static inline int mc1231a_rst_intrpt_response_from_frame(uint16_t request_sum, c
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_intrpt_mask.request, id 0x56 (section Host commands): Read back interrupt mask. */
-#define MC1231A_GET_INTRPT_MASK_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_INTRPT_MASK_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_INTRPT_MASK_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_INTRPT_MASK_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_INTRPT_MASK_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_INTRPT_MASK_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_INTRPT_MASK_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_INTRPT_MASK_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_intrpt_mask_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_INTRPT_MASK_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_intrpt_mask.response, id 0x56 (section Host commands): Read back interrupt mask.
  * Payload, 2 bytes:
  *      0  u16 be  mask
  */
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_intrpt_mask_response {
     uint16_t mask; /* Events that may interrupt: 1 lets one through; flags event_mask */
 } mc1231a_get_intrpt_mask_response_t;
 
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_INIT { 0u }
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_intrpt_mask_response_encode(
     const mc1231a_get_intrpt_mask_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->mask);
@@ -4702,7 +4655,7 @@ static inline int mc1231a_get_intrpt_mask_response_encode(
 static inline int mc1231a_get_intrpt_mask_response_decode(
     mc1231a_get_intrpt_mask_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->mask = mc1231a_get_u16_be_(payload);
@@ -4723,35 +4676,33 @@ static inline int mc1231a_get_intrpt_mask_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_intrpt_mask_response_decode(message, wire, size - 2u);
+    return mc1231a_get_intrpt_mask_response_decode(message, wire, size - 2U);
 }
 
 /* ---- clr_status.request, id 0x33 (section Host commands): Clear all event bits of the status word. */
-#define MC1231A_CLR_STATUS_REQUEST_MIN_SIZE 0u
-#define MC1231A_CLR_STATUS_REQUEST_MAX_SIZE 0u
-#define MC1231A_CLR_STATUS_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_CLR_STATUS_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_CLR_STATUS_REQUEST_MIN_SIZE 0U
+#define MC1231A_CLR_STATUS_REQUEST_MAX_SIZE 0U
+#define MC1231A_CLR_STATUS_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_CLR_STATUS_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_clr_status_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_CLR_STATUS_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- clr_status.response, id 0x33 (section Host commands): Clear all event bits of the status word. */
-#define MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE 0u
-#define MC1231A_CLR_STATUS_RESPONSE_MAX_SIZE 0u
-#define MC1231A_CLR_STATUS_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_CLR_STATUS_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE 0U
+#define MC1231A_CLR_STATUS_RESPONSE_MAX_SIZE 0U
+#define MC1231A_CLR_STATUS_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_CLR_STATUS_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_clr_status_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4760,7 +4711,7 @@ static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, c
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- rst_status.request, id 0x34 (section Host commands): Clear chosen event bits.
@@ -4768,21 +4719,21 @@ static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, c
  * Payload, 2 bytes:
  *      0  u16 be  mask
  */
-#define MC1231A_RST_STATUS_REQUEST_MIN_SIZE 2u
-#define MC1231A_RST_STATUS_REQUEST_MAX_SIZE 2u
-#define MC1231A_RST_STATUS_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_RST_STATUS_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_RST_STATUS_REQUEST_MIN_SIZE 2U
+#define MC1231A_RST_STATUS_REQUEST_MAX_SIZE 2U
+#define MC1231A_RST_STATUS_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_RST_STATUS_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_rst_status_request {
     uint16_t mask; /* Events to keep: 0 clears one; flags event_mask */
 } mc1231a_rst_status_request_t;
 
-#define MC1231A_RST_STATUS_REQUEST_INIT { 0u }
+#define MC1231A_RST_STATUS_REQUEST_INIT { 0U }
 
 static inline int mc1231a_rst_status_request_encode(
     const mc1231a_rst_status_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->mask);
@@ -4792,7 +4743,7 @@ static inline int mc1231a_rst_status_request_encode(
 static inline int mc1231a_rst_status_request_decode(
     mc1231a_rst_status_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->mask = mc1231a_get_u16_be_(payload);
@@ -4802,27 +4753,27 @@ static inline int mc1231a_rst_status_request_decode(
 static inline int mc1231a_rst_status_request_to_frame(
     const mc1231a_rst_status_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_RST_STATUS_REQUEST_ID;
-    size = mc1231a_rst_status_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_rst_status_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- rst_status.response, id 0x34 (section Host commands): Clear chosen event bits.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_RST_STATUS_RESPONSE_MIN_SIZE 0u
-#define MC1231A_RST_STATUS_RESPONSE_MAX_SIZE 0u
-#define MC1231A_RST_STATUS_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_RST_STATUS_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_RST_STATUS_RESPONSE_MIN_SIZE 0U
+#define MC1231A_RST_STATUS_RESPONSE_MAX_SIZE 0U
+#define MC1231A_RST_STATUS_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_RST_STATUS_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_rst_status_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_rst_status_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -4831,44 +4782,43 @@ static inline int mc1231a_rst_status_response_from_frame(uint16_t request_sum, c
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_status.request, id 0x31 (section Host commands): Read the axis status word. */
-#define MC1231A_GET_STATUS_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_STATUS_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_STATUS_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_STATUS_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_STATUS_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_STATUS_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_STATUS_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_STATUS_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_status_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_STATUS_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_status.response, id 0x31 (section Host commands): Read the axis status word.
  * Payload, 2 bytes:
  *      0  u16 be  status
  */
-#define MC1231A_GET_STATUS_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_STATUS_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_STATUS_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_STATUS_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_STATUS_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_STATUS_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_STATUS_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_STATUS_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_status_response {
     uint16_t status; /* Status of the axis; flags axis_status */
 } mc1231a_get_status_response_t;
 
-#define MC1231A_GET_STATUS_RESPONSE_INIT { 0u }
+#define MC1231A_GET_STATUS_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_status_response_encode(
     const mc1231a_get_status_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->status);
@@ -4878,7 +4828,7 @@ static inline int mc1231a_get_status_response_encode(
 static inline int mc1231a_get_status_response_decode(
     mc1231a_get_status_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->status = mc1231a_get_u16_be_(payload);
@@ -4899,25 +4849,24 @@ static inline int mc1231a_get_status_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_status_response_decode(message, wire, size - 2u);
+    return mc1231a_get_status_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_mode.request, id 0x48 (section Host commands): Read profile and breakpoint mode flags.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_MODE_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_MODE_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_MODE_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_MODE_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_MODE_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_MODE_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_MODE_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_MODE_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_mode_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_MODE_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_mode.response, id 0x48 (section Host commands): Read profile and breakpoint mode flags.
@@ -4925,21 +4874,21 @@ static inline int mc1231a_get_mode_request_to_frame(uint8_t *wire, size_t capaci
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_MODE_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_MODE_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_MODE_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_MODE_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_MODE_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_MODE_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_MODE_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_MODE_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_mode_response {
     uint16_t value; /* Mode bits; their layout was not found */
 } mc1231a_get_mode_response_t;
 
-#define MC1231A_GET_MODE_RESPONSE_INIT { 0u }
+#define MC1231A_GET_MODE_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_mode_response_encode(
     const mc1231a_get_mode_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -4949,7 +4898,7 @@ static inline int mc1231a_get_mode_response_encode(
 static inline int mc1231a_get_mode_response_decode(
     mc1231a_get_mode_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -4970,39 +4919,37 @@ static inline int mc1231a_get_mode_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_mode_response_decode(message, wire, size - 2u);
+    return mc1231a_get_mode_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_capt_index.request, id 0x64 (section Host commands): Capture position on index pulse.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_CAPT_INDEX_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_CAPT_INDEX_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_CAPT_INDEX_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_CAPT_INDEX_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_CAPT_INDEX_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_CAPT_INDEX_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_CAPT_INDEX_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_CAPT_INDEX_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_capt_index_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_CAPT_INDEX_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_capt_index.response, id 0x64 (section Host commands): Capture position on index pulse.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_CAPT_INDEX_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_CAPT_INDEX_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_CAPT_INDEX_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_CAPT_INDEX_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_CAPT_INDEX_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_CAPT_INDEX_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_capt_index_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_capt_index_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5011,35 +4958,33 @@ static inline int mc1231a_set_capt_index_response_from_frame(uint16_t request_su
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_capt_home.request, id 0x65 (section Host commands): Capture position on home signal. */
-#define MC1231A_SET_CAPT_HOME_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_CAPT_HOME_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_CAPT_HOME_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_CAPT_HOME_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_CAPT_HOME_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_CAPT_HOME_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_CAPT_HOME_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_CAPT_HOME_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_capt_home_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_CAPT_HOME_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_capt_home.response, id 0x65 (section Host commands): Capture position on home signal. */
-#define MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_CAPT_HOME_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_CAPT_HOME_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_CAPT_HOME_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_CAPT_HOME_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_CAPT_HOME_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_CAPT_HOME_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_capt_home_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_capt_home_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5048,44 +4993,43 @@ static inline int mc1231a_set_capt_home_response_from_frame(uint16_t request_sum
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_capt.request, id 0x36 (section Host commands): Read captured position and re-arm capture. */
-#define MC1231A_GET_CAPT_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_CAPT_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_CAPT_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_CAPT_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_CAPT_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_CAPT_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_CAPT_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_CAPT_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_capt_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_CAPT_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_capt.response, id 0x36 (section Host commands): Read captured position and re-arm capture.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_CAPT_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_CAPT_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_CAPT_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_CAPT_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_CAPT_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_CAPT_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_CAPT_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_CAPT_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_capt_response {
     int32_t value; /* Captured position; in counts */
 } mc1231a_get_capt_response_t;
 
-#define MC1231A_GET_CAPT_RESPONSE_INIT { 0l }
+#define MC1231A_GET_CAPT_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_capt_response_encode(
     const mc1231a_get_capt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -5095,7 +5039,7 @@ static inline int mc1231a_get_capt_response_encode(
 static inline int mc1231a_get_capt_response_decode(
     mc1231a_get_capt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -5116,35 +5060,33 @@ static inline int mc1231a_get_capt_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_capt_response_decode(message, wire, size - 2u);
+    return mc1231a_get_capt_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_output_pwm.request, id 0x3C (section Host commands): Select PWM output for every axis. */
-#define MC1231A_SET_OUTPUT_PWM_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_OUTPUT_PWM_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_OUTPUT_PWM_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_OUTPUT_PWM_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_OUTPUT_PWM_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_OUTPUT_PWM_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_OUTPUT_PWM_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_OUTPUT_PWM_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_output_pwm_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_OUTPUT_PWM_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_output_pwm.response, id 0x3C (section Host commands): Select PWM output for every axis. */
-#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_OUTPUT_PWM_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_output_pwm_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_output_pwm_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5153,35 +5095,33 @@ static inline int mc1231a_set_output_pwm_response_from_frame(uint16_t request_su
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_output_dac16.request, id 0x3B (section Host commands): Select 16-bit DAC output for every axis. */
-#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MIN_SIZE 0u
-#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MAX_SIZE 0u
-#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MIN_SIZE 0U
+#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MAX_SIZE 0U
+#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_SET_OUTPUT_DAC16_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_set_output_dac16_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_OUTPUT_DAC16_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- set_output_dac16.response, id 0x3B (section Host commands): Select 16-bit DAC output for every axis. */
-#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_output_dac16_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_output_dac16_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5190,35 +5130,33 @@ static inline int mc1231a_set_output_dac16_response_from_frame(uint16_t request_
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- mtr_on.request, id 0x43 (section Host commands): Close the loop: filter drives the motor. */
-#define MC1231A_MTR_ON_REQUEST_MIN_SIZE 0u
-#define MC1231A_MTR_ON_REQUEST_MAX_SIZE 0u
-#define MC1231A_MTR_ON_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_MTR_ON_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_MTR_ON_REQUEST_MIN_SIZE 0U
+#define MC1231A_MTR_ON_REQUEST_MAX_SIZE 0U
+#define MC1231A_MTR_ON_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_MTR_ON_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_mtr_on_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_MTR_ON_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- mtr_on.response, id 0x43 (section Host commands): Close the loop: filter drives the motor. */
-#define MC1231A_MTR_ON_RESPONSE_MIN_SIZE 0u
-#define MC1231A_MTR_ON_RESPONSE_MAX_SIZE 0u
-#define MC1231A_MTR_ON_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_MTR_ON_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_MTR_ON_RESPONSE_MIN_SIZE 0U
+#define MC1231A_MTR_ON_RESPONSE_MAX_SIZE 0U
+#define MC1231A_MTR_ON_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_MTR_ON_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_mtr_on_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_mtr_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5227,41 +5165,39 @@ static inline int mc1231a_mtr_on_response_from_frame(uint16_t request_sum, const
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- mtr_off.request, id 0x42 (section Host commands): Open the loop: manual motor command drives the
  * motor.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_MTR_OFF_REQUEST_MIN_SIZE 0u
-#define MC1231A_MTR_OFF_REQUEST_MAX_SIZE 0u
-#define MC1231A_MTR_OFF_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_MTR_OFF_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_MTR_OFF_REQUEST_MIN_SIZE 0U
+#define MC1231A_MTR_OFF_REQUEST_MAX_SIZE 0U
+#define MC1231A_MTR_OFF_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_MTR_OFF_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_mtr_off_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_MTR_OFF_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- mtr_off.response, id 0x42 (section Host commands): Open the loop: manual motor command drives the
  * motor.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_MTR_OFF_RESPONSE_MIN_SIZE 0u
-#define MC1231A_MTR_OFF_RESPONSE_MAX_SIZE 0u
-#define MC1231A_MTR_OFF_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_MTR_OFF_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_MTR_OFF_RESPONSE_MIN_SIZE 0U
+#define MC1231A_MTR_OFF_RESPONSE_MAX_SIZE 0U
+#define MC1231A_MTR_OFF_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_MTR_OFF_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_mtr_off_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_mtr_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5270,17 +5206,17 @@ static inline int mc1231a_mtr_off_response_from_frame(uint16_t request_sum, cons
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_mtr_cmd.request, id 0x62 (section Host commands): Write manual motor command (open loop only).
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_SET_MTR_CMD_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_MTR_CMD_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_MTR_CMD_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_MTR_CMD_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_mtr_cmd_request {
     int16_t value; /* Manual motor command (open loop only); -32767..32767 */
@@ -5294,7 +5230,7 @@ static inline int mc1231a_set_mtr_cmd_request_encode(
     if (message->value < -32767) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -5304,7 +5240,7 @@ static inline int mc1231a_set_mtr_cmd_request_encode(
 static inline int mc1231a_set_mtr_cmd_request_decode(
     mc1231a_set_mtr_cmd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -5317,25 +5253,25 @@ static inline int mc1231a_set_mtr_cmd_request_decode(
 static inline int mc1231a_set_mtr_cmd_request_to_frame(
     const mc1231a_set_mtr_cmd_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_MTR_CMD_REQUEST_ID;
-    size = mc1231a_set_mtr_cmd_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_mtr_cmd_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_mtr_cmd.response, id 0x62 (section Host commands): Write manual motor command (open loop only). */
-#define MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_MTR_CMD_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_MTR_CMD_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_mtr_cmd_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_mtr_cmd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5344,33 +5280,32 @@ static inline int mc1231a_set_mtr_cmd_response_from_frame(uint16_t request_sum, 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_mtr_cmd.request, id 0x3A (section Host commands): Read motor command now being output. */
-#define MC1231A_GET_MTR_CMD_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_MTR_CMD_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_MTR_CMD_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_MTR_CMD_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_MTR_CMD_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_MTR_CMD_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_MTR_CMD_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_MTR_CMD_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_mtr_cmd_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_MTR_CMD_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_mtr_cmd.response, id 0x3A (section Host commands): Read motor command now being output.
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_GET_MTR_CMD_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_MTR_CMD_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_MTR_CMD_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_MTR_CMD_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_mtr_cmd_response {
     int16_t value; /* Motor command now being output; -32767..32767 */
@@ -5384,7 +5319,7 @@ static inline int mc1231a_get_mtr_cmd_response_encode(
     if (message->value < -32767) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -5394,7 +5329,7 @@ static inline int mc1231a_get_mtr_cmd_response_encode(
 static inline int mc1231a_get_mtr_cmd_response_decode(
     mc1231a_get_mtr_cmd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -5418,7 +5353,7 @@ static inline int mc1231a_get_mtr_cmd_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_mtr_cmd_response_decode(message, wire, size - 2u);
+    return mc1231a_get_mtr_cmd_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_buf_mtr_cmd.request, id 0x77 (section Host commands): Load the buffered motor command, also the
@@ -5427,10 +5362,10 @@ static inline int mc1231a_get_mtr_cmd_response_from_frame(
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_buf_mtr_cmd_request {
     int16_t value; /* The buffered motor command; -32767..32767 */
@@ -5444,7 +5379,7 @@ static inline int mc1231a_set_buf_mtr_cmd_request_encode(
     if (message->value < -32767) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -5454,7 +5389,7 @@ static inline int mc1231a_set_buf_mtr_cmd_request_encode(
 static inline int mc1231a_set_buf_mtr_cmd_request_decode(
     mc1231a_set_buf_mtr_cmd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -5467,28 +5402,28 @@ static inline int mc1231a_set_buf_mtr_cmd_request_decode(
 static inline int mc1231a_set_buf_mtr_cmd_request_to_frame(
     const mc1231a_set_buf_mtr_cmd_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_BUF_MTR_CMD_REQUEST_ID;
-    size = mc1231a_set_buf_mtr_cmd_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_buf_mtr_cmd_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_buf_mtr_cmd.response, id 0x77 (section Host commands): Load the buffered motor command, also the
  * drive level of algorithmic phase initialisation.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_buf_mtr_cmd_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_buf_mtr_cmd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5497,33 +5432,32 @@ static inline int mc1231a_set_buf_mtr_cmd_response_from_frame(uint16_t request_s
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_buf_mtr_cmd.request, id 0x69 (section Host commands): Read back buffered motor command. */
-#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_BUF_MTR_CMD_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_buf_mtr_cmd_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_BUF_MTR_CMD_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_buf_mtr_cmd.response, id 0x69 (section Host commands): Read back buffered motor command.
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_buf_mtr_cmd_response {
     int16_t value; /* Buffered motor command */
@@ -5534,7 +5468,7 @@ typedef struct mc1231a_get_buf_mtr_cmd_response {
 static inline int mc1231a_get_buf_mtr_cmd_response_encode(
     const mc1231a_get_buf_mtr_cmd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, (uint16_t)message->value);
@@ -5544,7 +5478,7 @@ static inline int mc1231a_get_buf_mtr_cmd_response_encode(
 static inline int mc1231a_get_buf_mtr_cmd_response_decode(
     mc1231a_get_buf_mtr_cmd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int16_t)mc1231a_get_u16_be_(payload);
@@ -5565,44 +5499,43 @@ static inline int mc1231a_get_buf_mtr_cmd_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_buf_mtr_cmd_response_decode(message, wire, size - 2u);
+    return mc1231a_get_buf_mtr_cmd_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_output_mode.request, id 0x6E (section Host commands): Read motor output mode. */
-#define MC1231A_GET_OUTPUT_MODE_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_OUTPUT_MODE_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_OUTPUT_MODE_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_OUTPUT_MODE_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_OUTPUT_MODE_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_OUTPUT_MODE_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_OUTPUT_MODE_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_OUTPUT_MODE_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_output_mode_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_OUTPUT_MODE_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_output_mode.response, id 0x6E (section Host commands): Read motor output mode.
  * Payload, 2 bytes:
  *      0  u16 be  mode
  */
-#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_OUTPUT_MODE_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_output_mode_response {
     uint16_t mode; /* Motor output in use; enum output_mode */
 } mc1231a_get_output_mode_response_t;
 
-#define MC1231A_GET_OUTPUT_MODE_RESPONSE_INIT { 0u }
+#define MC1231A_GET_OUTPUT_MODE_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_output_mode_response_encode(
     const mc1231a_get_output_mode_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->mode);
@@ -5612,7 +5545,7 @@ static inline int mc1231a_get_output_mode_response_encode(
 static inline int mc1231a_get_output_mode_response_decode(
     mc1231a_get_output_mode_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->mode = mc1231a_get_u16_be_(payload);
@@ -5633,35 +5566,33 @@ static inline int mc1231a_get_output_mode_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_output_mode_response_decode(message, wire, size - 2u);
+    return mc1231a_get_output_mode_response_decode(message, wire, size - 2U);
 }
 
 /* ---- axis_on.request, id 0x41 (section Host commands): Enable servicing of the axis. */
-#define MC1231A_AXIS_ON_REQUEST_MIN_SIZE 0u
-#define MC1231A_AXIS_ON_REQUEST_MAX_SIZE 0u
-#define MC1231A_AXIS_ON_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_AXIS_ON_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_AXIS_ON_REQUEST_MIN_SIZE 0U
+#define MC1231A_AXIS_ON_REQUEST_MAX_SIZE 0U
+#define MC1231A_AXIS_ON_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_AXIS_ON_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_axis_on_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_AXIS_ON_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- axis_on.response, id 0x41 (section Host commands): Enable servicing of the axis. */
-#define MC1231A_AXIS_ON_RESPONSE_MIN_SIZE 0u
-#define MC1231A_AXIS_ON_RESPONSE_MAX_SIZE 0u
-#define MC1231A_AXIS_ON_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_AXIS_ON_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_AXIS_ON_RESPONSE_MIN_SIZE 0U
+#define MC1231A_AXIS_ON_RESPONSE_MAX_SIZE 0U
+#define MC1231A_AXIS_ON_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_AXIS_ON_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_axis_on_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_axis_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5670,35 +5601,33 @@ static inline int mc1231a_axis_on_response_from_frame(uint16_t request_sum, cons
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- axis_off.request, id 0x40 (section Host commands): Disable servicing of the axis. */
-#define MC1231A_AXIS_OFF_REQUEST_MIN_SIZE 0u
-#define MC1231A_AXIS_OFF_REQUEST_MAX_SIZE 0u
-#define MC1231A_AXIS_OFF_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_AXIS_OFF_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_AXIS_OFF_REQUEST_MIN_SIZE 0U
+#define MC1231A_AXIS_OFF_REQUEST_MAX_SIZE 0U
+#define MC1231A_AXIS_OFF_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_AXIS_OFF_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_axis_off_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_AXIS_OFF_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- axis_off.response, id 0x40 (section Host commands): Disable servicing of the axis. */
-#define MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE 0u
-#define MC1231A_AXIS_OFF_RESPONSE_MAX_SIZE 0u
-#define MC1231A_AXIS_OFF_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_AXIS_OFF_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE 0U
+#define MC1231A_AXIS_OFF_RESPONSE_MAX_SIZE 0U
+#define MC1231A_AXIS_OFF_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_AXIS_OFF_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_axis_off_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_axis_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5707,7 +5636,7 @@ static inline int mc1231a_axis_off_response_from_frame(uint16_t request_sum, con
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_actl_pos.request, id 0x4D (section Host commands): Set the actual position; the target is
@@ -5715,24 +5644,24 @@ static inline int mc1231a_axis_off_response_from_frame(uint16_t request_sum, con
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_SET_ACTL_POS_REQUEST_MIN_SIZE 4u
-#define MC1231A_SET_ACTL_POS_REQUEST_MAX_SIZE 4u
-#define MC1231A_SET_ACTL_POS_REQUEST_MAX_FRAME_SIZE 5u
-#define MC1231A_SET_ACTL_POS_REQUEST_MAX_WIRE_SIZE 5u
+#define MC1231A_SET_ACTL_POS_REQUEST_MIN_SIZE 4U
+#define MC1231A_SET_ACTL_POS_REQUEST_MAX_SIZE 4U
+#define MC1231A_SET_ACTL_POS_REQUEST_MAX_FRAME_SIZE 5U
+#define MC1231A_SET_ACTL_POS_REQUEST_MAX_WIRE_SIZE 5U
 
 typedef struct mc1231a_set_actl_pos_request {
     int32_t value; /* The actual position; in counts; -1073741824..1073741823 */
 } mc1231a_set_actl_pos_request_t;
 
-#define MC1231A_SET_ACTL_POS_REQUEST_INIT { 0l }
+#define MC1231A_SET_ACTL_POS_REQUEST_INIT { 0L }
 
 static inline int mc1231a_set_actl_pos_request_encode(
     const mc1231a_set_actl_pos_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->value < -1073741824l) || (message->value > 1073741823l)) {
+    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -5742,11 +5671,11 @@ static inline int mc1231a_set_actl_pos_request_encode(
 static inline int mc1231a_set_actl_pos_request_decode(
     mc1231a_set_actl_pos_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    if ((message->value < -1073741824l) || (message->value > 1073741823l)) {
+    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -5755,27 +5684,27 @@ static inline int mc1231a_set_actl_pos_request_decode(
 static inline int mc1231a_set_actl_pos_request_to_frame(
     const mc1231a_set_actl_pos_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_ACTL_POS_REQUEST_ID;
-    size = mc1231a_set_actl_pos_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_actl_pos_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_actl_pos.response, id 0x4D (section Host commands): Set the actual position; the target is
  * shifted to keep the error; takes effect at once.
  */
-#define MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_ACTL_POS_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_ACTL_POS_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_ACTL_POS_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_ACTL_POS_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_ACTL_POS_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_ACTL_POS_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_actl_pos_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_actl_pos_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5784,44 +5713,43 @@ static inline int mc1231a_set_actl_pos_response_from_frame(uint16_t request_sum,
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_actl_pos.request, id 0x37 (section Host commands): Read actual position. */
-#define MC1231A_GET_ACTL_POS_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_ACTL_POS_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_ACTL_POS_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_ACTL_POS_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_ACTL_POS_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_ACTL_POS_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_ACTL_POS_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_ACTL_POS_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_actl_pos_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_ACTL_POS_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_actl_pos.response, id 0x37 (section Host commands): Read actual position.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
-#define MC1231A_GET_ACTL_POS_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_ACTL_POS_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_ACTL_POS_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_ACTL_POS_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_ACTL_POS_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_ACTL_POS_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_ACTL_POS_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_ACTL_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_actl_pos_response {
     int32_t value; /* Actual position; in counts */
 } mc1231a_get_actl_pos_response_t;
 
-#define MC1231A_GET_ACTL_POS_RESPONSE_INIT { 0l }
+#define MC1231A_GET_ACTL_POS_RESPONSE_INIT { 0L }
 
 static inline int mc1231a_get_actl_pos_response_encode(
     const mc1231a_get_actl_pos_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, (uint32_t)message->value);
@@ -5831,7 +5759,7 @@ static inline int mc1231a_get_actl_pos_response_encode(
 static inline int mc1231a_get_actl_pos_response_decode(
     mc1231a_get_actl_pos_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = (int32_t)mc1231a_get_u32_be_(payload);
@@ -5852,7 +5780,7 @@ static inline int mc1231a_get_actl_pos_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_actl_pos_response_decode(message, wire, size - 2u);
+    return mc1231a_get_actl_pos_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_lmt_sense.request, id 0x66 (section Host commands): Set active level of limit inputs.
@@ -5860,22 +5788,22 @@ static inline int mc1231a_get_actl_pos_response_from_frame(
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_LMT_SENSE_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_LMT_SENSE_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_LMT_SENSE_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_LMT_SENSE_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_LMT_SENSE_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_LMT_SENSE_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_LMT_SENSE_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_LMT_SENSE_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_lmt_sense_request {
     /* Active level of each limit input, laid out as in get_lmt_swtch, as inferred; flags limit_switches */
     uint16_t value;
 } mc1231a_set_lmt_sense_request_t;
 
-#define MC1231A_SET_LMT_SENSE_REQUEST_INIT { 0u }
+#define MC1231A_SET_LMT_SENSE_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_lmt_sense_request_encode(
     const mc1231a_set_lmt_sense_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -5885,7 +5813,7 @@ static inline int mc1231a_set_lmt_sense_request_encode(
 static inline int mc1231a_set_lmt_sense_request_decode(
     mc1231a_set_lmt_sense_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -5895,27 +5823,27 @@ static inline int mc1231a_set_lmt_sense_request_decode(
 static inline int mc1231a_set_lmt_sense_request_to_frame(
     const mc1231a_set_lmt_sense_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_LMT_SENSE_REQUEST_ID;
-    size = mc1231a_set_lmt_sense_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_lmt_sense_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_lmt_sense.response, id 0x66 (section Host commands): Set active level of limit inputs.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_LMT_SENSE_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_LMT_SENSE_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_LMT_SENSE_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_LMT_SENSE_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_LMT_SENSE_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_LMT_SENSE_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_lmt_sense_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_lmt_sense_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -5924,44 +5852,43 @@ static inline int mc1231a_set_lmt_sense_response_from_frame(uint16_t request_sum
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_lmt_swtch.request, id 0x67 (section Host commands): Read limit inputs of every axis. */
-#define MC1231A_GET_LMT_SWTCH_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_LMT_SWTCH_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_LMT_SWTCH_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_LMT_SWTCH_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_LMT_SWTCH_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_LMT_SWTCH_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_LMT_SWTCH_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_LMT_SWTCH_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_lmt_swtch_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_LMT_SWTCH_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_lmt_swtch.response, id 0x67 (section Host commands): Read limit inputs of every axis.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_lmt_swtch_response {
     uint16_t value; /* Limit inputs; 1 is set; flags limit_switches */
 } mc1231a_get_lmt_swtch_response_t;
 
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_INIT { 0u }
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_lmt_swtch_response_encode(
     const mc1231a_get_lmt_swtch_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -5971,7 +5898,7 @@ static inline int mc1231a_get_lmt_swtch_response_encode(
 static inline int mc1231a_get_lmt_swtch_response_decode(
     mc1231a_get_lmt_swtch_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -5992,39 +5919,37 @@ static inline int mc1231a_get_lmt_swtch_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_lmt_swtch_response_decode(message, wire, size - 2u);
+    return mc1231a_get_lmt_swtch_response_decode(message, wire, size - 2U);
 }
 
 /* ---- lmts_on.request, id 0x70 (section Host commands): Enable limit-switch handling.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_LMTS_ON_REQUEST_MIN_SIZE 0u
-#define MC1231A_LMTS_ON_REQUEST_MAX_SIZE 0u
-#define MC1231A_LMTS_ON_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_LMTS_ON_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_LMTS_ON_REQUEST_MIN_SIZE 0U
+#define MC1231A_LMTS_ON_REQUEST_MAX_SIZE 0U
+#define MC1231A_LMTS_ON_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_LMTS_ON_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_lmts_on_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_LMTS_ON_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- lmts_on.response, id 0x70 (section Host commands): Enable limit-switch handling.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_LMTS_ON_RESPONSE_MIN_SIZE 0u
-#define MC1231A_LMTS_ON_RESPONSE_MAX_SIZE 0u
-#define MC1231A_LMTS_ON_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_LMTS_ON_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_LMTS_ON_RESPONSE_MIN_SIZE 0U
+#define MC1231A_LMTS_ON_RESPONSE_MAX_SIZE 0U
+#define MC1231A_LMTS_ON_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_LMTS_ON_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_lmts_on_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_lmts_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6033,39 +5958,37 @@ static inline int mc1231a_lmts_on_response_from_frame(uint16_t request_sum, cons
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- lmts_off.request, id 0x71 (section Host commands): Disable limit-switch handling.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_LMTS_OFF_REQUEST_MIN_SIZE 0u
-#define MC1231A_LMTS_OFF_REQUEST_MAX_SIZE 0u
-#define MC1231A_LMTS_OFF_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_LMTS_OFF_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_LMTS_OFF_REQUEST_MIN_SIZE 0U
+#define MC1231A_LMTS_OFF_REQUEST_MAX_SIZE 0U
+#define MC1231A_LMTS_OFF_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_LMTS_OFF_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_lmts_off_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_LMTS_OFF_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- lmts_off.response, id 0x71 (section Host commands): Disable limit-switch handling.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE 0u
-#define MC1231A_LMTS_OFF_RESPONSE_MAX_SIZE 0u
-#define MC1231A_LMTS_OFF_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_LMTS_OFF_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE 0U
+#define MC1231A_LMTS_OFF_RESPONSE_MAX_SIZE 0U
+#define MC1231A_LMTS_OFF_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_LMTS_OFF_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_lmts_off_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_lmts_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6074,25 +5997,24 @@ static inline int mc1231a_lmts_off_response_from_frame(uint16_t request_sum, con
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_home.request, id 0x05 (section Host commands): Read home inputs.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_HOME_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_HOME_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_HOME_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_HOME_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_HOME_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_HOME_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_HOME_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_HOME_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_home_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_HOME_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_home.response, id 0x05 (section Host commands): Read home inputs.
@@ -6100,21 +6022,21 @@ static inline int mc1231a_get_home_request_to_frame(uint8_t *wire, size_t capaci
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_HOME_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_HOME_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_HOME_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_HOME_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_HOME_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_HOME_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_HOME_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_HOME_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_home_response {
     uint16_t value; /* One bit for each axis, as inferred */
 } mc1231a_get_home_response_t;
 
-#define MC1231A_GET_HOME_RESPONSE_INIT { 0u }
+#define MC1231A_GET_HOME_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_home_response_encode(
     const mc1231a_get_home_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6124,7 +6046,7 @@ static inline int mc1231a_get_home_response_encode(
 static inline int mc1231a_get_home_response_decode(
     mc1231a_get_home_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6145,7 +6067,7 @@ static inline int mc1231a_get_home_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_home_response_decode(message, wire, size - 2u);
+    return mc1231a_get_home_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_smpl_time.request, id 0x38 (section Host commands): Set servo loop time.
@@ -6153,21 +6075,21 @@ static inline int mc1231a_get_home_response_from_frame(
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_SMPL_TIME_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_SMPL_TIME_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_SMPL_TIME_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_SMPL_TIME_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_SMPL_TIME_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_SMPL_TIME_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_SMPL_TIME_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_SMPL_TIME_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_smpl_time_request {
     uint16_t value; /* Servo loop time; its unit was not found */
 } mc1231a_set_smpl_time_request_t;
 
-#define MC1231A_SET_SMPL_TIME_REQUEST_INIT { 0u }
+#define MC1231A_SET_SMPL_TIME_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_smpl_time_request_encode(
     const mc1231a_set_smpl_time_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6177,7 +6099,7 @@ static inline int mc1231a_set_smpl_time_request_encode(
 static inline int mc1231a_set_smpl_time_request_decode(
     mc1231a_set_smpl_time_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6187,27 +6109,27 @@ static inline int mc1231a_set_smpl_time_request_decode(
 static inline int mc1231a_set_smpl_time_request_to_frame(
     const mc1231a_set_smpl_time_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_SMPL_TIME_REQUEST_ID;
-    size = mc1231a_set_smpl_time_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_smpl_time_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_smpl_time.response, id 0x38 (section Host commands): Set servo loop time.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_SMPL_TIME_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_SMPL_TIME_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_SMPL_TIME_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_SMPL_TIME_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_SMPL_TIME_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_SMPL_TIME_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_smpl_time_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_smpl_time_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6216,25 +6138,24 @@ static inline int mc1231a_set_smpl_time_response_from_frame(uint16_t request_sum
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_smpl_time.request, id 0x61 (section Host commands): Read servo loop time.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_SMPL_TIME_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_SMPL_TIME_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_SMPL_TIME_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_SMPL_TIME_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_SMPL_TIME_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_SMPL_TIME_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_SMPL_TIME_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_SMPL_TIME_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_smpl_time_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_SMPL_TIME_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_smpl_time.response, id 0x61 (section Host commands): Read servo loop time.
@@ -6242,21 +6163,21 @@ static inline int mc1231a_get_smpl_time_request_to_frame(uint8_t *wire, size_t c
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_SMPL_TIME_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_SMPL_TIME_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_smpl_time_response {
     uint16_t value; /* Servo loop time; its unit was not found */
 } mc1231a_get_smpl_time_response_t;
 
-#define MC1231A_GET_SMPL_TIME_RESPONSE_INIT { 0u }
+#define MC1231A_GET_SMPL_TIME_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_smpl_time_response_encode(
     const mc1231a_get_smpl_time_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6266,7 +6187,7 @@ static inline int mc1231a_get_smpl_time_response_encode(
 static inline int mc1231a_get_smpl_time_response_decode(
     mc1231a_get_smpl_time_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6287,35 +6208,33 @@ static inline int mc1231a_get_smpl_time_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_smpl_time_response_decode(message, wire, size - 2u);
+    return mc1231a_get_smpl_time_response_decode(message, wire, size - 2U);
 }
 
 /* ---- reset.request, id 0x39 (section Host commands): Reset the chipset. */
-#define MC1231A_RESET_REQUEST_MIN_SIZE 0u
-#define MC1231A_RESET_REQUEST_MAX_SIZE 0u
-#define MC1231A_RESET_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_RESET_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_RESET_REQUEST_MIN_SIZE 0U
+#define MC1231A_RESET_REQUEST_MAX_SIZE 0U
+#define MC1231A_RESET_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_RESET_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_reset_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_RESET_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- reset.response, id 0x39 (section Host commands): Reset the chipset. */
-#define MC1231A_RESET_RESPONSE_MIN_SIZE 0u
-#define MC1231A_RESET_RESPONSE_MAX_SIZE 0u
-#define MC1231A_RESET_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_RESET_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_RESET_RESPONSE_MIN_SIZE 0U
+#define MC1231A_RESET_RESPONSE_MAX_SIZE 0U
+#define MC1231A_RESET_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_RESET_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_reset_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_reset_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6324,25 +6243,24 @@ static inline int mc1231a_reset_response_from_frame(uint16_t request_sum, const 
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_vrsn.request, id 0x6C (section Host commands): Read product and software version.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_VRSN_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_VRSN_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_VRSN_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_VRSN_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_VRSN_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_VRSN_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_VRSN_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_VRSN_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_vrsn_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_VRSN_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_vrsn.response, id 0x6C (section Host commands): Read product and software version.
@@ -6350,21 +6268,21 @@ static inline int mc1231a_get_vrsn_request_to_frame(uint8_t *wire, size_t capaci
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_VRSN_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_VRSN_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_VRSN_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_VRSN_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_VRSN_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_VRSN_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_VRSN_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_VRSN_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_vrsn_response {
     uint16_t value; /* Packed version; its layout was not found */
 } mc1231a_get_vrsn_response_t;
 
-#define MC1231A_GET_VRSN_RESPONSE_INIT { 0u }
+#define MC1231A_GET_VRSN_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_vrsn_response_encode(
     const mc1231a_get_vrsn_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6374,7 +6292,7 @@ static inline int mc1231a_get_vrsn_response_encode(
 static inline int mc1231a_get_vrsn_response_decode(
     mc1231a_get_vrsn_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6395,25 +6313,24 @@ static inline int mc1231a_get_vrsn_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_vrsn_response_decode(message, wire, size - 2u);
+    return mc1231a_get_vrsn_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_time.request, id 0x3E (section Host commands): Read cycle counter since reset.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_TIME_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_TIME_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_TIME_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_TIME_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_TIME_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_TIME_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_TIME_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_TIME_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_time_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_TIME_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_time.response, id 0x3E (section Host commands): Read cycle counter since reset.
@@ -6421,21 +6338,21 @@ static inline int mc1231a_get_time_request_to_frame(uint8_t *wire, size_t capaci
  * Payload, 4 bytes:
  *      0  u32 be  value
  */
-#define MC1231A_GET_TIME_RESPONSE_MIN_SIZE 4u
-#define MC1231A_GET_TIME_RESPONSE_MAX_SIZE 4u
-#define MC1231A_GET_TIME_RESPONSE_MAX_FRAME_SIZE 6u
-#define MC1231A_GET_TIME_RESPONSE_MAX_WIRE_SIZE 6u
+#define MC1231A_GET_TIME_RESPONSE_MIN_SIZE 4U
+#define MC1231A_GET_TIME_RESPONSE_MAX_SIZE 4U
+#define MC1231A_GET_TIME_RESPONSE_MAX_FRAME_SIZE 6U
+#define MC1231A_GET_TIME_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_time_response {
     uint32_t value; /* Cycle counter since reset; in cycles */
 } mc1231a_get_time_response_t;
 
-#define MC1231A_GET_TIME_RESPONSE_INIT { 0ul }
+#define MC1231A_GET_TIME_RESPONSE_INIT { 0UL }
 
 static inline int mc1231a_get_time_response_encode(
     const mc1231a_get_time_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u32_be_(payload, message->value);
@@ -6445,7 +6362,7 @@ static inline int mc1231a_get_time_response_encode(
 static inline int mc1231a_get_time_response_decode(
     mc1231a_get_time_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u32_be_(payload);
@@ -6466,7 +6383,7 @@ static inline int mc1231a_get_time_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_time_response_decode(message, wire, size - 2u);
+    return mc1231a_get_time_response_decode(message, wire, size - 2U);
 }
 
 /* ---- set_phase_cnts.request, id 0x75 (section Host commands): Set counts per electrical cycle.
@@ -6474,24 +6391,24 @@ static inline int mc1231a_get_time_response_from_frame(
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_PHASE_CNTS_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_PHASE_CNTS_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_PHASE_CNTS_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_PHASE_CNTS_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_PHASE_CNTS_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_PHASE_CNTS_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_PHASE_CNTS_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_PHASE_CNTS_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_phase_cnts_request {
     uint16_t value; /* Encoder counts of an electrical cycle; in counts; 129..65535 */
 } mc1231a_set_phase_cnts_request_t;
 
-#define MC1231A_SET_PHASE_CNTS_REQUEST_INIT { 129u }
+#define MC1231A_SET_PHASE_CNTS_REQUEST_INIT { 129U }
 
 static inline int mc1231a_set_phase_cnts_request_encode(
     const mc1231a_set_phase_cnts_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < 129u) {
+    if (message->value < 129U) {
         return MC1231A_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6501,11 +6418,11 @@ static inline int mc1231a_set_phase_cnts_request_encode(
 static inline int mc1231a_set_phase_cnts_request_decode(
     mc1231a_set_phase_cnts_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
-    if (message->value < 129u) {
+    if (message->value < 129U) {
         return MC1231A_ERROR_RANGE;
     }
     return MC1231A_OK;
@@ -6514,27 +6431,27 @@ static inline int mc1231a_set_phase_cnts_request_decode(
 static inline int mc1231a_set_phase_cnts_request_to_frame(
     const mc1231a_set_phase_cnts_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PHASE_CNTS_REQUEST_ID;
-    size = mc1231a_set_phase_cnts_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_phase_cnts_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_phase_cnts.response, id 0x75 (section Host commands): Set counts per electrical cycle.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PHASE_CNTS_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PHASE_CNTS_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PHASE_CNTS_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PHASE_CNTS_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PHASE_CNTS_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PHASE_CNTS_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_phase_cnts_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_phase_cnts_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6543,7 +6460,7 @@ static inline int mc1231a_set_phase_cnts_response_from_frame(uint16_t request_su
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_phase_offset.request, id 0x76 (section Host commands): Set the phase offset from the index
@@ -6552,21 +6469,21 @@ static inline int mc1231a_set_phase_cnts_response_from_frame(uint16_t request_su
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_PHASE_OFFSET_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_PHASE_OFFSET_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_PHASE_OFFSET_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_PHASE_OFFSET_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_PHASE_OFFSET_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_PHASE_OFFSET_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_PHASE_OFFSET_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_PHASE_OFFSET_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_phase_offset_request {
     uint16_t value; /* Phase offset from the index pulse; in counts */
 } mc1231a_set_phase_offset_request_t;
 
-#define MC1231A_SET_PHASE_OFFSET_REQUEST_INIT { 0u }
+#define MC1231A_SET_PHASE_OFFSET_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_phase_offset_request_encode(
     const mc1231a_set_phase_offset_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6576,7 +6493,7 @@ static inline int mc1231a_set_phase_offset_request_encode(
 static inline int mc1231a_set_phase_offset_request_decode(
     mc1231a_set_phase_offset_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6586,28 +6503,28 @@ static inline int mc1231a_set_phase_offset_request_decode(
 static inline int mc1231a_set_phase_offset_request_to_frame(
     const mc1231a_set_phase_offset_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PHASE_OFFSET_REQUEST_ID;
-    size = mc1231a_set_phase_offset_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_phase_offset_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_phase_offset.response, id 0x76 (section Host commands): Set the phase offset from the index
  * pulse.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PHASE_OFFSET_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_phase_offset_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_phase_offset_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6616,7 +6533,7 @@ static inline int mc1231a_set_phase_offset_response_from_frame(uint16_t request_
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_phase_time.request, id 0x72 (section Host commands): Set duration of algorithmic phase
@@ -6625,21 +6542,21 @@ static inline int mc1231a_set_phase_offset_response_from_frame(uint16_t request_
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_PHASE_TIME_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_PHASE_TIME_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_PHASE_TIME_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_PHASE_TIME_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_PHASE_TIME_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_PHASE_TIME_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_PHASE_TIME_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_PHASE_TIME_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_phase_time_request {
     uint16_t value; /* Duration of algorithmic phase initialisation; in samples */
 } mc1231a_set_phase_time_request_t;
 
-#define MC1231A_SET_PHASE_TIME_REQUEST_INIT { 0u }
+#define MC1231A_SET_PHASE_TIME_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_phase_time_request_encode(
     const mc1231a_set_phase_time_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6649,7 +6566,7 @@ static inline int mc1231a_set_phase_time_request_encode(
 static inline int mc1231a_set_phase_time_request_decode(
     mc1231a_set_phase_time_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6659,28 +6576,28 @@ static inline int mc1231a_set_phase_time_request_decode(
 static inline int mc1231a_set_phase_time_request_to_frame(
     const mc1231a_set_phase_time_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PHASE_TIME_REQUEST_ID;
-    size = mc1231a_set_phase_time_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_phase_time_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_phase_time.response, id 0x72 (section Host commands): Set duration of algorithmic phase
  * initialisation.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PHASE_TIME_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PHASE_TIME_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PHASE_TIME_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PHASE_TIME_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PHASE_TIME_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PHASE_TIME_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_phase_time_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6689,7 +6606,7 @@ static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_su
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- set_phase.request, id 0x84 (section Host commands): Set phase angle directly.
@@ -6697,21 +6614,21 @@ static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_su
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_SET_PHASE_REQUEST_MIN_SIZE 2u
-#define MC1231A_SET_PHASE_REQUEST_MAX_SIZE 2u
-#define MC1231A_SET_PHASE_REQUEST_MAX_FRAME_SIZE 3u
-#define MC1231A_SET_PHASE_REQUEST_MAX_WIRE_SIZE 3u
+#define MC1231A_SET_PHASE_REQUEST_MIN_SIZE 2U
+#define MC1231A_SET_PHASE_REQUEST_MAX_SIZE 2U
+#define MC1231A_SET_PHASE_REQUEST_MAX_FRAME_SIZE 3U
+#define MC1231A_SET_PHASE_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_phase_request {
     uint16_t value; /* Phase angle; encoder counts assumed; in counts */
 } mc1231a_set_phase_request_t;
 
-#define MC1231A_SET_PHASE_REQUEST_INIT { 0u }
+#define MC1231A_SET_PHASE_REQUEST_INIT { 0U }
 
 static inline int mc1231a_set_phase_request_encode(
     const mc1231a_set_phase_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6721,7 +6638,7 @@ static inline int mc1231a_set_phase_request_encode(
 static inline int mc1231a_set_phase_request_decode(
     mc1231a_set_phase_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6731,27 +6648,27 @@ static inline int mc1231a_set_phase_request_decode(
 static inline int mc1231a_set_phase_request_to_frame(
     const mc1231a_set_phase_request_t *message, uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    int size;
+
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_SET_PHASE_REQUEST_ID;
-    size = mc1231a_set_phase_request_encode(message, wire + 1, capacity - 1u);
-    return (size < 0) ? size : size + 1;
+    size = mc1231a_set_phase_request_encode(message, &wire[1], capacity - 1U);
+    return (size < 0) ? size : (size + 1);
 }
 
 /* ---- set_phase.response, id 0x84 (section Host commands): Set phase angle directly.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_SET_PHASE_RESPONSE_MIN_SIZE 0u
-#define MC1231A_SET_PHASE_RESPONSE_MAX_SIZE 0u
-#define MC1231A_SET_PHASE_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_SET_PHASE_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_SET_PHASE_RESPONSE_MIN_SIZE 0U
+#define MC1231A_SET_PHASE_RESPONSE_MAX_SIZE 0U
+#define MC1231A_SET_PHASE_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_SET_PHASE_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_set_phase_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_set_phase_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6760,41 +6677,39 @@ static inline int mc1231a_set_phase_response_from_frame(uint16_t request_sum, co
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- init_phase.request, id 0x7A (section Host commands): Start phase initialisation (algorithmic or
  * Hall).
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_INIT_PHASE_REQUEST_MIN_SIZE 0u
-#define MC1231A_INIT_PHASE_REQUEST_MAX_SIZE 0u
-#define MC1231A_INIT_PHASE_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_INIT_PHASE_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_INIT_PHASE_REQUEST_MIN_SIZE 0U
+#define MC1231A_INIT_PHASE_REQUEST_MAX_SIZE 0U
+#define MC1231A_INIT_PHASE_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_INIT_PHASE_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_init_phase_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_INIT_PHASE_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- init_phase.response, id 0x7A (section Host commands): Start phase initialisation (algorithmic or
  * Hall).
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE 0u
-#define MC1231A_INIT_PHASE_RESPONSE_MAX_SIZE 0u
-#define MC1231A_INIT_PHASE_RESPONSE_MAX_FRAME_SIZE 2u
-#define MC1231A_INIT_PHASE_RESPONSE_MAX_WIRE_SIZE 2u
+#define MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE 0U
+#define MC1231A_INIT_PHASE_RESPONSE_MAX_SIZE 0U
+#define MC1231A_INIT_PHASE_RESPONSE_MAX_FRAME_SIZE 2U
+#define MC1231A_INIT_PHASE_RESPONSE_MAX_WIRE_SIZE 2U
 
 static inline int mc1231a_init_phase_response_to_frame(uint16_t request_sum, uint8_t *wire, size_t capacity)
 {
-    const int size = 0;
-    return (size < 0) ? size : mc1231a_close_(request_sum, (size_t)size, wire, capacity);
+    return mc1231a_close_(request_sum, 0U, wire, capacity);
 }
 
 static inline int mc1231a_init_phase_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
@@ -6803,44 +6718,43 @@ static inline int mc1231a_init_phase_response_from_frame(uint16_t request_sum, c
     if (status != MC1231A_OK) {
         return status;
     }
-    return (size - 2u == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
 }
 
 /* ---- get_phase_info.request, id 0x7F (section Host commands): Read commutation flags. */
-#define MC1231A_GET_PHASE_INFO_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_PHASE_INFO_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_PHASE_INFO_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_PHASE_INFO_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_PHASE_INFO_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_PHASE_INFO_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_PHASE_INFO_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_PHASE_INFO_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_phase_info_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_PHASE_INFO_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_phase_info.response, id 0x7F (section Host commands): Read commutation flags.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_PHASE_INFO_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_PHASE_INFO_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_phase_info_response {
     uint16_t value; /* Commutation flags; their layout was not found; not confirmed */
 } mc1231a_get_phase_info_response_t;
 
-#define MC1231A_GET_PHASE_INFO_RESPONSE_INIT { 0u }
+#define MC1231A_GET_PHASE_INFO_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_phase_info_response_encode(
     const mc1231a_get_phase_info_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6850,7 +6764,7 @@ static inline int mc1231a_get_phase_info_response_encode(
 static inline int mc1231a_get_phase_info_response_decode(
     mc1231a_get_phase_info_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6871,44 +6785,43 @@ static inline int mc1231a_get_phase_info_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_phase_info_response_decode(message, wire, size - 2u);
+    return mc1231a_get_phase_info_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_phase_cnts.request, id 0x7D (section Host commands): Read back counts per electrical cycle. */
-#define MC1231A_GET_PHASE_CNTS_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_PHASE_CNTS_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_PHASE_CNTS_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_PHASE_CNTS_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_PHASE_CNTS_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_PHASE_CNTS_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_PHASE_CNTS_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_PHASE_CNTS_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_phase_cnts_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_PHASE_CNTS_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_phase_cnts.response, id 0x7D (section Host commands): Read back counts per electrical cycle.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_PHASE_CNTS_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_PHASE_CNTS_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_PHASE_CNTS_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_PHASE_CNTS_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_PHASE_CNTS_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_PHASE_CNTS_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_PHASE_CNTS_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_PHASE_CNTS_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_phase_cnts_response {
     uint16_t value; /* Encoder counts of an electrical cycle; in counts */
 } mc1231a_get_phase_cnts_response_t;
 
-#define MC1231A_GET_PHASE_CNTS_RESPONSE_INIT { 0u }
+#define MC1231A_GET_PHASE_CNTS_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_phase_cnts_response_encode(
     const mc1231a_get_phase_cnts_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6918,7 +6831,7 @@ static inline int mc1231a_get_phase_cnts_response_encode(
 static inline int mc1231a_get_phase_cnts_response_decode(
     mc1231a_get_phase_cnts_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -6939,44 +6852,43 @@ static inline int mc1231a_get_phase_cnts_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_phase_cnts_response_decode(message, wire, size - 2u);
+    return mc1231a_get_phase_cnts_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_phase_time.request, id 0x7C (section Host commands): Read back initialisation duration. */
-#define MC1231A_GET_PHASE_TIME_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_PHASE_TIME_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_PHASE_TIME_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_PHASE_TIME_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_PHASE_TIME_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_PHASE_TIME_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_PHASE_TIME_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_PHASE_TIME_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_phase_time_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_PHASE_TIME_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_phase_time.response, id 0x7C (section Host commands): Read back initialisation duration.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_PHASE_TIME_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_PHASE_TIME_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_phase_time_response {
     uint16_t value; /* Initialisation duration; in samples */
 } mc1231a_get_phase_time_response_t;
 
-#define MC1231A_GET_PHASE_TIME_RESPONSE_INIT { 0u }
+#define MC1231A_GET_PHASE_TIME_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_phase_time_response_encode(
     const mc1231a_get_phase_time_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -6986,7 +6898,7 @@ static inline int mc1231a_get_phase_time_response_encode(
 static inline int mc1231a_get_phase_time_response_decode(
     mc1231a_get_phase_time_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -7007,25 +6919,24 @@ static inline int mc1231a_get_phase_time_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_phase_time_response_decode(message, wire, size - 2u);
+    return mc1231a_get_phase_time_response_decode(message, wire, size - 2U);
 }
 
 /* ---- get_phase_offset.request, id 0x7B (section Host commands): Read back phase offset.
  * NOT CONFIRMED: its source is weak; check it at the device.
  */
-#define MC1231A_GET_PHASE_OFFSET_REQUEST_MIN_SIZE 0u
-#define MC1231A_GET_PHASE_OFFSET_REQUEST_MAX_SIZE 0u
-#define MC1231A_GET_PHASE_OFFSET_REQUEST_MAX_FRAME_SIZE 1u
-#define MC1231A_GET_PHASE_OFFSET_REQUEST_MAX_WIRE_SIZE 1u
+#define MC1231A_GET_PHASE_OFFSET_REQUEST_MIN_SIZE 0U
+#define MC1231A_GET_PHASE_OFFSET_REQUEST_MAX_SIZE 0U
+#define MC1231A_GET_PHASE_OFFSET_REQUEST_MAX_FRAME_SIZE 1U
+#define MC1231A_GET_PHASE_OFFSET_REQUEST_MAX_WIRE_SIZE 1U
 
 static inline int mc1231a_get_phase_offset_request_to_frame(uint8_t *wire, size_t capacity)
 {
-    int size = 0;
-    if (capacity == 0u) {
+    if (capacity == 0U) {
         return MC1231A_ERROR_CAPACITY;
     }
     wire[0] = MC1231A_GET_PHASE_OFFSET_REQUEST_ID;
-    return (size < 0) ? size : size + 1;
+    return 1;
 }
 
 /* ---- get_phase_offset.response, id 0x7B (section Host commands): Read back phase offset.
@@ -7033,21 +6944,21 @@ static inline int mc1231a_get_phase_offset_request_to_frame(uint8_t *wire, size_
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MIN_SIZE 2u
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_SIZE 2u
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_FRAME_SIZE 4u
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_WIRE_SIZE 4u
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MIN_SIZE 2U
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_SIZE 2U
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_FRAME_SIZE 4U
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_phase_offset_response {
     uint16_t value; /* Phase offset; in counts */
 } mc1231a_get_phase_offset_response_t;
 
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT { 0u }
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT { 0U }
 
 static inline int mc1231a_get_phase_offset_response_encode(
     const mc1231a_get_phase_offset_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return MC1231A_ERROR_CAPACITY;
     }
     mc1231a_put_u16_be_(payload, message->value);
@@ -7057,7 +6968,7 @@ static inline int mc1231a_get_phase_offset_response_encode(
 static inline int mc1231a_get_phase_offset_response_decode(
     mc1231a_get_phase_offset_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return MC1231A_ERROR_LENGTH;
     }
     message->value = mc1231a_get_u16_be_(payload);
@@ -7078,7 +6989,7 @@ static inline int mc1231a_get_phase_offset_response_from_frame(
     if (status != MC1231A_OK) {
         return status;
     }
-    return mc1231a_get_phase_offset_response_decode(message, wire, size - 2u);
+    return mc1231a_get_phase_offset_response_decode(message, wire, size - 2U);
 }
 
 /* What a request carries is right: id, address, size, ranges. */
@@ -7089,31 +7000,31 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
 
     switch (frame->id) {
     case MC1231A_SET_1_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_2_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_I_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PRFL_S_CRV_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PRFL_TRAP_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PRFL_VEL_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PRFL_GEAR_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_POS_REQUEST_ID: {
@@ -7147,47 +7058,47 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_STOP_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SMOOTH_STOP_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SYNCH_PRFL_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_POS_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_VEL_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_ACC_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_MAX_ACC_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_JERK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_RATIO_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_TRGT_POS_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_TRGT_VEL_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_KP_REQUEST_ID: {
@@ -7231,83 +7142,83 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_KP_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_KD_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_KI_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_KVFF_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_I_LM_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_MTR_LMT_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_MTR_BIAS_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_POS_ERR_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_INTGR_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_ACTL_POS_ERR_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_AUTO_STOP_ON_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_AUTO_STOP_OFF_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_TIME_BRK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_POS_BRK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_NEG_BRK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_ACTL_POS_BRK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_ACTL_NEG_BRK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_MTN_CMPLT_BRK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_EXT_BRK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_BRK_OFF_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_BRK_PNT_REQUEST_ID: {
@@ -7316,7 +7227,7 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_UPDATE_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_MULTI_UPDATE_REQUEST_ID: {
@@ -7325,15 +7236,15 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_AUTO_UPDATE_ON_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_BRK_PNT_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_INTRPT_MASK_REQUEST_ID: {
@@ -7342,7 +7253,7 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_INTRPT_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_RST_INTRPT_REQUEST_ID: {
@@ -7351,11 +7262,11 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_INTRPT_MASK_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_CLR_STATUS_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_RST_STATUS_REQUEST_ID: {
@@ -7364,39 +7275,39 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_STATUS_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_MODE_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_CAPT_INDEX_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_CAPT_HOME_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_CAPT_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_OUTPUT_PWM_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_OUTPUT_DAC16_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_MTR_ON_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_MTR_OFF_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_MTR_CMD_REQUEST_ID: {
@@ -7405,7 +7316,7 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_MTR_CMD_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_BUF_MTR_CMD_REQUEST_ID: {
@@ -7414,19 +7325,19 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_BUF_MTR_CMD_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_OUTPUT_MODE_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_AXIS_ON_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_AXIS_OFF_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_ACTL_POS_REQUEST_ID: {
@@ -7435,7 +7346,7 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_ACTL_POS_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_LMT_SENSE_REQUEST_ID: {
@@ -7444,19 +7355,19 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_LMT_SWTCH_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_LMTS_ON_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_LMTS_OFF_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_HOME_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_SMPL_TIME_REQUEST_ID: {
@@ -7465,19 +7376,19 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_GET_SMPL_TIME_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_RESET_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_VRSN_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_TIME_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PHASE_CNTS_REQUEST_ID: {
@@ -7501,30 +7412,30 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_INIT_PHASE_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_PHASE_INFO_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_PHASE_CNTS_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_PHASE_TIME_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_PHASE_OFFSET_REQUEST_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     default:
         status = MC1231A_ERROR_UNKNOWN;
         break;
     }
-    return (status == MC1231A_OK && !allowed) ? MC1231A_ERROR_RANGE : status;
+    return ((status == MC1231A_OK) && !allowed) ? MC1231A_ERROR_RANGE : status;
 }
 
 /* What a response carries is right: id, address, size, ranges. */
@@ -7550,55 +7461,55 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_PRFL_S_CRV_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PRFL_TRAP_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PRFL_VEL_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PRFL_GEAR_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_POS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_VEL_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_ACC_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_MAX_ACC_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_JERK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_RATIO_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_STOP_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SMOOTH_STOP_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SYNCH_PRFL_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_POS_RESPONSE_ID: {
@@ -7642,35 +7553,35 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_KP_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_KD_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_KI_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_KVFF_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_I_LM_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_MTR_LMT_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_MTR_BIAS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_POS_ERR_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_KP_RESPONSE_ID: {
@@ -7724,63 +7635,63 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_AUTO_STOP_ON_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_AUTO_STOP_OFF_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_TIME_BRK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_POS_BRK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_NEG_BRK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_ACTL_POS_BRK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_ACTL_NEG_BRK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_EXT_BRK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_BRK_OFF_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_BRK_PNT_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_UPDATE_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_MULTI_UPDATE_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_BRK_PNT_RESPONSE_ID: {
@@ -7789,7 +7700,7 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_INTRPT_MASK_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_INTRPT_RESPONSE_ID: {
@@ -7798,7 +7709,7 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_RST_INTRPT_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_INTRPT_MASK_RESPONSE_ID: {
@@ -7807,11 +7718,11 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_CLR_STATUS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_RST_STATUS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_STATUS_RESPONSE_ID: {
@@ -7825,11 +7736,11 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_CAPT_INDEX_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_CAPT_HOME_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_CAPT_RESPONSE_ID: {
@@ -7838,23 +7749,23 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_OUTPUT_PWM_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_OUTPUT_DAC16_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_MTR_ON_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_MTR_OFF_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_MTR_CMD_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_MTR_CMD_RESPONSE_ID: {
@@ -7863,7 +7774,7 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_BUF_MTR_CMD_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_BUF_MTR_CMD_RESPONSE_ID: {
@@ -7877,15 +7788,15 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_AXIS_ON_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_AXIS_OFF_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_ACTL_POS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_ACTL_POS_RESPONSE_ID: {
@@ -7894,7 +7805,7 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_LMT_SENSE_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_LMT_SWTCH_RESPONSE_ID: {
@@ -7903,11 +7814,11 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_LMTS_ON_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_LMTS_OFF_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_HOME_RESPONSE_ID: {
@@ -7916,7 +7827,7 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_SMPL_TIME_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_SMPL_TIME_RESPONSE_ID: {
@@ -7925,7 +7836,7 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_RESET_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_VRSN_RESPONSE_ID: {
@@ -7939,23 +7850,23 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         break;
     }
     case MC1231A_SET_PHASE_CNTS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PHASE_OFFSET_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PHASE_TIME_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_SET_PHASE_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_INIT_PHASE_RESPONSE_ID: {
-        status = (frame->size == 0u) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+        status = (frame->size == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
         break;
     }
     case MC1231A_GET_PHASE_INFO_RESPONSE_ID: {
@@ -7982,7 +7893,7 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
         status = MC1231A_ERROR_UNKNOWN;
         break;
     }
-    return (status == MC1231A_OK && !allowed) ? MC1231A_ERROR_RANGE : status;
+    return ((status == MC1231A_OK) && !allowed) ? MC1231A_ERROR_RANGE : status;
 }
 
 /* ---- Receiver of requests: one byte at a time, each in constant time, so that it can run in an interrupt ----
@@ -7999,9 +7910,9 @@ typedef struct mc1231a_receiver {
 
 static inline void mc1231a_receiver_init(mc1231a_receiver_t *receiver)
 {
-    receiver->id = 0u;
-    receiver->count = 0u;
-    receiver->expected = 0u;
+    receiver->id = 0U;
+    receiver->count = 0U;
+    receiver->expected = 0U;
     receiver->inside = false;
 }
 
@@ -8027,7 +7938,7 @@ static inline mc1231a_event_t mc1231a_receive(mc1231a_receiver_t *receiver, uint
             return MC1231A_EVENT_UNKNOWN;
         }
         receiver->id = byte;
-        receiver->count = 0u;
+        receiver->count = 0U;
         receiver->expected = (uint8_t)expected;
     }
     receiver->inside = receiver->count < receiver->expected;
@@ -8043,615 +7954,615 @@ static inline mc1231a_event_t mc1231a_receive(mc1231a_receiver_t *receiver, uint
 #define MC1231A_REPEAT_BY_COUNTER 2 /* yes, with the same number in the field that is named */
 
 /* The slave may take _RESPONSE_BITS bit times and _RESPONSE_US microseconds to answer; this is the sum in microseconds,
- * such as MC1231A_RESPONSE_US(SET_1, 115200ul). A command that is not answered has neither. */
+ * such as MC1231A_RESPONSE_US(SET_1, 115200UL). A command that is not answered has neither. */
 #define MC1231A_RESPONSE_US(command, baud) \
-    (MC1231A_##command##_RESPONSE_US + (MC1231A_##command##_RESPONSE_BITS * 1000000ul + (baud) - 1ul) / (baud))
+    (MC1231A_##command##_RESPONSE_US + (MC1231A_##command##_RESPONSE_BITS * 1000000UL + (baud) - 1UL) / (baud))
 
 #define MC1231A_SET_1_ANSWERED 1
 #define MC1231A_SET_1_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_1_IN_FLIGHT 1
-#define MC1231A_SET_1_RESPONSE_BITS 0ul
-#define MC1231A_SET_1_RESPONSE_US 0ul
+#define MC1231A_SET_1_RESPONSE_BITS 0UL
+#define MC1231A_SET_1_RESPONSE_US 0UL
 
 #define MC1231A_SET_2_ANSWERED 1
 #define MC1231A_SET_2_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_2_IN_FLIGHT 1
-#define MC1231A_SET_2_RESPONSE_BITS 0ul
-#define MC1231A_SET_2_RESPONSE_US 0ul
+#define MC1231A_SET_2_RESPONSE_BITS 0UL
+#define MC1231A_SET_2_RESPONSE_US 0UL
 
 #define MC1231A_SET_I_ANSWERED 1
 #define MC1231A_SET_I_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_I_IN_FLIGHT 1
-#define MC1231A_SET_I_RESPONSE_BITS 0ul
-#define MC1231A_SET_I_RESPONSE_US 0ul
+#define MC1231A_SET_I_RESPONSE_BITS 0UL
+#define MC1231A_SET_I_RESPONSE_US 0UL
 
 #define MC1231A_SET_PRFL_S_CRV_ANSWERED 1
 #define MC1231A_SET_PRFL_S_CRV_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PRFL_S_CRV_IN_FLIGHT 1
-#define MC1231A_SET_PRFL_S_CRV_RESPONSE_BITS 0ul
-#define MC1231A_SET_PRFL_S_CRV_RESPONSE_US 0ul
+#define MC1231A_SET_PRFL_S_CRV_RESPONSE_BITS 0UL
+#define MC1231A_SET_PRFL_S_CRV_RESPONSE_US 0UL
 
 #define MC1231A_SET_PRFL_TRAP_ANSWERED 1
 #define MC1231A_SET_PRFL_TRAP_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PRFL_TRAP_IN_FLIGHT 1
-#define MC1231A_SET_PRFL_TRAP_RESPONSE_BITS 0ul
-#define MC1231A_SET_PRFL_TRAP_RESPONSE_US 0ul
+#define MC1231A_SET_PRFL_TRAP_RESPONSE_BITS 0UL
+#define MC1231A_SET_PRFL_TRAP_RESPONSE_US 0UL
 
 #define MC1231A_SET_PRFL_VEL_ANSWERED 1
 #define MC1231A_SET_PRFL_VEL_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PRFL_VEL_IN_FLIGHT 1
-#define MC1231A_SET_PRFL_VEL_RESPONSE_BITS 0ul
-#define MC1231A_SET_PRFL_VEL_RESPONSE_US 0ul
+#define MC1231A_SET_PRFL_VEL_RESPONSE_BITS 0UL
+#define MC1231A_SET_PRFL_VEL_RESPONSE_US 0UL
 
 #define MC1231A_SET_PRFL_GEAR_ANSWERED 1
 #define MC1231A_SET_PRFL_GEAR_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PRFL_GEAR_IN_FLIGHT 1
-#define MC1231A_SET_PRFL_GEAR_RESPONSE_BITS 0ul
-#define MC1231A_SET_PRFL_GEAR_RESPONSE_US 0ul
+#define MC1231A_SET_PRFL_GEAR_RESPONSE_BITS 0UL
+#define MC1231A_SET_PRFL_GEAR_RESPONSE_US 0UL
 
 #define MC1231A_SET_POS_ANSWERED 1
 #define MC1231A_SET_POS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_POS_IN_FLIGHT 1
-#define MC1231A_SET_POS_RESPONSE_BITS 0ul
-#define MC1231A_SET_POS_RESPONSE_US 0ul
+#define MC1231A_SET_POS_RESPONSE_BITS 0UL
+#define MC1231A_SET_POS_RESPONSE_US 0UL
 
 #define MC1231A_SET_VEL_ANSWERED 1
 #define MC1231A_SET_VEL_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_VEL_IN_FLIGHT 1
-#define MC1231A_SET_VEL_RESPONSE_BITS 0ul
-#define MC1231A_SET_VEL_RESPONSE_US 0ul
+#define MC1231A_SET_VEL_RESPONSE_BITS 0UL
+#define MC1231A_SET_VEL_RESPONSE_US 0UL
 
 #define MC1231A_SET_ACC_ANSWERED 1
 #define MC1231A_SET_ACC_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_ACC_IN_FLIGHT 1
-#define MC1231A_SET_ACC_RESPONSE_BITS 0ul
-#define MC1231A_SET_ACC_RESPONSE_US 0ul
+#define MC1231A_SET_ACC_RESPONSE_BITS 0UL
+#define MC1231A_SET_ACC_RESPONSE_US 0UL
 
 #define MC1231A_SET_MAX_ACC_ANSWERED 1
 #define MC1231A_SET_MAX_ACC_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_MAX_ACC_IN_FLIGHT 1
-#define MC1231A_SET_MAX_ACC_RESPONSE_BITS 0ul
-#define MC1231A_SET_MAX_ACC_RESPONSE_US 0ul
+#define MC1231A_SET_MAX_ACC_RESPONSE_BITS 0UL
+#define MC1231A_SET_MAX_ACC_RESPONSE_US 0UL
 
 #define MC1231A_SET_JERK_ANSWERED 1
 #define MC1231A_SET_JERK_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_JERK_IN_FLIGHT 1
-#define MC1231A_SET_JERK_RESPONSE_BITS 0ul
-#define MC1231A_SET_JERK_RESPONSE_US 0ul
+#define MC1231A_SET_JERK_RESPONSE_BITS 0UL
+#define MC1231A_SET_JERK_RESPONSE_US 0UL
 
 #define MC1231A_SET_RATIO_ANSWERED 1
 #define MC1231A_SET_RATIO_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_RATIO_IN_FLIGHT 1
-#define MC1231A_SET_RATIO_RESPONSE_BITS 0ul
-#define MC1231A_SET_RATIO_RESPONSE_US 0ul
+#define MC1231A_SET_RATIO_RESPONSE_BITS 0UL
+#define MC1231A_SET_RATIO_RESPONSE_US 0UL
 
 #define MC1231A_STOP_ANSWERED 1
 #define MC1231A_STOP_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_STOP_IN_FLIGHT 1
-#define MC1231A_STOP_RESPONSE_BITS 0ul
-#define MC1231A_STOP_RESPONSE_US 0ul
+#define MC1231A_STOP_RESPONSE_BITS 0UL
+#define MC1231A_STOP_RESPONSE_US 0UL
 
 #define MC1231A_SMOOTH_STOP_ANSWERED 1
 #define MC1231A_SMOOTH_STOP_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SMOOTH_STOP_IN_FLIGHT 1
-#define MC1231A_SMOOTH_STOP_RESPONSE_BITS 0ul
-#define MC1231A_SMOOTH_STOP_RESPONSE_US 0ul
+#define MC1231A_SMOOTH_STOP_RESPONSE_BITS 0UL
+#define MC1231A_SMOOTH_STOP_RESPONSE_US 0UL
 
 #define MC1231A_SYNCH_PRFL_ANSWERED 1
 #define MC1231A_SYNCH_PRFL_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SYNCH_PRFL_IN_FLIGHT 1
-#define MC1231A_SYNCH_PRFL_RESPONSE_BITS 0ul
-#define MC1231A_SYNCH_PRFL_RESPONSE_US 0ul
+#define MC1231A_SYNCH_PRFL_RESPONSE_BITS 0UL
+#define MC1231A_SYNCH_PRFL_RESPONSE_US 0UL
 
 #define MC1231A_GET_POS_ANSWERED 1
 #define MC1231A_GET_POS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_POS_IN_FLIGHT 1
-#define MC1231A_GET_POS_RESPONSE_BITS 0ul
-#define MC1231A_GET_POS_RESPONSE_US 0ul
+#define MC1231A_GET_POS_RESPONSE_BITS 0UL
+#define MC1231A_GET_POS_RESPONSE_US 0UL
 
 #define MC1231A_GET_VEL_ANSWERED 1
 #define MC1231A_GET_VEL_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_VEL_IN_FLIGHT 1
-#define MC1231A_GET_VEL_RESPONSE_BITS 0ul
-#define MC1231A_GET_VEL_RESPONSE_US 0ul
+#define MC1231A_GET_VEL_RESPONSE_BITS 0UL
+#define MC1231A_GET_VEL_RESPONSE_US 0UL
 
 #define MC1231A_GET_ACC_ANSWERED 1
 #define MC1231A_GET_ACC_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_ACC_IN_FLIGHT 1
-#define MC1231A_GET_ACC_RESPONSE_BITS 0ul
-#define MC1231A_GET_ACC_RESPONSE_US 0ul
+#define MC1231A_GET_ACC_RESPONSE_BITS 0UL
+#define MC1231A_GET_ACC_RESPONSE_US 0UL
 
 #define MC1231A_GET_MAX_ACC_ANSWERED 1
 #define MC1231A_GET_MAX_ACC_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_MAX_ACC_IN_FLIGHT 1
-#define MC1231A_GET_MAX_ACC_RESPONSE_BITS 0ul
-#define MC1231A_GET_MAX_ACC_RESPONSE_US 0ul
+#define MC1231A_GET_MAX_ACC_RESPONSE_BITS 0UL
+#define MC1231A_GET_MAX_ACC_RESPONSE_US 0UL
 
 #define MC1231A_GET_JERK_ANSWERED 1
 #define MC1231A_GET_JERK_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_JERK_IN_FLIGHT 1
-#define MC1231A_GET_JERK_RESPONSE_BITS 0ul
-#define MC1231A_GET_JERK_RESPONSE_US 0ul
+#define MC1231A_GET_JERK_RESPONSE_BITS 0UL
+#define MC1231A_GET_JERK_RESPONSE_US 0UL
 
 #define MC1231A_GET_RATIO_ANSWERED 1
 #define MC1231A_GET_RATIO_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_RATIO_IN_FLIGHT 1
-#define MC1231A_GET_RATIO_RESPONSE_BITS 0ul
-#define MC1231A_GET_RATIO_RESPONSE_US 0ul
+#define MC1231A_GET_RATIO_RESPONSE_BITS 0UL
+#define MC1231A_GET_RATIO_RESPONSE_US 0UL
 
 #define MC1231A_GET_TRGT_POS_ANSWERED 1
 #define MC1231A_GET_TRGT_POS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_TRGT_POS_IN_FLIGHT 1
-#define MC1231A_GET_TRGT_POS_RESPONSE_BITS 0ul
-#define MC1231A_GET_TRGT_POS_RESPONSE_US 0ul
+#define MC1231A_GET_TRGT_POS_RESPONSE_BITS 0UL
+#define MC1231A_GET_TRGT_POS_RESPONSE_US 0UL
 
 #define MC1231A_GET_TRGT_VEL_ANSWERED 1
 #define MC1231A_GET_TRGT_VEL_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_TRGT_VEL_IN_FLIGHT 1
-#define MC1231A_GET_TRGT_VEL_RESPONSE_BITS 0ul
-#define MC1231A_GET_TRGT_VEL_RESPONSE_US 0ul
+#define MC1231A_GET_TRGT_VEL_RESPONSE_BITS 0UL
+#define MC1231A_GET_TRGT_VEL_RESPONSE_US 0UL
 
 #define MC1231A_SET_KP_ANSWERED 1
 #define MC1231A_SET_KP_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_KP_IN_FLIGHT 1
-#define MC1231A_SET_KP_RESPONSE_BITS 0ul
-#define MC1231A_SET_KP_RESPONSE_US 0ul
+#define MC1231A_SET_KP_RESPONSE_BITS 0UL
+#define MC1231A_SET_KP_RESPONSE_US 0UL
 
 #define MC1231A_SET_KD_ANSWERED 1
 #define MC1231A_SET_KD_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_KD_IN_FLIGHT 1
-#define MC1231A_SET_KD_RESPONSE_BITS 0ul
-#define MC1231A_SET_KD_RESPONSE_US 0ul
+#define MC1231A_SET_KD_RESPONSE_BITS 0UL
+#define MC1231A_SET_KD_RESPONSE_US 0UL
 
 #define MC1231A_SET_KI_ANSWERED 1
 #define MC1231A_SET_KI_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_KI_IN_FLIGHT 1
-#define MC1231A_SET_KI_RESPONSE_BITS 0ul
-#define MC1231A_SET_KI_RESPONSE_US 0ul
+#define MC1231A_SET_KI_RESPONSE_BITS 0UL
+#define MC1231A_SET_KI_RESPONSE_US 0UL
 
 #define MC1231A_SET_KVFF_ANSWERED 1
 #define MC1231A_SET_KVFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_KVFF_IN_FLIGHT 1
-#define MC1231A_SET_KVFF_RESPONSE_BITS 0ul
-#define MC1231A_SET_KVFF_RESPONSE_US 0ul
+#define MC1231A_SET_KVFF_RESPONSE_BITS 0UL
+#define MC1231A_SET_KVFF_RESPONSE_US 0UL
 
 #define MC1231A_SET_I_LM_ANSWERED 1
 #define MC1231A_SET_I_LM_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_I_LM_IN_FLIGHT 1
-#define MC1231A_SET_I_LM_RESPONSE_BITS 0ul
-#define MC1231A_SET_I_LM_RESPONSE_US 0ul
+#define MC1231A_SET_I_LM_RESPONSE_BITS 0UL
+#define MC1231A_SET_I_LM_RESPONSE_US 0UL
 
 #define MC1231A_SET_MTR_LMT_ANSWERED 1
 #define MC1231A_SET_MTR_LMT_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_MTR_LMT_IN_FLIGHT 1
-#define MC1231A_SET_MTR_LMT_RESPONSE_BITS 0ul
-#define MC1231A_SET_MTR_LMT_RESPONSE_US 0ul
+#define MC1231A_SET_MTR_LMT_RESPONSE_BITS 0UL
+#define MC1231A_SET_MTR_LMT_RESPONSE_US 0UL
 
 #define MC1231A_SET_MTR_BIAS_ANSWERED 1
 #define MC1231A_SET_MTR_BIAS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_MTR_BIAS_IN_FLIGHT 1
-#define MC1231A_SET_MTR_BIAS_RESPONSE_BITS 0ul
-#define MC1231A_SET_MTR_BIAS_RESPONSE_US 0ul
+#define MC1231A_SET_MTR_BIAS_RESPONSE_BITS 0UL
+#define MC1231A_SET_MTR_BIAS_RESPONSE_US 0UL
 
 #define MC1231A_SET_POS_ERR_ANSWERED 1
 #define MC1231A_SET_POS_ERR_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_POS_ERR_IN_FLIGHT 1
-#define MC1231A_SET_POS_ERR_RESPONSE_BITS 0ul
-#define MC1231A_SET_POS_ERR_RESPONSE_US 0ul
+#define MC1231A_SET_POS_ERR_RESPONSE_BITS 0UL
+#define MC1231A_SET_POS_ERR_RESPONSE_US 0UL
 
 #define MC1231A_GET_KP_ANSWERED 1
 #define MC1231A_GET_KP_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_KP_IN_FLIGHT 1
-#define MC1231A_GET_KP_RESPONSE_BITS 0ul
-#define MC1231A_GET_KP_RESPONSE_US 0ul
+#define MC1231A_GET_KP_RESPONSE_BITS 0UL
+#define MC1231A_GET_KP_RESPONSE_US 0UL
 
 #define MC1231A_GET_KD_ANSWERED 1
 #define MC1231A_GET_KD_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_KD_IN_FLIGHT 1
-#define MC1231A_GET_KD_RESPONSE_BITS 0ul
-#define MC1231A_GET_KD_RESPONSE_US 0ul
+#define MC1231A_GET_KD_RESPONSE_BITS 0UL
+#define MC1231A_GET_KD_RESPONSE_US 0UL
 
 #define MC1231A_GET_KI_ANSWERED 1
 #define MC1231A_GET_KI_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_KI_IN_FLIGHT 1
-#define MC1231A_GET_KI_RESPONSE_BITS 0ul
-#define MC1231A_GET_KI_RESPONSE_US 0ul
+#define MC1231A_GET_KI_RESPONSE_BITS 0UL
+#define MC1231A_GET_KI_RESPONSE_US 0UL
 
 #define MC1231A_GET_KVFF_ANSWERED 1
 #define MC1231A_GET_KVFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_KVFF_IN_FLIGHT 1
-#define MC1231A_GET_KVFF_RESPONSE_BITS 0ul
-#define MC1231A_GET_KVFF_RESPONSE_US 0ul
+#define MC1231A_GET_KVFF_RESPONSE_BITS 0UL
+#define MC1231A_GET_KVFF_RESPONSE_US 0UL
 
 #define MC1231A_GET_I_LM_ANSWERED 1
 #define MC1231A_GET_I_LM_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_I_LM_IN_FLIGHT 1
-#define MC1231A_GET_I_LM_RESPONSE_BITS 0ul
-#define MC1231A_GET_I_LM_RESPONSE_US 0ul
+#define MC1231A_GET_I_LM_RESPONSE_BITS 0UL
+#define MC1231A_GET_I_LM_RESPONSE_US 0UL
 
 #define MC1231A_GET_MTR_LMT_ANSWERED 1
 #define MC1231A_GET_MTR_LMT_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_MTR_LMT_IN_FLIGHT 1
-#define MC1231A_GET_MTR_LMT_RESPONSE_BITS 0ul
-#define MC1231A_GET_MTR_LMT_RESPONSE_US 0ul
+#define MC1231A_GET_MTR_LMT_RESPONSE_BITS 0UL
+#define MC1231A_GET_MTR_LMT_RESPONSE_US 0UL
 
 #define MC1231A_GET_MTR_BIAS_ANSWERED 1
 #define MC1231A_GET_MTR_BIAS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_MTR_BIAS_IN_FLIGHT 1
-#define MC1231A_GET_MTR_BIAS_RESPONSE_BITS 0ul
-#define MC1231A_GET_MTR_BIAS_RESPONSE_US 0ul
+#define MC1231A_GET_MTR_BIAS_RESPONSE_BITS 0UL
+#define MC1231A_GET_MTR_BIAS_RESPONSE_US 0UL
 
 #define MC1231A_GET_POS_ERR_ANSWERED 1
 #define MC1231A_GET_POS_ERR_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_POS_ERR_IN_FLIGHT 1
-#define MC1231A_GET_POS_ERR_RESPONSE_BITS 0ul
-#define MC1231A_GET_POS_ERR_RESPONSE_US 0ul
+#define MC1231A_GET_POS_ERR_RESPONSE_BITS 0UL
+#define MC1231A_GET_POS_ERR_RESPONSE_US 0UL
 
 #define MC1231A_GET_INTGR_ANSWERED 1
 #define MC1231A_GET_INTGR_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_INTGR_IN_FLIGHT 1
-#define MC1231A_GET_INTGR_RESPONSE_BITS 0ul
-#define MC1231A_GET_INTGR_RESPONSE_US 0ul
+#define MC1231A_GET_INTGR_RESPONSE_BITS 0UL
+#define MC1231A_GET_INTGR_RESPONSE_US 0UL
 
 #define MC1231A_GET_ACTL_POS_ERR_ANSWERED 1
 #define MC1231A_GET_ACTL_POS_ERR_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_ACTL_POS_ERR_IN_FLIGHT 1
-#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_BITS 0ul
-#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_US 0ul
+#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_BITS 0UL
+#define MC1231A_GET_ACTL_POS_ERR_RESPONSE_US 0UL
 
 #define MC1231A_SET_AUTO_STOP_ON_ANSWERED 1
 #define MC1231A_SET_AUTO_STOP_ON_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_AUTO_STOP_ON_IN_FLIGHT 1
-#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_BITS 0ul
-#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_US 0ul
+#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_BITS 0UL
+#define MC1231A_SET_AUTO_STOP_ON_RESPONSE_US 0UL
 
 #define MC1231A_SET_AUTO_STOP_OFF_ANSWERED 1
 #define MC1231A_SET_AUTO_STOP_OFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_AUTO_STOP_OFF_IN_FLIGHT 1
-#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_BITS 0ul
-#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_US 0ul
+#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_BITS 0UL
+#define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_US 0UL
 
 #define MC1231A_SET_TIME_BRK_ANSWERED 1
 #define MC1231A_SET_TIME_BRK_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_SET_TIME_BRK_IN_FLIGHT 1
-#define MC1231A_SET_TIME_BRK_RESPONSE_BITS 0ul
-#define MC1231A_SET_TIME_BRK_RESPONSE_US 0ul
+#define MC1231A_SET_TIME_BRK_RESPONSE_BITS 0UL
+#define MC1231A_SET_TIME_BRK_RESPONSE_US 0UL
 
 #define MC1231A_SET_POS_BRK_ANSWERED 1
 #define MC1231A_SET_POS_BRK_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_SET_POS_BRK_IN_FLIGHT 1
-#define MC1231A_SET_POS_BRK_RESPONSE_BITS 0ul
-#define MC1231A_SET_POS_BRK_RESPONSE_US 0ul
+#define MC1231A_SET_POS_BRK_RESPONSE_BITS 0UL
+#define MC1231A_SET_POS_BRK_RESPONSE_US 0UL
 
 #define MC1231A_SET_NEG_BRK_ANSWERED 1
 #define MC1231A_SET_NEG_BRK_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_SET_NEG_BRK_IN_FLIGHT 1
-#define MC1231A_SET_NEG_BRK_RESPONSE_BITS 0ul
-#define MC1231A_SET_NEG_BRK_RESPONSE_US 0ul
+#define MC1231A_SET_NEG_BRK_RESPONSE_BITS 0UL
+#define MC1231A_SET_NEG_BRK_RESPONSE_US 0UL
 
 #define MC1231A_SET_ACTL_POS_BRK_ANSWERED 1
 #define MC1231A_SET_ACTL_POS_BRK_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_SET_ACTL_POS_BRK_IN_FLIGHT 1
-#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_BITS 0ul
-#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_US 0ul
+#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_BITS 0UL
+#define MC1231A_SET_ACTL_POS_BRK_RESPONSE_US 0UL
 
 #define MC1231A_SET_ACTL_NEG_BRK_ANSWERED 1
 #define MC1231A_SET_ACTL_NEG_BRK_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_SET_ACTL_NEG_BRK_IN_FLIGHT 1
-#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_BITS 0ul
-#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_US 0ul
+#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_BITS 0UL
+#define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_US 0UL
 
 #define MC1231A_SET_MTN_CMPLT_BRK_ANSWERED 1
 #define MC1231A_SET_MTN_CMPLT_BRK_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_SET_MTN_CMPLT_BRK_IN_FLIGHT 1
-#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_BITS 0ul
-#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_US 0ul
+#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_BITS 0UL
+#define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_US 0UL
 
 #define MC1231A_SET_EXT_BRK_ANSWERED 1
 #define MC1231A_SET_EXT_BRK_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_SET_EXT_BRK_IN_FLIGHT 1
-#define MC1231A_SET_EXT_BRK_RESPONSE_BITS 0ul
-#define MC1231A_SET_EXT_BRK_RESPONSE_US 0ul
+#define MC1231A_SET_EXT_BRK_RESPONSE_BITS 0UL
+#define MC1231A_SET_EXT_BRK_RESPONSE_US 0UL
 
 #define MC1231A_SET_BRK_OFF_ANSWERED 1
 #define MC1231A_SET_BRK_OFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_BRK_OFF_IN_FLIGHT 1
-#define MC1231A_SET_BRK_OFF_RESPONSE_BITS 0ul
-#define MC1231A_SET_BRK_OFF_RESPONSE_US 0ul
+#define MC1231A_SET_BRK_OFF_RESPONSE_BITS 0UL
+#define MC1231A_SET_BRK_OFF_RESPONSE_US 0UL
 
 #define MC1231A_SET_BRK_PNT_ANSWERED 1
 #define MC1231A_SET_BRK_PNT_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_BRK_PNT_IN_FLIGHT 1
-#define MC1231A_SET_BRK_PNT_RESPONSE_BITS 0ul
-#define MC1231A_SET_BRK_PNT_RESPONSE_US 0ul
+#define MC1231A_SET_BRK_PNT_RESPONSE_BITS 0UL
+#define MC1231A_SET_BRK_PNT_RESPONSE_US 0UL
 
 #define MC1231A_UPDATE_ANSWERED 1
 #define MC1231A_UPDATE_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_UPDATE_IN_FLIGHT 1
-#define MC1231A_UPDATE_RESPONSE_BITS 0ul
-#define MC1231A_UPDATE_RESPONSE_US 0ul
+#define MC1231A_UPDATE_RESPONSE_BITS 0UL
+#define MC1231A_UPDATE_RESPONSE_US 0UL
 
 #define MC1231A_MULTI_UPDATE_ANSWERED 1
 #define MC1231A_MULTI_UPDATE_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_MULTI_UPDATE_IN_FLIGHT 1
-#define MC1231A_MULTI_UPDATE_RESPONSE_BITS 0ul
-#define MC1231A_MULTI_UPDATE_RESPONSE_US 0ul
+#define MC1231A_MULTI_UPDATE_RESPONSE_BITS 0UL
+#define MC1231A_MULTI_UPDATE_RESPONSE_US 0UL
 
 #define MC1231A_SET_AUTO_UPDATE_ON_ANSWERED 1
 #define MC1231A_SET_AUTO_UPDATE_ON_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_AUTO_UPDATE_ON_IN_FLIGHT 1
-#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_BITS 0ul
-#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_US 0ul
+#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_BITS 0UL
+#define MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_US 0UL
 
 #define MC1231A_SET_AUTO_UPDATE_OFF_ANSWERED 1
 #define MC1231A_SET_AUTO_UPDATE_OFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_AUTO_UPDATE_OFF_IN_FLIGHT 1
-#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_BITS 0ul
-#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_US 0ul
+#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_BITS 0UL
+#define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_US 0UL
 
 #define MC1231A_GET_BRK_PNT_ANSWERED 1
 #define MC1231A_GET_BRK_PNT_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_BRK_PNT_IN_FLIGHT 1
-#define MC1231A_GET_BRK_PNT_RESPONSE_BITS 0ul
-#define MC1231A_GET_BRK_PNT_RESPONSE_US 0ul
+#define MC1231A_GET_BRK_PNT_RESPONSE_BITS 0UL
+#define MC1231A_GET_BRK_PNT_RESPONSE_US 0UL
 
 #define MC1231A_SET_INTRPT_MASK_ANSWERED 1
 #define MC1231A_SET_INTRPT_MASK_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_INTRPT_MASK_IN_FLIGHT 1
-#define MC1231A_SET_INTRPT_MASK_RESPONSE_BITS 0ul
-#define MC1231A_SET_INTRPT_MASK_RESPONSE_US 0ul
+#define MC1231A_SET_INTRPT_MASK_RESPONSE_BITS 0UL
+#define MC1231A_SET_INTRPT_MASK_RESPONSE_US 0UL
 
 #define MC1231A_GET_INTRPT_ANSWERED 1
 #define MC1231A_GET_INTRPT_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_INTRPT_IN_FLIGHT 1
-#define MC1231A_GET_INTRPT_RESPONSE_BITS 0ul
-#define MC1231A_GET_INTRPT_RESPONSE_US 0ul
+#define MC1231A_GET_INTRPT_RESPONSE_BITS 0UL
+#define MC1231A_GET_INTRPT_RESPONSE_US 0UL
 
 #define MC1231A_RST_INTRPT_ANSWERED 1
 #define MC1231A_RST_INTRPT_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_RST_INTRPT_IN_FLIGHT 1
-#define MC1231A_RST_INTRPT_RESPONSE_BITS 0ul
-#define MC1231A_RST_INTRPT_RESPONSE_US 0ul
+#define MC1231A_RST_INTRPT_RESPONSE_BITS 0UL
+#define MC1231A_RST_INTRPT_RESPONSE_US 0UL
 
 #define MC1231A_GET_INTRPT_MASK_ANSWERED 1
 #define MC1231A_GET_INTRPT_MASK_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_INTRPT_MASK_IN_FLIGHT 1
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_BITS 0ul
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_US 0ul
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_BITS 0UL
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_US 0UL
 
 #define MC1231A_CLR_STATUS_ANSWERED 1
 #define MC1231A_CLR_STATUS_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_CLR_STATUS_IN_FLIGHT 1
-#define MC1231A_CLR_STATUS_RESPONSE_BITS 0ul
-#define MC1231A_CLR_STATUS_RESPONSE_US 0ul
+#define MC1231A_CLR_STATUS_RESPONSE_BITS 0UL
+#define MC1231A_CLR_STATUS_RESPONSE_US 0UL
 
 #define MC1231A_RST_STATUS_ANSWERED 1
 #define MC1231A_RST_STATUS_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_RST_STATUS_IN_FLIGHT 1
-#define MC1231A_RST_STATUS_RESPONSE_BITS 0ul
-#define MC1231A_RST_STATUS_RESPONSE_US 0ul
+#define MC1231A_RST_STATUS_RESPONSE_BITS 0UL
+#define MC1231A_RST_STATUS_RESPONSE_US 0UL
 
 #define MC1231A_GET_STATUS_ANSWERED 1
 #define MC1231A_GET_STATUS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_STATUS_IN_FLIGHT 1
-#define MC1231A_GET_STATUS_RESPONSE_BITS 0ul
-#define MC1231A_GET_STATUS_RESPONSE_US 0ul
+#define MC1231A_GET_STATUS_RESPONSE_BITS 0UL
+#define MC1231A_GET_STATUS_RESPONSE_US 0UL
 
 #define MC1231A_GET_MODE_ANSWERED 1
 #define MC1231A_GET_MODE_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_MODE_IN_FLIGHT 1
-#define MC1231A_GET_MODE_RESPONSE_BITS 0ul
-#define MC1231A_GET_MODE_RESPONSE_US 0ul
+#define MC1231A_GET_MODE_RESPONSE_BITS 0UL
+#define MC1231A_GET_MODE_RESPONSE_US 0UL
 
 #define MC1231A_SET_CAPT_INDEX_ANSWERED 1
 #define MC1231A_SET_CAPT_INDEX_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_CAPT_INDEX_IN_FLIGHT 1
-#define MC1231A_SET_CAPT_INDEX_RESPONSE_BITS 0ul
-#define MC1231A_SET_CAPT_INDEX_RESPONSE_US 0ul
+#define MC1231A_SET_CAPT_INDEX_RESPONSE_BITS 0UL
+#define MC1231A_SET_CAPT_INDEX_RESPONSE_US 0UL
 
 #define MC1231A_SET_CAPT_HOME_ANSWERED 1
 #define MC1231A_SET_CAPT_HOME_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_CAPT_HOME_IN_FLIGHT 1
-#define MC1231A_SET_CAPT_HOME_RESPONSE_BITS 0ul
-#define MC1231A_SET_CAPT_HOME_RESPONSE_US 0ul
+#define MC1231A_SET_CAPT_HOME_RESPONSE_BITS 0UL
+#define MC1231A_SET_CAPT_HOME_RESPONSE_US 0UL
 
 #define MC1231A_GET_CAPT_ANSWERED 1
 #define MC1231A_GET_CAPT_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_GET_CAPT_IN_FLIGHT 1
-#define MC1231A_GET_CAPT_RESPONSE_BITS 0ul
-#define MC1231A_GET_CAPT_RESPONSE_US 0ul
+#define MC1231A_GET_CAPT_RESPONSE_BITS 0UL
+#define MC1231A_GET_CAPT_RESPONSE_US 0UL
 
 #define MC1231A_SET_OUTPUT_PWM_ANSWERED 1
 #define MC1231A_SET_OUTPUT_PWM_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_OUTPUT_PWM_IN_FLIGHT 1
-#define MC1231A_SET_OUTPUT_PWM_RESPONSE_BITS 0ul
-#define MC1231A_SET_OUTPUT_PWM_RESPONSE_US 0ul
+#define MC1231A_SET_OUTPUT_PWM_RESPONSE_BITS 0UL
+#define MC1231A_SET_OUTPUT_PWM_RESPONSE_US 0UL
 
 #define MC1231A_SET_OUTPUT_DAC16_ANSWERED 1
 #define MC1231A_SET_OUTPUT_DAC16_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_OUTPUT_DAC16_IN_FLIGHT 1
-#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_BITS 0ul
-#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_US 0ul
+#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_BITS 0UL
+#define MC1231A_SET_OUTPUT_DAC16_RESPONSE_US 0UL
 
 #define MC1231A_MTR_ON_ANSWERED 1
 #define MC1231A_MTR_ON_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_MTR_ON_IN_FLIGHT 1
-#define MC1231A_MTR_ON_RESPONSE_BITS 0ul
-#define MC1231A_MTR_ON_RESPONSE_US 0ul
+#define MC1231A_MTR_ON_RESPONSE_BITS 0UL
+#define MC1231A_MTR_ON_RESPONSE_US 0UL
 
 #define MC1231A_MTR_OFF_ANSWERED 1
 #define MC1231A_MTR_OFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_MTR_OFF_IN_FLIGHT 1
-#define MC1231A_MTR_OFF_RESPONSE_BITS 0ul
-#define MC1231A_MTR_OFF_RESPONSE_US 0ul
+#define MC1231A_MTR_OFF_RESPONSE_BITS 0UL
+#define MC1231A_MTR_OFF_RESPONSE_US 0UL
 
 #define MC1231A_SET_MTR_CMD_ANSWERED 1
 #define MC1231A_SET_MTR_CMD_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_MTR_CMD_IN_FLIGHT 1
-#define MC1231A_SET_MTR_CMD_RESPONSE_BITS 0ul
-#define MC1231A_SET_MTR_CMD_RESPONSE_US 0ul
+#define MC1231A_SET_MTR_CMD_RESPONSE_BITS 0UL
+#define MC1231A_SET_MTR_CMD_RESPONSE_US 0UL
 
 #define MC1231A_GET_MTR_CMD_ANSWERED 1
 #define MC1231A_GET_MTR_CMD_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_MTR_CMD_IN_FLIGHT 1
-#define MC1231A_GET_MTR_CMD_RESPONSE_BITS 0ul
-#define MC1231A_GET_MTR_CMD_RESPONSE_US 0ul
+#define MC1231A_GET_MTR_CMD_RESPONSE_BITS 0UL
+#define MC1231A_GET_MTR_CMD_RESPONSE_US 0UL
 
 #define MC1231A_SET_BUF_MTR_CMD_ANSWERED 1
 #define MC1231A_SET_BUF_MTR_CMD_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_BUF_MTR_CMD_IN_FLIGHT 1
-#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_BITS 0ul
-#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_US 0ul
+#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_BITS 0UL
+#define MC1231A_SET_BUF_MTR_CMD_RESPONSE_US 0UL
 
 #define MC1231A_GET_BUF_MTR_CMD_ANSWERED 1
 #define MC1231A_GET_BUF_MTR_CMD_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_BUF_MTR_CMD_IN_FLIGHT 1
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_BITS 0ul
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_US 0ul
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_BITS 0UL
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_US 0UL
 
 #define MC1231A_GET_OUTPUT_MODE_ANSWERED 1
 #define MC1231A_GET_OUTPUT_MODE_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_OUTPUT_MODE_IN_FLIGHT 1
-#define MC1231A_GET_OUTPUT_MODE_RESPONSE_BITS 0ul
-#define MC1231A_GET_OUTPUT_MODE_RESPONSE_US 0ul
+#define MC1231A_GET_OUTPUT_MODE_RESPONSE_BITS 0UL
+#define MC1231A_GET_OUTPUT_MODE_RESPONSE_US 0UL
 
 #define MC1231A_AXIS_ON_ANSWERED 1
 #define MC1231A_AXIS_ON_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_AXIS_ON_IN_FLIGHT 1
-#define MC1231A_AXIS_ON_RESPONSE_BITS 0ul
-#define MC1231A_AXIS_ON_RESPONSE_US 0ul
+#define MC1231A_AXIS_ON_RESPONSE_BITS 0UL
+#define MC1231A_AXIS_ON_RESPONSE_US 0UL
 
 #define MC1231A_AXIS_OFF_ANSWERED 1
 #define MC1231A_AXIS_OFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_AXIS_OFF_IN_FLIGHT 1
-#define MC1231A_AXIS_OFF_RESPONSE_BITS 0ul
-#define MC1231A_AXIS_OFF_RESPONSE_US 0ul
+#define MC1231A_AXIS_OFF_RESPONSE_BITS 0UL
+#define MC1231A_AXIS_OFF_RESPONSE_US 0UL
 
 #define MC1231A_SET_ACTL_POS_ANSWERED 1
 #define MC1231A_SET_ACTL_POS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_ACTL_POS_IN_FLIGHT 1
-#define MC1231A_SET_ACTL_POS_RESPONSE_BITS 0ul
-#define MC1231A_SET_ACTL_POS_RESPONSE_US 0ul
+#define MC1231A_SET_ACTL_POS_RESPONSE_BITS 0UL
+#define MC1231A_SET_ACTL_POS_RESPONSE_US 0UL
 
 #define MC1231A_GET_ACTL_POS_ANSWERED 1
 #define MC1231A_GET_ACTL_POS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_ACTL_POS_IN_FLIGHT 1
-#define MC1231A_GET_ACTL_POS_RESPONSE_BITS 0ul
-#define MC1231A_GET_ACTL_POS_RESPONSE_US 0ul
+#define MC1231A_GET_ACTL_POS_RESPONSE_BITS 0UL
+#define MC1231A_GET_ACTL_POS_RESPONSE_US 0UL
 
 #define MC1231A_SET_LMT_SENSE_ANSWERED 1
 #define MC1231A_SET_LMT_SENSE_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_LMT_SENSE_IN_FLIGHT 1
-#define MC1231A_SET_LMT_SENSE_RESPONSE_BITS 0ul
-#define MC1231A_SET_LMT_SENSE_RESPONSE_US 0ul
+#define MC1231A_SET_LMT_SENSE_RESPONSE_BITS 0UL
+#define MC1231A_SET_LMT_SENSE_RESPONSE_US 0UL
 
 #define MC1231A_GET_LMT_SWTCH_ANSWERED 1
 #define MC1231A_GET_LMT_SWTCH_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_LMT_SWTCH_IN_FLIGHT 1
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_BITS 0ul
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_US 0ul
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_BITS 0UL
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_US 0UL
 
 #define MC1231A_LMTS_ON_ANSWERED 1
 #define MC1231A_LMTS_ON_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_LMTS_ON_IN_FLIGHT 1
-#define MC1231A_LMTS_ON_RESPONSE_BITS 0ul
-#define MC1231A_LMTS_ON_RESPONSE_US 0ul
+#define MC1231A_LMTS_ON_RESPONSE_BITS 0UL
+#define MC1231A_LMTS_ON_RESPONSE_US 0UL
 
 #define MC1231A_LMTS_OFF_ANSWERED 1
 #define MC1231A_LMTS_OFF_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_LMTS_OFF_IN_FLIGHT 1
-#define MC1231A_LMTS_OFF_RESPONSE_BITS 0ul
-#define MC1231A_LMTS_OFF_RESPONSE_US 0ul
+#define MC1231A_LMTS_OFF_RESPONSE_BITS 0UL
+#define MC1231A_LMTS_OFF_RESPONSE_US 0UL
 
 #define MC1231A_GET_HOME_ANSWERED 1
 #define MC1231A_GET_HOME_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_HOME_IN_FLIGHT 1
-#define MC1231A_GET_HOME_RESPONSE_BITS 0ul
-#define MC1231A_GET_HOME_RESPONSE_US 0ul
+#define MC1231A_GET_HOME_RESPONSE_BITS 0UL
+#define MC1231A_GET_HOME_RESPONSE_US 0UL
 
 #define MC1231A_SET_SMPL_TIME_ANSWERED 1
 #define MC1231A_SET_SMPL_TIME_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_SMPL_TIME_IN_FLIGHT 1
-#define MC1231A_SET_SMPL_TIME_RESPONSE_BITS 0ul
-#define MC1231A_SET_SMPL_TIME_RESPONSE_US 0ul
+#define MC1231A_SET_SMPL_TIME_RESPONSE_BITS 0UL
+#define MC1231A_SET_SMPL_TIME_RESPONSE_US 0UL
 
 #define MC1231A_GET_SMPL_TIME_ANSWERED 1
 #define MC1231A_GET_SMPL_TIME_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_SMPL_TIME_IN_FLIGHT 1
-#define MC1231A_GET_SMPL_TIME_RESPONSE_BITS 0ul
-#define MC1231A_GET_SMPL_TIME_RESPONSE_US 0ul
+#define MC1231A_GET_SMPL_TIME_RESPONSE_BITS 0UL
+#define MC1231A_GET_SMPL_TIME_RESPONSE_US 0UL
 
 #define MC1231A_RESET_ANSWERED 1
 #define MC1231A_RESET_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_RESET_IN_FLIGHT 1
-#define MC1231A_RESET_RESPONSE_BITS 0ul
-#define MC1231A_RESET_RESPONSE_US 0ul
+#define MC1231A_RESET_RESPONSE_BITS 0UL
+#define MC1231A_RESET_RESPONSE_US 0UL
 
 #define MC1231A_GET_VRSN_ANSWERED 1
 #define MC1231A_GET_VRSN_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_VRSN_IN_FLIGHT 1
-#define MC1231A_GET_VRSN_RESPONSE_BITS 0ul
-#define MC1231A_GET_VRSN_RESPONSE_US 0ul
+#define MC1231A_GET_VRSN_RESPONSE_BITS 0UL
+#define MC1231A_GET_VRSN_RESPONSE_US 0UL
 
 #define MC1231A_GET_TIME_ANSWERED 1
 #define MC1231A_GET_TIME_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_TIME_IN_FLIGHT 1
-#define MC1231A_GET_TIME_RESPONSE_BITS 0ul
-#define MC1231A_GET_TIME_RESPONSE_US 0ul
+#define MC1231A_GET_TIME_RESPONSE_BITS 0UL
+#define MC1231A_GET_TIME_RESPONSE_US 0UL
 
 #define MC1231A_SET_PHASE_CNTS_ANSWERED 1
 #define MC1231A_SET_PHASE_CNTS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PHASE_CNTS_IN_FLIGHT 1
-#define MC1231A_SET_PHASE_CNTS_RESPONSE_BITS 0ul
-#define MC1231A_SET_PHASE_CNTS_RESPONSE_US 0ul
+#define MC1231A_SET_PHASE_CNTS_RESPONSE_BITS 0UL
+#define MC1231A_SET_PHASE_CNTS_RESPONSE_US 0UL
 
 #define MC1231A_SET_PHASE_OFFSET_ANSWERED 1
 #define MC1231A_SET_PHASE_OFFSET_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PHASE_OFFSET_IN_FLIGHT 1
-#define MC1231A_SET_PHASE_OFFSET_RESPONSE_BITS 0ul
-#define MC1231A_SET_PHASE_OFFSET_RESPONSE_US 0ul
+#define MC1231A_SET_PHASE_OFFSET_RESPONSE_BITS 0UL
+#define MC1231A_SET_PHASE_OFFSET_RESPONSE_US 0UL
 
 #define MC1231A_SET_PHASE_TIME_ANSWERED 1
 #define MC1231A_SET_PHASE_TIME_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PHASE_TIME_IN_FLIGHT 1
-#define MC1231A_SET_PHASE_TIME_RESPONSE_BITS 0ul
-#define MC1231A_SET_PHASE_TIME_RESPONSE_US 0ul
+#define MC1231A_SET_PHASE_TIME_RESPONSE_BITS 0UL
+#define MC1231A_SET_PHASE_TIME_RESPONSE_US 0UL
 
 #define MC1231A_SET_PHASE_ANSWERED 1
 #define MC1231A_SET_PHASE_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_SET_PHASE_IN_FLIGHT 1
-#define MC1231A_SET_PHASE_RESPONSE_BITS 0ul
-#define MC1231A_SET_PHASE_RESPONSE_US 0ul
+#define MC1231A_SET_PHASE_RESPONSE_BITS 0UL
+#define MC1231A_SET_PHASE_RESPONSE_US 0UL
 
 #define MC1231A_INIT_PHASE_ANSWERED 1
 #define MC1231A_INIT_PHASE_REPEAT MC1231A_REPEAT_UNSAFE
 #define MC1231A_INIT_PHASE_IN_FLIGHT 1
-#define MC1231A_INIT_PHASE_RESPONSE_BITS 0ul
-#define MC1231A_INIT_PHASE_RESPONSE_US 0ul
+#define MC1231A_INIT_PHASE_RESPONSE_BITS 0UL
+#define MC1231A_INIT_PHASE_RESPONSE_US 0UL
 
 #define MC1231A_GET_PHASE_INFO_ANSWERED 1
 #define MC1231A_GET_PHASE_INFO_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_PHASE_INFO_IN_FLIGHT 1
-#define MC1231A_GET_PHASE_INFO_RESPONSE_BITS 0ul
-#define MC1231A_GET_PHASE_INFO_RESPONSE_US 0ul
+#define MC1231A_GET_PHASE_INFO_RESPONSE_BITS 0UL
+#define MC1231A_GET_PHASE_INFO_RESPONSE_US 0UL
 
 #define MC1231A_GET_PHASE_CNTS_ANSWERED 1
 #define MC1231A_GET_PHASE_CNTS_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_PHASE_CNTS_IN_FLIGHT 1
-#define MC1231A_GET_PHASE_CNTS_RESPONSE_BITS 0ul
-#define MC1231A_GET_PHASE_CNTS_RESPONSE_US 0ul
+#define MC1231A_GET_PHASE_CNTS_RESPONSE_BITS 0UL
+#define MC1231A_GET_PHASE_CNTS_RESPONSE_US 0UL
 
 #define MC1231A_GET_PHASE_TIME_ANSWERED 1
 #define MC1231A_GET_PHASE_TIME_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_PHASE_TIME_IN_FLIGHT 1
-#define MC1231A_GET_PHASE_TIME_RESPONSE_BITS 0ul
-#define MC1231A_GET_PHASE_TIME_RESPONSE_US 0ul
+#define MC1231A_GET_PHASE_TIME_RESPONSE_BITS 0UL
+#define MC1231A_GET_PHASE_TIME_RESPONSE_US 0UL
 
 #define MC1231A_GET_PHASE_OFFSET_ANSWERED 1
 #define MC1231A_GET_PHASE_OFFSET_REPEAT MC1231A_REPEAT_SAFE
 #define MC1231A_GET_PHASE_OFFSET_IN_FLIGHT 1
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_BITS 0ul
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_US 0ul
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_BITS 0UL
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_US 0UL
 
 /* ---- Slave ----
  * One function for each command. A command without one is not answered, nor is one whose function returns false; a
@@ -8764,1895 +8675,1793 @@ struct mc1231a_slave {
     bool (*get_phase_offset)(mc1231a_slave_t *slave, mc1231a_get_phase_offset_response_t *response);
 };
 
-static inline size_t mc1231a_slave_set_1_(
+static inline int mc1231a_slave_set_1_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_1_response_t response = MC1231A_SET_1_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->set_1 == NULL) {
         return mc1231a_reject_(MC1231A_SET_1_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_1(slave, &response);
+        if (answers) {
+            size = mc1231a_set_1_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_1(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_set_1_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_2_(
+static inline int mc1231a_slave_set_2_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_2_response_t response = MC1231A_SET_2_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->set_2 == NULL) {
         return mc1231a_reject_(MC1231A_SET_2_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_2(slave, &response);
+        if (answers) {
+            size = mc1231a_set_2_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_2(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_set_2_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_i_(
+static inline int mc1231a_slave_set_i_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_i_response_t response = MC1231A_SET_I_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->set_i == NULL) {
         return mc1231a_reject_(MC1231A_SET_I_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_i(slave, &response);
+        if (answers) {
+            size = mc1231a_set_i_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_i(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_set_i_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_prfl_s_crv_(
+static inline int mc1231a_slave_set_prfl_s_crv_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_prfl_s_crv == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_prfl_s_crv(slave);
+        if (answers) {
+            size = mc1231a_set_prfl_s_crv_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_prfl_s_crv(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_prfl_s_crv_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_prfl_trap_(
+static inline int mc1231a_slave_set_prfl_trap_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_prfl_trap == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_prfl_trap(slave);
+        if (answers) {
+            size = mc1231a_set_prfl_trap_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_prfl_trap(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_prfl_trap_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_prfl_vel_(
+static inline int mc1231a_slave_set_prfl_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_prfl_vel == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_prfl_vel(slave);
+        if (answers) {
+            size = mc1231a_set_prfl_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_prfl_vel(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_prfl_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_prfl_gear_(
+static inline int mc1231a_slave_set_prfl_gear_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_prfl_gear == NULL) {
         return mc1231a_reject_(MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_prfl_gear(slave);
+        if (answers) {
+            size = mc1231a_set_prfl_gear_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_prfl_gear(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_prfl_gear_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_pos_(
+static inline int mc1231a_slave_set_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_pos_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_pos == NULL) {
         return mc1231a_reject_(MC1231A_SET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_pos_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_pos(slave, &request);
+        if (answers) {
+            size = mc1231a_set_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_pos(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_vel_(
+static inline int mc1231a_slave_set_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_vel_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_vel == NULL) {
         return mc1231a_reject_(MC1231A_SET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_vel_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_vel_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_vel(slave, &request);
+        if (answers) {
+            size = mc1231a_set_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_vel(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_acc_(
+static inline int mc1231a_slave_set_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_acc_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_acc == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_acc_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_acc(slave, &request);
+        if (answers) {
+            size = mc1231a_set_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_acc(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_max_acc_(
+static inline int mc1231a_slave_set_max_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_max_acc_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_max_acc == NULL) {
         return mc1231a_reject_(MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_max_acc_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_max_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_max_acc(slave, &request);
+        if (answers) {
+            size = mc1231a_set_max_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_max_acc(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_max_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_jerk_(
+static inline int mc1231a_slave_set_jerk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_jerk_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_jerk == NULL) {
         return mc1231a_reject_(MC1231A_SET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_jerk_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_jerk_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_jerk(slave, &request);
+        if (answers) {
+            size = mc1231a_set_jerk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_jerk(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_jerk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_ratio_(
+static inline int mc1231a_slave_set_ratio_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_ratio_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_ratio == NULL) {
         return mc1231a_reject_(MC1231A_SET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_ratio_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_ratio_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_ratio(slave, &request);
+        if (answers) {
+            size = mc1231a_set_ratio_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_ratio(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_ratio_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_stop_(
+static inline int mc1231a_slave_stop_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->stop == NULL) {
         return mc1231a_reject_(MC1231A_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->stop(slave);
+        if (answers) {
+            size = mc1231a_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->stop(slave)) {
-        return 0u;
-    }
-    size = mc1231a_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_smooth_stop_(
+static inline int mc1231a_slave_smooth_stop_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->smooth_stop == NULL) {
         return mc1231a_reject_(MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->smooth_stop(slave);
+        if (answers) {
+            size = mc1231a_smooth_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->smooth_stop(slave)) {
-        return 0u;
-    }
-    size = mc1231a_smooth_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_synch_prfl_(
+static inline int mc1231a_slave_synch_prfl_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->synch_prfl == NULL) {
         return mc1231a_reject_(MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->synch_prfl(slave);
+        if (answers) {
+            size = mc1231a_synch_prfl_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->synch_prfl(slave)) {
-        return 0u;
-    }
-    size = mc1231a_synch_prfl_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_pos_(
+static inline int mc1231a_slave_get_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_pos_response_t response = MC1231A_GET_POS_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_pos == NULL) {
         return mc1231a_reject_(MC1231A_GET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_pos(slave, &response);
+        if (answers) {
+            size = mc1231a_get_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_pos(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_vel_(
+static inline int mc1231a_slave_get_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_vel_response_t response = MC1231A_GET_VEL_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_vel == NULL) {
         return mc1231a_reject_(MC1231A_GET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_vel(slave, &response);
+        if (answers) {
+            size = mc1231a_get_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_vel(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_acc_(
+static inline int mc1231a_slave_get_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_acc_response_t response = MC1231A_GET_ACC_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_acc == NULL) {
         return mc1231a_reject_(MC1231A_GET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_acc(slave, &response);
+        if (answers) {
+            size = mc1231a_get_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_acc(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_max_acc_(
+static inline int mc1231a_slave_get_max_acc_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_max_acc_response_t response = MC1231A_GET_MAX_ACC_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_max_acc == NULL) {
         return mc1231a_reject_(MC1231A_GET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_max_acc(slave, &response);
+        if (answers) {
+            size = mc1231a_get_max_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_max_acc(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_max_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_jerk_(
+static inline int mc1231a_slave_get_jerk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_jerk_response_t response = MC1231A_GET_JERK_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_jerk == NULL) {
         return mc1231a_reject_(MC1231A_GET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_jerk(slave, &response);
+        if (answers) {
+            size = mc1231a_get_jerk_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_jerk(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_jerk_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_ratio_(
+static inline int mc1231a_slave_get_ratio_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_ratio_response_t response = MC1231A_GET_RATIO_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_ratio == NULL) {
         return mc1231a_reject_(MC1231A_GET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_ratio(slave, &response);
+        if (answers) {
+            size = mc1231a_get_ratio_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_ratio(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_ratio_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_trgt_pos_(
+static inline int mc1231a_slave_get_trgt_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_trgt_pos_response_t response = MC1231A_GET_TRGT_POS_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_trgt_pos == NULL) {
         return mc1231a_reject_(MC1231A_GET_TRGT_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_trgt_pos(slave, &response);
+        if (answers) {
+            size = mc1231a_get_trgt_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_trgt_pos(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_trgt_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_trgt_vel_(
+static inline int mc1231a_slave_get_trgt_vel_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_trgt_vel_response_t response = MC1231A_GET_TRGT_VEL_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_trgt_vel == NULL) {
         return mc1231a_reject_(MC1231A_GET_TRGT_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_trgt_vel(slave, &response);
+        if (answers) {
+            size = mc1231a_get_trgt_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_trgt_vel(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_trgt_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_kp_(
+static inline int mc1231a_slave_set_kp_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_kp_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_kp == NULL) {
         return mc1231a_reject_(MC1231A_SET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_kp_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_kp_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_kp(slave, &request);
+        if (answers) {
+            size = mc1231a_set_kp_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_kp(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_kp_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_kd_(
+static inline int mc1231a_slave_set_kd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_kd_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_kd == NULL) {
         return mc1231a_reject_(MC1231A_SET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_kd_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_kd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_kd(slave, &request);
+        if (answers) {
+            size = mc1231a_set_kd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_kd(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_kd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_ki_(
+static inline int mc1231a_slave_set_ki_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_ki_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_ki == NULL) {
         return mc1231a_reject_(MC1231A_SET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_ki_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_ki_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_ki(slave, &request);
+        if (answers) {
+            size = mc1231a_set_ki_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_ki(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_ki_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_kvff_(
+static inline int mc1231a_slave_set_kvff_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_kvff_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_kvff == NULL) {
         return mc1231a_reject_(MC1231A_SET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_kvff_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_kvff_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_kvff(slave, &request);
+        if (answers) {
+            size = mc1231a_set_kvff_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_kvff(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_kvff_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_i_lm_(
+static inline int mc1231a_slave_set_i_lm_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_i_lm_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_i_lm == NULL) {
         return mc1231a_reject_(MC1231A_SET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_i_lm_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_i_lm_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_i_lm(slave, &request);
+        if (answers) {
+            size = mc1231a_set_i_lm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_i_lm(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_i_lm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_mtr_lmt_(
+static inline int mc1231a_slave_set_mtr_lmt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_mtr_lmt_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_mtr_lmt == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_mtr_lmt_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_mtr_lmt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_mtr_lmt(slave, &request);
+        if (answers) {
+            size = mc1231a_set_mtr_lmt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_mtr_lmt(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_mtr_lmt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_mtr_bias_(
+static inline int mc1231a_slave_set_mtr_bias_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_mtr_bias_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_mtr_bias == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_mtr_bias_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_mtr_bias_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_mtr_bias(slave, &request);
+        if (answers) {
+            size = mc1231a_set_mtr_bias_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_mtr_bias(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_mtr_bias_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_pos_err_(
+static inline int mc1231a_slave_set_pos_err_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_pos_err_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_pos_err == NULL) {
         return mc1231a_reject_(MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_pos_err_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_pos_err_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_pos_err(slave, &request);
+        if (answers) {
+            size = mc1231a_set_pos_err_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_pos_err(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_pos_err_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_kp_(
+static inline int mc1231a_slave_get_kp_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_kp_response_t response = MC1231A_GET_KP_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_kp == NULL) {
         return mc1231a_reject_(MC1231A_GET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_kp(slave, &response);
+        if (answers) {
+            size = mc1231a_get_kp_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_kp(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_kp_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_kd_(
+static inline int mc1231a_slave_get_kd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_kd_response_t response = MC1231A_GET_KD_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_kd == NULL) {
         return mc1231a_reject_(MC1231A_GET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_kd(slave, &response);
+        if (answers) {
+            size = mc1231a_get_kd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_kd(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_kd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_ki_(
+static inline int mc1231a_slave_get_ki_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_ki_response_t response = MC1231A_GET_KI_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_ki == NULL) {
         return mc1231a_reject_(MC1231A_GET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_ki(slave, &response);
+        if (answers) {
+            size = mc1231a_get_ki_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_ki(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_ki_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_kvff_(
+static inline int mc1231a_slave_get_kvff_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_kvff_response_t response = MC1231A_GET_KVFF_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_kvff == NULL) {
         return mc1231a_reject_(MC1231A_GET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_kvff(slave, &response);
+        if (answers) {
+            size = mc1231a_get_kvff_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_kvff(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_kvff_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_i_lm_(
+static inline int mc1231a_slave_get_i_lm_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_i_lm_response_t response = MC1231A_GET_I_LM_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_i_lm == NULL) {
         return mc1231a_reject_(MC1231A_GET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_i_lm(slave, &response);
+        if (answers) {
+            size = mc1231a_get_i_lm_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_i_lm(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_i_lm_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_mtr_lmt_(
+static inline int mc1231a_slave_get_mtr_lmt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mtr_lmt_response_t response = MC1231A_GET_MTR_LMT_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_mtr_lmt == NULL) {
         return mc1231a_reject_(MC1231A_GET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_mtr_lmt(slave, &response);
+        if (answers) {
+            size = mc1231a_get_mtr_lmt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_mtr_lmt(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_mtr_lmt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_mtr_bias_(
+static inline int mc1231a_slave_get_mtr_bias_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mtr_bias_response_t response = MC1231A_GET_MTR_BIAS_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_mtr_bias == NULL) {
         return mc1231a_reject_(MC1231A_GET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_mtr_bias(slave, &response);
+        if (answers) {
+            size = mc1231a_get_mtr_bias_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_mtr_bias(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_mtr_bias_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_pos_err_(
+static inline int mc1231a_slave_get_pos_err_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_pos_err_response_t response = MC1231A_GET_POS_ERR_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_pos_err == NULL) {
         return mc1231a_reject_(MC1231A_GET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_pos_err(slave, &response);
+        if (answers) {
+            size = mc1231a_get_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_pos_err(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_intgr_(
+static inline int mc1231a_slave_get_intgr_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_intgr_response_t response = MC1231A_GET_INTGR_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_intgr == NULL) {
         return mc1231a_reject_(MC1231A_GET_INTGR_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_intgr(slave, &response);
+        if (answers) {
+            size = mc1231a_get_intgr_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_intgr(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_intgr_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_actl_pos_err_(
+static inline int mc1231a_slave_get_actl_pos_err_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_actl_pos_err_response_t response = MC1231A_GET_ACTL_POS_ERR_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_actl_pos_err == NULL) {
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_actl_pos_err(slave, &response);
+        if (answers) {
+            size = mc1231a_get_actl_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_actl_pos_err(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_actl_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_auto_stop_on_(
+static inline int mc1231a_slave_set_auto_stop_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_auto_stop_on == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_auto_stop_on(slave);
+        if (answers) {
+            size = mc1231a_set_auto_stop_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_auto_stop_on(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_auto_stop_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_auto_stop_off_(
+static inline int mc1231a_slave_set_auto_stop_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_auto_stop_off == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_auto_stop_off(slave);
+        if (answers) {
+            size = mc1231a_set_auto_stop_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_auto_stop_off(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_auto_stop_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_time_brk_(
+static inline int mc1231a_slave_set_time_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_time_brk == NULL) {
         return mc1231a_reject_(MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_time_brk(slave);
+        if (answers) {
+            size = mc1231a_set_time_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_time_brk(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_time_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_pos_brk_(
+static inline int mc1231a_slave_set_pos_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_pos_brk == NULL) {
         return mc1231a_reject_(MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_pos_brk(slave);
+        if (answers) {
+            size = mc1231a_set_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_pos_brk(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_neg_brk_(
+static inline int mc1231a_slave_set_neg_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_neg_brk == NULL) {
         return mc1231a_reject_(MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_neg_brk(slave);
+        if (answers) {
+            size = mc1231a_set_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_neg_brk(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_actl_pos_brk_(
+static inline int mc1231a_slave_set_actl_pos_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_actl_pos_brk == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_actl_pos_brk(slave);
+        if (answers) {
+            size = mc1231a_set_actl_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_actl_pos_brk(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_actl_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_actl_neg_brk_(
+static inline int mc1231a_slave_set_actl_neg_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_actl_neg_brk == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_actl_neg_brk(slave);
+        if (answers) {
+            size = mc1231a_set_actl_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_actl_neg_brk(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_actl_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_mtn_cmplt_brk_(
+static inline int mc1231a_slave_set_mtn_cmplt_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_mtn_cmplt_brk == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_mtn_cmplt_brk(slave);
+        if (answers) {
+            size = mc1231a_set_mtn_cmplt_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_mtn_cmplt_brk(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_mtn_cmplt_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_ext_brk_(
+static inline int mc1231a_slave_set_ext_brk_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_ext_brk == NULL) {
         return mc1231a_reject_(MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_ext_brk(slave);
+        if (answers) {
+            size = mc1231a_set_ext_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_ext_brk(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_ext_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_brk_off_(
+static inline int mc1231a_slave_set_brk_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_brk_off == NULL) {
         return mc1231a_reject_(MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_brk_off(slave);
+        if (answers) {
+            size = mc1231a_set_brk_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_brk_off(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_brk_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_brk_pnt_(
+static inline int mc1231a_slave_set_brk_pnt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_brk_pnt_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_brk_pnt == NULL) {
         return mc1231a_reject_(MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_brk_pnt_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_brk_pnt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_brk_pnt(slave, &request);
+        if (answers) {
+            size = mc1231a_set_brk_pnt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_brk_pnt(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_brk_pnt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_update_(
+static inline int mc1231a_slave_update_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->update == NULL) {
         return mc1231a_reject_(MC1231A_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->update(slave);
+        if (answers) {
+            size = mc1231a_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->update(slave)) {
-        return 0u;
-    }
-    size = mc1231a_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_multi_update_(
+static inline int mc1231a_slave_multi_update_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_multi_update_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->multi_update == NULL) {
         return mc1231a_reject_(MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_multi_update_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_multi_update_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->multi_update(slave, &request);
+        if (answers) {
+            size = mc1231a_multi_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->multi_update(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_multi_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_auto_update_on_(
+static inline int mc1231a_slave_set_auto_update_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_auto_update_on == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_auto_update_on(slave);
+        if (answers) {
+            size = mc1231a_set_auto_update_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_auto_update_on(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_auto_update_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_auto_update_off_(
+static inline int mc1231a_slave_set_auto_update_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_auto_update_off == NULL) {
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_auto_update_off(slave);
+        if (answers) {
+            size = mc1231a_set_auto_update_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_auto_update_off(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_auto_update_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_brk_pnt_(
+static inline int mc1231a_slave_get_brk_pnt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_brk_pnt_response_t response = MC1231A_GET_BRK_PNT_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_brk_pnt == NULL) {
         return mc1231a_reject_(MC1231A_GET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_brk_pnt(slave, &response);
+        if (answers) {
+            size = mc1231a_get_brk_pnt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_brk_pnt(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_brk_pnt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_intrpt_mask_(
+static inline int mc1231a_slave_set_intrpt_mask_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_intrpt_mask_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_intrpt_mask == NULL) {
         return mc1231a_reject_(MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_intrpt_mask_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_intrpt_mask_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_intrpt_mask(slave, &request);
+        if (answers) {
+            size = mc1231a_set_intrpt_mask_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_intrpt_mask(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_intrpt_mask_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_intrpt_(
+static inline int mc1231a_slave_get_intrpt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_intrpt_response_t response = MC1231A_GET_INTRPT_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_intrpt == NULL) {
         return mc1231a_reject_(MC1231A_GET_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_intrpt(slave, &response);
+        if (answers) {
+            size = mc1231a_get_intrpt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_intrpt(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_intrpt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_rst_intrpt_(
+static inline int mc1231a_slave_rst_intrpt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_rst_intrpt_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->rst_intrpt == NULL) {
         return mc1231a_reject_(MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_rst_intrpt_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_rst_intrpt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->rst_intrpt(slave, &request);
+        if (answers) {
+            size = mc1231a_rst_intrpt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->rst_intrpt(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_rst_intrpt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_intrpt_mask_(
+static inline int mc1231a_slave_get_intrpt_mask_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_intrpt_mask_response_t response = MC1231A_GET_INTRPT_MASK_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_intrpt_mask == NULL) {
         return mc1231a_reject_(MC1231A_GET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_intrpt_mask(slave, &response);
+        if (answers) {
+            size = mc1231a_get_intrpt_mask_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_intrpt_mask(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_intrpt_mask_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_clr_status_(
+static inline int mc1231a_slave_clr_status_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->clr_status == NULL) {
         return mc1231a_reject_(MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->clr_status(slave);
+        if (answers) {
+            size = mc1231a_clr_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->clr_status(slave)) {
-        return 0u;
-    }
-    size = mc1231a_clr_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_rst_status_(
+static inline int mc1231a_slave_rst_status_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_rst_status_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->rst_status == NULL) {
         return mc1231a_reject_(MC1231A_RST_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_rst_status_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_rst_status_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->rst_status(slave, &request);
+        if (answers) {
+            size = mc1231a_rst_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->rst_status(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_rst_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_status_(
+static inline int mc1231a_slave_get_status_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_status_response_t response = MC1231A_GET_STATUS_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_status == NULL) {
         return mc1231a_reject_(MC1231A_GET_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_status(slave, &response);
+        if (answers) {
+            size = mc1231a_get_status_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_status(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_status_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_mode_(
+static inline int mc1231a_slave_get_mode_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mode_response_t response = MC1231A_GET_MODE_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_mode == NULL) {
         return mc1231a_reject_(MC1231A_GET_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_mode(slave, &response);
+        if (answers) {
+            size = mc1231a_get_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_mode(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_capt_index_(
+static inline int mc1231a_slave_set_capt_index_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_capt_index == NULL) {
         return mc1231a_reject_(MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_capt_index(slave);
+        if (answers) {
+            size = mc1231a_set_capt_index_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_capt_index(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_capt_index_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_capt_home_(
+static inline int mc1231a_slave_set_capt_home_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_capt_home == NULL) {
         return mc1231a_reject_(MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_capt_home(slave);
+        if (answers) {
+            size = mc1231a_set_capt_home_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_capt_home(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_capt_home_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_capt_(
+static inline int mc1231a_slave_get_capt_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_capt_response_t response = MC1231A_GET_CAPT_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_capt == NULL) {
         return mc1231a_reject_(MC1231A_GET_CAPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_capt(slave, &response);
+        if (answers) {
+            size = mc1231a_get_capt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_capt(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_capt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_output_pwm_(
+static inline int mc1231a_slave_set_output_pwm_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_output_pwm == NULL) {
         return mc1231a_reject_(MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_output_pwm(slave);
+        if (answers) {
+            size = mc1231a_set_output_pwm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_output_pwm(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_output_pwm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_output_dac16_(
+static inline int mc1231a_slave_set_output_dac16_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->set_output_dac16 == NULL) {
         return mc1231a_reject_(MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->set_output_dac16(slave);
+        if (answers) {
+            size = mc1231a_set_output_dac16_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_output_dac16(slave)) {
-        return 0u;
-    }
-    size = mc1231a_set_output_dac16_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_mtr_on_(
+static inline int mc1231a_slave_mtr_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->mtr_on == NULL) {
         return mc1231a_reject_(MC1231A_MTR_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->mtr_on(slave);
+        if (answers) {
+            size = mc1231a_mtr_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->mtr_on(slave)) {
-        return 0u;
-    }
-    size = mc1231a_mtr_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_mtr_off_(
+static inline int mc1231a_slave_mtr_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->mtr_off == NULL) {
         return mc1231a_reject_(MC1231A_MTR_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->mtr_off(slave);
+        if (answers) {
+            size = mc1231a_mtr_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->mtr_off(slave)) {
-        return 0u;
-    }
-    size = mc1231a_mtr_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_mtr_cmd_(
+static inline int mc1231a_slave_set_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_mtr_cmd_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_mtr_cmd == NULL) {
         return mc1231a_reject_(MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_mtr_cmd_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_mtr_cmd(slave, &request);
+        if (answers) {
+            size = mc1231a_set_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_mtr_cmd(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_mtr_cmd_(
+static inline int mc1231a_slave_get_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_mtr_cmd_response_t response = MC1231A_GET_MTR_CMD_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_mtr_cmd == NULL) {
         return mc1231a_reject_(MC1231A_GET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_mtr_cmd(slave, &response);
+        if (answers) {
+            size = mc1231a_get_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_mtr_cmd(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_buf_mtr_cmd_(
+static inline int mc1231a_slave_set_buf_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_buf_mtr_cmd_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_buf_mtr_cmd == NULL) {
         return mc1231a_reject_(MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_buf_mtr_cmd_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_buf_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_buf_mtr_cmd(slave, &request);
+        if (answers) {
+            size = mc1231a_set_buf_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_buf_mtr_cmd(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_buf_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_buf_mtr_cmd_(
+static inline int mc1231a_slave_get_buf_mtr_cmd_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_buf_mtr_cmd_response_t response = MC1231A_GET_BUF_MTR_CMD_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_buf_mtr_cmd == NULL) {
         return mc1231a_reject_(MC1231A_GET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_buf_mtr_cmd(slave, &response);
+        if (answers) {
+            size = mc1231a_get_buf_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_buf_mtr_cmd(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_buf_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_output_mode_(
+static inline int mc1231a_slave_get_output_mode_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_output_mode_response_t response = MC1231A_GET_OUTPUT_MODE_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_output_mode == NULL) {
         return mc1231a_reject_(MC1231A_GET_OUTPUT_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_output_mode(slave, &response);
+        if (answers) {
+            size = mc1231a_get_output_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_output_mode(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_output_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_axis_on_(
+static inline int mc1231a_slave_axis_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->axis_on == NULL) {
         return mc1231a_reject_(MC1231A_AXIS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->axis_on(slave);
+        if (answers) {
+            size = mc1231a_axis_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->axis_on(slave)) {
-        return 0u;
-    }
-    size = mc1231a_axis_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_axis_off_(
+static inline int mc1231a_slave_axis_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->axis_off == NULL) {
         return mc1231a_reject_(MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->axis_off(slave);
+        if (answers) {
+            size = mc1231a_axis_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->axis_off(slave)) {
-        return 0u;
-    }
-    size = mc1231a_axis_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_actl_pos_(
+static inline int mc1231a_slave_set_actl_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_actl_pos_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_actl_pos == NULL) {
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_actl_pos_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_actl_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_actl_pos(slave, &request);
+        if (answers) {
+            size = mc1231a_set_actl_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_actl_pos(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_actl_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_actl_pos_(
+static inline int mc1231a_slave_get_actl_pos_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_actl_pos_response_t response = MC1231A_GET_ACTL_POS_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_actl_pos == NULL) {
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_actl_pos(slave, &response);
+        if (answers) {
+            size = mc1231a_get_actl_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_actl_pos(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_actl_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_lmt_sense_(
+static inline int mc1231a_slave_set_lmt_sense_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_lmt_sense_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_lmt_sense == NULL) {
         return mc1231a_reject_(MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_lmt_sense_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_lmt_sense_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_lmt_sense(slave, &request);
+        if (answers) {
+            size = mc1231a_set_lmt_sense_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_lmt_sense(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_lmt_sense_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_lmt_swtch_(
+static inline int mc1231a_slave_get_lmt_swtch_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_lmt_swtch_response_t response = MC1231A_GET_LMT_SWTCH_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_lmt_swtch == NULL) {
         return mc1231a_reject_(MC1231A_GET_LMT_SWTCH_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_lmt_swtch(slave, &response);
+        if (answers) {
+            size = mc1231a_get_lmt_swtch_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_lmt_swtch(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_lmt_swtch_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_lmts_on_(
+static inline int mc1231a_slave_lmts_on_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->lmts_on == NULL) {
         return mc1231a_reject_(MC1231A_LMTS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->lmts_on(slave);
+        if (answers) {
+            size = mc1231a_lmts_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->lmts_on(slave)) {
-        return 0u;
-    }
-    size = mc1231a_lmts_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_lmts_off_(
+static inline int mc1231a_slave_lmts_off_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->lmts_off == NULL) {
         return mc1231a_reject_(MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->lmts_off(slave);
+        if (answers) {
+            size = mc1231a_lmts_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->lmts_off(slave)) {
-        return 0u;
-    }
-    size = mc1231a_lmts_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_home_(
+static inline int mc1231a_slave_get_home_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_home_response_t response = MC1231A_GET_HOME_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_home == NULL) {
         return mc1231a_reject_(MC1231A_GET_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_home(slave, &response);
+        if (answers) {
+            size = mc1231a_get_home_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_home(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_home_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_smpl_time_(
+static inline int mc1231a_slave_set_smpl_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_smpl_time_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_smpl_time == NULL) {
         return mc1231a_reject_(MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_smpl_time_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_smpl_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_smpl_time(slave, &request);
+        if (answers) {
+            size = mc1231a_set_smpl_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_smpl_time(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_smpl_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_smpl_time_(
+static inline int mc1231a_slave_get_smpl_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_smpl_time_response_t response = MC1231A_GET_SMPL_TIME_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_smpl_time == NULL) {
         return mc1231a_reject_(MC1231A_GET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_smpl_time(slave, &response);
+        if (answers) {
+            size = mc1231a_get_smpl_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_smpl_time(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_smpl_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_reset_(
+static inline int mc1231a_slave_reset_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->reset == NULL) {
         return mc1231a_reject_(MC1231A_RESET_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->reset(slave);
+        if (answers) {
+            size = mc1231a_reset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->reset(slave)) {
-        return 0u;
-    }
-    size = mc1231a_reset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_vrsn_(
+static inline int mc1231a_slave_get_vrsn_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_vrsn_response_t response = MC1231A_GET_VRSN_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_vrsn == NULL) {
         return mc1231a_reject_(MC1231A_GET_VRSN_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_vrsn(slave, &response);
+        if (answers) {
+            size = mc1231a_get_vrsn_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_vrsn(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_vrsn_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_time_(
+static inline int mc1231a_slave_get_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_time_response_t response = MC1231A_GET_TIME_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_time == NULL) {
         return mc1231a_reject_(MC1231A_GET_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_time(slave, &response);
+        if (answers) {
+            size = mc1231a_get_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_time(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_phase_cnts_(
+static inline int mc1231a_slave_set_phase_cnts_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_cnts_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_phase_cnts == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_phase_cnts_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_phase_cnts_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_phase_cnts(slave, &request);
+        if (answers) {
+            size = mc1231a_set_phase_cnts_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_phase_cnts(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_phase_cnts_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_phase_offset_(
+static inline int mc1231a_slave_set_phase_offset_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_offset_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_phase_offset == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_phase_offset_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_phase_offset_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_phase_offset(slave, &request);
+        if (answers) {
+            size = mc1231a_set_phase_offset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_phase_offset(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_phase_offset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_phase_time_(
+static inline int mc1231a_slave_set_phase_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_time_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_phase_time == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_phase_time_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_phase_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_phase_time(slave, &request);
+        if (answers) {
+            size = mc1231a_set_phase_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_phase_time(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_phase_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_set_phase_(
+static inline int mc1231a_slave_set_phase_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_set_phase_request_t request;
-    int size;
+    int size = 0;
 
     if (slave->set_phase == NULL) {
         return mc1231a_reject_(MC1231A_SET_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (mc1231a_set_phase_request_decode(&request, frame->payload, frame->size) != MC1231A_OK) {
-        return 0u;
+    if (mc1231a_set_phase_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
+        const bool answers = slave->set_phase(slave, &request);
+        if (answers) {
+            size = mc1231a_set_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->set_phase(slave, &request)) {
-        return 0u;
-    }
-    size = mc1231a_set_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_init_phase_(
+static inline int mc1231a_slave_init_phase_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
     if (slave->init_phase == NULL) {
         return mc1231a_reject_(MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->init_phase(slave);
+        if (answers) {
+            size = mc1231a_init_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->init_phase(slave)) {
-        return 0u;
-    }
-    size = mc1231a_init_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_phase_info_(
+static inline int mc1231a_slave_get_phase_info_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_info_response_t response = MC1231A_GET_PHASE_INFO_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_phase_info == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_INFO_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_phase_info(slave, &response);
+        if (answers) {
+            size = mc1231a_get_phase_info_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_phase_info(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_phase_info_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_phase_cnts_(
+static inline int mc1231a_slave_get_phase_cnts_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_cnts_response_t response = MC1231A_GET_PHASE_CNTS_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_phase_cnts == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_phase_cnts(slave, &response);
+        if (answers) {
+            size = mc1231a_get_phase_cnts_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_phase_cnts(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_phase_cnts_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_phase_time_(
+static inline int mc1231a_slave_get_phase_time_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_time_response_t response = MC1231A_GET_PHASE_TIME_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_phase_time == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_phase_time(slave, &response);
+        if (answers) {
+            size = mc1231a_get_phase_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_phase_time(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_phase_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t mc1231a_slave_get_phase_offset_(
+static inline int mc1231a_slave_get_phase_offset_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     mc1231a_get_phase_offset_response_t response = MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
     if (slave->get_phase_offset == NULL) {
         return mc1231a_reject_(MC1231A_GET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
-    if (frame->size != 0u) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->get_phase_offset(slave, &response);
+        if (answers) {
+            size = mc1231a_get_phase_offset_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
+        }
     }
-    if (!slave->get_phase_offset(slave, &response)) {
-        return 0u;
-    }
-    size = mc1231a_get_phase_offset_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-/* Handles a request; returns the bytes of the answer in `wire`, 0 where there is nothing to send. `wire` may take
- * MC1231A_MAX_WIRE_SIZE bytes, and must not be the memory that the frame lies in. */
-static inline size_t mc1231a_slave_dispatch(
+/* All requests. */
+static inline int mc1231a_handle_any_(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     switch (frame->id) {
@@ -10859,8 +10668,18 @@ static inline size_t mc1231a_slave_dispatch(
     case MC1231A_GET_PHASE_OFFSET_REQUEST_ID:
         return mc1231a_slave_get_phase_offset_(slave, frame, wire, capacity);
     default:
-        return 0u;
+        return 0;
     }
+}
+
+/* Handles a request; returns the bytes of the answer in `wire`, 0 where there is nothing to send. `wire` may take
+ * MC1231A_MAX_WIRE_SIZE bytes, and must not be the memory that the frame lies in. */
+static inline size_t mc1231a_slave_dispatch(
+    mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
+{
+    int size = 0;
+    size = mc1231a_handle_any_(slave, frame, wire, capacity);
+    return (size > 0) ? (size_t)size : 0U;
 }
 
 #ifdef __cplusplus

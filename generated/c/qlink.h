@@ -44,7 +44,7 @@
  * void board_start(void)
  * {
  *     qlink_receiver_init(&receiver);
- *     slave.node = 1u;
+ *     slave.node = 1U;
  *     slave.motion = on_motion;
  * }
  */
@@ -55,6 +55,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -69,10 +72,11 @@ extern "C" {
 
 /* What the code relies on: bytes of eight bits, and two's complement where an unsigned number becomes a signed one. */
 typedef char qlink_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
-typedef char qlink_needs_twos_complement_[((int8_t)0xFFu == -1 && (int16_t)0xFFFFu == -1) ? 1 : -1];
+typedef char qlink_needs_twos_complement_[(((int8_t)0xFFU == -1) && ((int16_t)0xFFFFU == -1)) ? 1 : -1];
 typedef char qlink_needs_sizes_in_int_[(INT_MAX >= 61) ? 1 : -1];
 
-typedef enum qlink_status {
+/* What went wrong; functions return it as an int, which may also be a number of bytes. */
+enum {
     QLINK_OK = 0,
     QLINK_ERROR_CAPACITY = -1,  /* the buffer is too small */
     QLINK_ERROR_LENGTH = -2,    /* a size or count that the message cannot have */
@@ -83,7 +87,8 @@ typedef enum qlink_status {
     QLINK_ERROR_TRUNCATED = -7, /* the frame is not complete */
     QLINK_ERROR_FRAME = -8,     /* preamble, header or end is wrong */
     QLINK_ERROR_ILLEGAL = -9    /* the slave does not know the command */
-} qlink_status_t;
+};
+typedef int qlink_status_t;
 
 /* What a received byte completed. */
 typedef enum qlink_event {
@@ -97,20 +102,20 @@ typedef enum qlink_event {
     QLINK_EVENT_FRAMING
 } qlink_event_t;
 
-#define QLINK_MAX_PAYLOAD_SIZE 26u
-#define QLINK_MAX_FRAME_SIZE 33u
-#define QLINK_MAX_WIRE_SIZE 61u
-#define QLINK_FIRST_NODE 1u
-#define QLINK_LAST_NODE 16u
-#define QLINK_BROADCAST 0u
-#define QLINK_BAUD 115200ul
-#define QLINK_BITS_PER_BYTE 10u
+#define QLINK_MAX_PAYLOAD_SIZE 26U
+#define QLINK_MAX_FRAME_SIZE 33U
+#define QLINK_MAX_WIRE_SIZE 61U
+#define QLINK_FIRST_NODE 1U
+#define QLINK_LAST_NODE 16U
+#define QLINK_BROADCAST 0U
+#define QLINK_BAUD 115200UL
+#define QLINK_BITS_PER_BYTE 10U
 
 /* Enum position_type (section 7.1.1): How a node asks its motor for the position. */
 typedef uint8_t qlink_position_type_t;
-#define QLINK_POSITION_TYPE_NONE 0u /* The position is not asked for */
-#define QLINK_POSITION_TYPE_JVL_MACTALK 1u /* JVL MacTalk position request */
-#define QLINK_POSITION_TYPE_METRONIX 2u /* Metronix position request */
+#define QLINK_POSITION_TYPE_NONE 0U /* The position is not asked for */
+#define QLINK_POSITION_TYPE_JVL_MACTALK 1U /* JVL MacTalk position request */
+#define QLINK_POSITION_TYPE_METRONIX 2U /* Metronix position request */
 
 static inline bool qlink_position_type_is_valid(qlink_position_type_t value)
 {
@@ -143,8 +148,8 @@ static inline const char *qlink_position_type_name(qlink_position_type_t value)
 /* Flags motor_status (section 7.10): State of the motor; the bits without a name are not defined yet and are kept as
  * received. */
 typedef uint16_t qlink_motor_status_t;
-#define QLINK_MOTOR_STATUS_RUNNING 0x0001u /* The motor runs */
-#define QLINK_MOTOR_STATUS_POSITION_VALID 0x0002u /* The position in the same message is valid */
+#define QLINK_MOTOR_STATUS_RUNNING 0x0001U /* The motor runs */
+#define QLINK_MOTOR_STATUS_POSITION_VALID 0x0002U /* The position in the same message is valid */
 
 /* ---- Bytes ---- */
 
@@ -193,24 +198,35 @@ static inline uint32_t qlink_get_u24_le_(const uint8_t *at)
         (uint32_t)((uint32_t)at[2] << 16));
 }
 
+static inline void qlink_copy_(uint8_t *to, const uint8_t *from, size_t count)
+{
+    for (size_t index = 0U; index < count; ++index) {
+        to[index] = from[index];
+    }
+}
+
 #if QLINK_ENABLE_FLOAT
 /* The whole number of steps that is nearest, a tie to the even one. What is not exact in a double is not exact here. */
 static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most, uint8_t *raw)
 {
     uint8_t whole;
     double rest;
-    if (!(steps >= (double)least - 0.5 && steps <= (double)most + 0.5)) {
+    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
         return QLINK_ERROR_RANGE;
     }
-    if (steps <= (double)least || steps >= (double)most) {
-        *raw = (steps <= (double)least) ? least : most;
+    if (steps <= (double)least) {
+        *raw = least;
+        return QLINK_OK;
+    }
+    if (steps >= (double)most) {
+        *raw = most;
         return QLINK_OK;
     }
     whole = (uint8_t)steps;
     rest = steps - (double)whole;
-    if (rest > 0.5 || (rest == 0.5 && (whole & 1) != 0)) {
+    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1U) != 0U))) {
         ++whole;
-    } else if (rest < -0.5 || (rest == -0.5 && (whole & 1) != 0)) {
+    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
         /* already the nearest */
@@ -225,37 +241,37 @@ static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most
 /* Any 16-bit algorithm of the CRC catalogue: (polynomial, start value, reflected, final XOR).
  * Choose one with -DQLINK_CRC=QLINK_CRC_16_XMODEM, or write a tuple of your own. The check value is the CRC of
  * the nine characters 123456789. */
-#define QLINK_CRC_16_ARC (0x8005u, 0x0000u, 1, 0x0000u) /* check value 0xBB3D */
-#define QLINK_CRC_16_CDMA2000 (0xC867u, 0xFFFFu, 0, 0x0000u) /* check value 0x4C06 */
-#define QLINK_CRC_16_CMS (0x8005u, 0xFFFFu, 0, 0x0000u) /* check value 0xAEE7 */
-#define QLINK_CRC_16_DDS_110 (0x8005u, 0x800Du, 0, 0x0000u) /* check value 0x9ECF */
-#define QLINK_CRC_16_DECT_R (0x0589u, 0x0000u, 0, 0x0001u) /* check value 0x007E */
-#define QLINK_CRC_16_DECT_X (0x0589u, 0x0000u, 0, 0x0000u) /* check value 0x007F */
-#define QLINK_CRC_16_DNP (0x3D65u, 0x0000u, 1, 0xFFFFu) /* check value 0xEA82 */
-#define QLINK_CRC_16_EN_13757 (0x3D65u, 0x0000u, 0, 0xFFFFu) /* check value 0xC2B7 */
-#define QLINK_CRC_16_GENIBUS (0x1021u, 0xFFFFu, 0, 0xFFFFu) /* check value 0xD64E */
-#define QLINK_CRC_16_GSM (0x1021u, 0x0000u, 0, 0xFFFFu) /* check value 0xCE3C */
-#define QLINK_CRC_16_IBM_3740 (0x1021u, 0xFFFFu, 0, 0x0000u) /* check value 0x29B1 */
-#define QLINK_CRC_16_IBM_SDLC (0x1021u, 0xFFFFu, 1, 0xFFFFu) /* check value 0x906E */
-#define QLINK_CRC_16_ISO_IEC_14443_3_A (0x1021u, 0xC6C6u, 1, 0x0000u) /* check value 0xBF05 */
-#define QLINK_CRC_16_KERMIT (0x1021u, 0x0000u, 1, 0x0000u) /* check value 0x2189 */
-#define QLINK_CRC_16_LJ1200 (0x6F63u, 0x0000u, 0, 0x0000u) /* check value 0xBDF4 */
-#define QLINK_CRC_16_M17 (0x5935u, 0xFFFFu, 0, 0x0000u) /* check value 0x772B */
-#define QLINK_CRC_16_MAXIM_DOW (0x8005u, 0x0000u, 1, 0xFFFFu) /* check value 0x44C2 */
-#define QLINK_CRC_16_MCRF4XX (0x1021u, 0xFFFFu, 1, 0x0000u) /* check value 0x6F91 */
-#define QLINK_CRC_16_MODBUS (0x8005u, 0xFFFFu, 1, 0x0000u) /* check value 0x4B37 */
-#define QLINK_CRC_16_NRSC_5 (0x080Bu, 0xFFFFu, 1, 0x0000u) /* check value 0xA066 */
-#define QLINK_CRC_16_OPENSAFETY_A (0x5935u, 0x0000u, 0, 0x0000u) /* check value 0x5D38 */
-#define QLINK_CRC_16_OPENSAFETY_B (0x755Bu, 0x0000u, 0, 0x0000u) /* check value 0x20FE */
-#define QLINK_CRC_16_PROFIBUS (0x1DCFu, 0xFFFFu, 0, 0xFFFFu) /* check value 0xA819 */
-#define QLINK_CRC_16_RIELLO (0x1021u, 0xB2AAu, 1, 0x0000u) /* check value 0x63D0 */
-#define QLINK_CRC_16_SPI_FUJITSU (0x1021u, 0x1D0Fu, 0, 0x0000u) /* check value 0xE5CC */
-#define QLINK_CRC_16_T10_DIF (0x8BB7u, 0x0000u, 0, 0x0000u) /* check value 0xD0DB */
-#define QLINK_CRC_16_TELEDISK (0xA097u, 0x0000u, 0, 0x0000u) /* check value 0x0FB3 */
-#define QLINK_CRC_16_TMS37157 (0x1021u, 0x89ECu, 1, 0x0000u) /* check value 0x26B1 */
-#define QLINK_CRC_16_UMTS (0x8005u, 0x0000u, 0, 0x0000u) /* check value 0xFEE8 */
-#define QLINK_CRC_16_USB (0x8005u, 0xFFFFu, 1, 0xFFFFu) /* check value 0xB4C8 */
-#define QLINK_CRC_16_XMODEM (0x1021u, 0x0000u, 0, 0x0000u) /* check value 0x31C3 */
+#define QLINK_CRC_16_ARC (0x8005U, 0x0000U, 1, 0x0000U) /* check value 0xBB3D */
+#define QLINK_CRC_16_CDMA2000 (0xC867U, 0xFFFFU, 0, 0x0000U) /* check value 0x4C06 */
+#define QLINK_CRC_16_CMS (0x8005U, 0xFFFFU, 0, 0x0000U) /* check value 0xAEE7 */
+#define QLINK_CRC_16_DDS_110 (0x8005U, 0x800DU, 0, 0x0000U) /* check value 0x9ECF */
+#define QLINK_CRC_16_DECT_R (0x0589U, 0x0000U, 0, 0x0001U) /* check value 0x007E */
+#define QLINK_CRC_16_DECT_X (0x0589U, 0x0000U, 0, 0x0000U) /* check value 0x007F */
+#define QLINK_CRC_16_DNP (0x3D65U, 0x0000U, 1, 0xFFFFU) /* check value 0xEA82 */
+#define QLINK_CRC_16_EN_13757 (0x3D65U, 0x0000U, 0, 0xFFFFU) /* check value 0xC2B7 */
+#define QLINK_CRC_16_GENIBUS (0x1021U, 0xFFFFU, 0, 0xFFFFU) /* check value 0xD64E */
+#define QLINK_CRC_16_GSM (0x1021U, 0x0000U, 0, 0xFFFFU) /* check value 0xCE3C */
+#define QLINK_CRC_16_IBM_3740 (0x1021U, 0xFFFFU, 0, 0x0000U) /* check value 0x29B1 */
+#define QLINK_CRC_16_IBM_SDLC (0x1021U, 0xFFFFU, 1, 0xFFFFU) /* check value 0x906E */
+#define QLINK_CRC_16_ISO_IEC_14443_3_A (0x1021U, 0xC6C6U, 1, 0x0000U) /* check value 0xBF05 */
+#define QLINK_CRC_16_KERMIT (0x1021U, 0x0000U, 1, 0x0000U) /* check value 0x2189 */
+#define QLINK_CRC_16_LJ1200 (0x6F63U, 0x0000U, 0, 0x0000U) /* check value 0xBDF4 */
+#define QLINK_CRC_16_M17 (0x5935U, 0xFFFFU, 0, 0x0000U) /* check value 0x772B */
+#define QLINK_CRC_16_MAXIM_DOW (0x8005U, 0x0000U, 1, 0xFFFFU) /* check value 0x44C2 */
+#define QLINK_CRC_16_MCRF4XX (0x1021U, 0xFFFFU, 1, 0x0000U) /* check value 0x6F91 */
+#define QLINK_CRC_16_MODBUS (0x8005U, 0xFFFFU, 1, 0x0000U) /* check value 0x4B37 */
+#define QLINK_CRC_16_NRSC_5 (0x080BU, 0xFFFFU, 1, 0x0000U) /* check value 0xA066 */
+#define QLINK_CRC_16_OPENSAFETY_A (0x5935U, 0x0000U, 0, 0x0000U) /* check value 0x5D38 */
+#define QLINK_CRC_16_OPENSAFETY_B (0x755BU, 0x0000U, 0, 0x0000U) /* check value 0x20FE */
+#define QLINK_CRC_16_PROFIBUS (0x1DCFU, 0xFFFFU, 0, 0xFFFFU) /* check value 0xA819 */
+#define QLINK_CRC_16_RIELLO (0x1021U, 0xB2AAU, 1, 0x0000U) /* check value 0x63D0 */
+#define QLINK_CRC_16_SPI_FUJITSU (0x1021U, 0x1D0FU, 0, 0x0000U) /* check value 0xE5CC */
+#define QLINK_CRC_16_T10_DIF (0x8BB7U, 0x0000U, 0, 0x0000U) /* check value 0xD0DB */
+#define QLINK_CRC_16_TELEDISK (0xA097U, 0x0000U, 0, 0x0000U) /* check value 0x0FB3 */
+#define QLINK_CRC_16_TMS37157 (0x1021U, 0x89ECU, 1, 0x0000U) /* check value 0x26B1 */
+#define QLINK_CRC_16_UMTS (0x8005U, 0x0000U, 0, 0x0000U) /* check value 0xFEE8 */
+#define QLINK_CRC_16_USB (0x8005U, 0xFFFFU, 1, 0xFFFFU) /* check value 0xB4C8 */
+#define QLINK_CRC_16_XMODEM (0x1021U, 0x0000U, 0, 0x0000U) /* check value 0x31C3 */
 #ifndef QLINK_CRC
 #define QLINK_CRC QLINK_CRC_16_IBM_3740
 #endif
@@ -282,10 +298,10 @@ static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most
 #define QLINK_CRC_XOROUT_ QLINK_CRC_EXPAND_(QLINK_CRC_TAKE_4_ QLINK_CRC)
 
 /* A reflected CRC keeps its register turned round, so that nothing has to be turned for each byte. */
-#define QLINK_SWAP_1_(x) ((((x) & 0x5555u) << 1) | (((x) >> 1) & 0x5555u))
-#define QLINK_SWAP_2_(x) ((((x) & 0x3333u) << 2) | (((x) >> 2) & 0x3333u))
-#define QLINK_SWAP_4_(x) ((((x) & 0x0F0Fu) << 4) | (((x) >> 4) & 0x0F0Fu))
-#define QLINK_SWAP_8_(x) ((((x) & 0x00FFu) << 8) | (((x) >> 8) & 0x00FFu))
+#define QLINK_SWAP_1_(x) ((((x) & 0x5555U) << 1) | (((x) >> 1) & 0x5555U))
+#define QLINK_SWAP_2_(x) ((((x) & 0x3333U) << 2) | (((x) >> 2) & 0x3333U))
+#define QLINK_SWAP_4_(x) ((((x) & 0x0F0FU) << 4) | (((x) >> 4) & 0x0F0FU))
+#define QLINK_SWAP_8_(x) ((((x) & 0x00FFU) << 8) | (((x) >> 8) & 0x00FFU))
 #define QLINK_TURNED_(x) QLINK_SWAP_8_(QLINK_SWAP_4_(QLINK_SWAP_2_(QLINK_SWAP_1_(x))))
 #if QLINK_CRC_REFLECTED_
 #define QLINK_CRC_FEEDBACK_ QLINK_TURNED_(QLINK_CRC_POLY_)
@@ -304,13 +320,12 @@ static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most
 #endif
 
 #if QLINK_CRC_FORM == QLINK_CRC_FORM_TABLE && \
-    (QLINK_CRC_POLY_ != 0x1021u || QLINK_CRC_REFLECTED_ != 0)
+    (QLINK_CRC_POLY_ != 0x1021U || QLINK_CRC_REFLECTED_ != 0)
 #error "The 256-entry table is that of crc-16/ibm-3740: choose QLINK_CRC_FORM_NIBBLE, or generate with --set crc=NAME"
 #endif
 
 #if QLINK_CRC_FORM != QLINK_CRC_FORM_LOOP
 #if defined(__AVR__) /* tables stay in flash */
-#include <avr/pgmspace.h>
 #define QLINK_CRC_STORAGE_ PROGMEM
 #define QLINK_CRC_ENTRY_(index) pgm_read_word(&qlink_crc_table[(index)])
 #else
@@ -335,63 +350,63 @@ extern const uint16_t qlink_crc_table[];
 #if QLINK_CRC_HERE_
 /* A step is linear: an entry is the sum of what its four bits do, so the compiler can compute the table. */
 #if QLINK_CRC_REFLECTED_
-#define QLINK_CRC_CLOCK_(x) (((x) >> 1) ^ (((x) & 1u) * QLINK_CRC_FEEDBACK_))
+#define QLINK_CRC_CLOCK_(x) (((x) >> 1) ^ (((x) & 1U) * QLINK_CRC_FEEDBACK_))
 #define QLINK_CRC_BIT_3_ QLINK_CRC_FEEDBACK_
 #define QLINK_CRC_BIT_2_ QLINK_CRC_CLOCK_(QLINK_CRC_BIT_3_)
 #define QLINK_CRC_BIT_1_ QLINK_CRC_CLOCK_(QLINK_CRC_BIT_2_)
 #define QLINK_CRC_BIT_0_ QLINK_CRC_CLOCK_(QLINK_CRC_BIT_1_)
 #else
-#define QLINK_CRC_CLOCK_(x) ((((x) << 1) & 0xFFFFu) ^ ((((x) >> 15) & 1u) * QLINK_CRC_FEEDBACK_))
+#define QLINK_CRC_CLOCK_(x) ((((x) << 1) & 0xFFFFU) ^ ((((x) >> 15) & 1U) * QLINK_CRC_FEEDBACK_))
 #define QLINK_CRC_BIT_0_ QLINK_CRC_FEEDBACK_
 #define QLINK_CRC_BIT_1_ QLINK_CRC_CLOCK_(QLINK_CRC_BIT_0_)
 #define QLINK_CRC_BIT_2_ QLINK_CRC_CLOCK_(QLINK_CRC_BIT_1_)
 #define QLINK_CRC_BIT_3_ QLINK_CRC_CLOCK_(QLINK_CRC_BIT_2_)
 #endif
 #define QLINK_CRC_SUM_(i) \
-    ((uint16_t)((((i) & 1u) * QLINK_CRC_BIT_0_) ^ ((((i) >> 1) & 1u) * QLINK_CRC_BIT_1_) ^ \
-                ((((i) >> 2) & 1u) * QLINK_CRC_BIT_2_) ^ ((((i) >> 3) & 1u) * QLINK_CRC_BIT_3_)))
+    ((uint16_t)((((i) & 1U) * QLINK_CRC_BIT_0_) ^ ((((i) >> 1) & 1U) * QLINK_CRC_BIT_1_) ^ \
+                ((((i) >> 2) & 1U) * QLINK_CRC_BIT_2_) ^ ((((i) >> 3) & 1U) * QLINK_CRC_BIT_3_)))
 QLINK_CRC_DECLARE_ uint16_t qlink_crc_table[16] QLINK_CRC_STORAGE_ = {
-    QLINK_CRC_SUM_(0u), QLINK_CRC_SUM_(1u), QLINK_CRC_SUM_(2u), QLINK_CRC_SUM_(3u),
-    QLINK_CRC_SUM_(4u), QLINK_CRC_SUM_(5u), QLINK_CRC_SUM_(6u), QLINK_CRC_SUM_(7u),
-    QLINK_CRC_SUM_(8u), QLINK_CRC_SUM_(9u), QLINK_CRC_SUM_(10u), QLINK_CRC_SUM_(11u),
-    QLINK_CRC_SUM_(12u), QLINK_CRC_SUM_(13u), QLINK_CRC_SUM_(14u), QLINK_CRC_SUM_(15u)
+    QLINK_CRC_SUM_(0U), QLINK_CRC_SUM_(1U), QLINK_CRC_SUM_(2U), QLINK_CRC_SUM_(3U),
+    QLINK_CRC_SUM_(4U), QLINK_CRC_SUM_(5U), QLINK_CRC_SUM_(6U), QLINK_CRC_SUM_(7U),
+    QLINK_CRC_SUM_(8U), QLINK_CRC_SUM_(9U), QLINK_CRC_SUM_(10U), QLINK_CRC_SUM_(11U),
+    QLINK_CRC_SUM_(12U), QLINK_CRC_SUM_(13U), QLINK_CRC_SUM_(14U), QLINK_CRC_SUM_(15U)
 };
 #endif
 #elif QLINK_CRC_FORM == QLINK_CRC_FORM_TABLE
 #if QLINK_CRC_HERE_
 QLINK_CRC_DECLARE_ uint16_t qlink_crc_table[256] QLINK_CRC_STORAGE_ = {
-    0x0000u, 0x1021u, 0x2042u, 0x3063u, 0x4084u, 0x50A5u, 0x60C6u, 0x70E7u,
-    0x8108u, 0x9129u, 0xA14Au, 0xB16Bu, 0xC18Cu, 0xD1ADu, 0xE1CEu, 0xF1EFu,
-    0x1231u, 0x0210u, 0x3273u, 0x2252u, 0x52B5u, 0x4294u, 0x72F7u, 0x62D6u,
-    0x9339u, 0x8318u, 0xB37Bu, 0xA35Au, 0xD3BDu, 0xC39Cu, 0xF3FFu, 0xE3DEu,
-    0x2462u, 0x3443u, 0x0420u, 0x1401u, 0x64E6u, 0x74C7u, 0x44A4u, 0x5485u,
-    0xA56Au, 0xB54Bu, 0x8528u, 0x9509u, 0xE5EEu, 0xF5CFu, 0xC5ACu, 0xD58Du,
-    0x3653u, 0x2672u, 0x1611u, 0x0630u, 0x76D7u, 0x66F6u, 0x5695u, 0x46B4u,
-    0xB75Bu, 0xA77Au, 0x9719u, 0x8738u, 0xF7DFu, 0xE7FEu, 0xD79Du, 0xC7BCu,
-    0x48C4u, 0x58E5u, 0x6886u, 0x78A7u, 0x0840u, 0x1861u, 0x2802u, 0x3823u,
-    0xC9CCu, 0xD9EDu, 0xE98Eu, 0xF9AFu, 0x8948u, 0x9969u, 0xA90Au, 0xB92Bu,
-    0x5AF5u, 0x4AD4u, 0x7AB7u, 0x6A96u, 0x1A71u, 0x0A50u, 0x3A33u, 0x2A12u,
-    0xDBFDu, 0xCBDCu, 0xFBBFu, 0xEB9Eu, 0x9B79u, 0x8B58u, 0xBB3Bu, 0xAB1Au,
-    0x6CA6u, 0x7C87u, 0x4CE4u, 0x5CC5u, 0x2C22u, 0x3C03u, 0x0C60u, 0x1C41u,
-    0xEDAEu, 0xFD8Fu, 0xCDECu, 0xDDCDu, 0xAD2Au, 0xBD0Bu, 0x8D68u, 0x9D49u,
-    0x7E97u, 0x6EB6u, 0x5ED5u, 0x4EF4u, 0x3E13u, 0x2E32u, 0x1E51u, 0x0E70u,
-    0xFF9Fu, 0xEFBEu, 0xDFDDu, 0xCFFCu, 0xBF1Bu, 0xAF3Au, 0x9F59u, 0x8F78u,
-    0x9188u, 0x81A9u, 0xB1CAu, 0xA1EBu, 0xD10Cu, 0xC12Du, 0xF14Eu, 0xE16Fu,
-    0x1080u, 0x00A1u, 0x30C2u, 0x20E3u, 0x5004u, 0x4025u, 0x7046u, 0x6067u,
-    0x83B9u, 0x9398u, 0xA3FBu, 0xB3DAu, 0xC33Du, 0xD31Cu, 0xE37Fu, 0xF35Eu,
-    0x02B1u, 0x1290u, 0x22F3u, 0x32D2u, 0x4235u, 0x5214u, 0x6277u, 0x7256u,
-    0xB5EAu, 0xA5CBu, 0x95A8u, 0x8589u, 0xF56Eu, 0xE54Fu, 0xD52Cu, 0xC50Du,
-    0x34E2u, 0x24C3u, 0x14A0u, 0x0481u, 0x7466u, 0x6447u, 0x5424u, 0x4405u,
-    0xA7DBu, 0xB7FAu, 0x8799u, 0x97B8u, 0xE75Fu, 0xF77Eu, 0xC71Du, 0xD73Cu,
-    0x26D3u, 0x36F2u, 0x0691u, 0x16B0u, 0x6657u, 0x7676u, 0x4615u, 0x5634u,
-    0xD94Cu, 0xC96Du, 0xF90Eu, 0xE92Fu, 0x99C8u, 0x89E9u, 0xB98Au, 0xA9ABu,
-    0x5844u, 0x4865u, 0x7806u, 0x6827u, 0x18C0u, 0x08E1u, 0x3882u, 0x28A3u,
-    0xCB7Du, 0xDB5Cu, 0xEB3Fu, 0xFB1Eu, 0x8BF9u, 0x9BD8u, 0xABBBu, 0xBB9Au,
-    0x4A75u, 0x5A54u, 0x6A37u, 0x7A16u, 0x0AF1u, 0x1AD0u, 0x2AB3u, 0x3A92u,
-    0xFD2Eu, 0xED0Fu, 0xDD6Cu, 0xCD4Du, 0xBDAAu, 0xAD8Bu, 0x9DE8u, 0x8DC9u,
-    0x7C26u, 0x6C07u, 0x5C64u, 0x4C45u, 0x3CA2u, 0x2C83u, 0x1CE0u, 0x0CC1u,
-    0xEF1Fu, 0xFF3Eu, 0xCF5Du, 0xDF7Cu, 0xAF9Bu, 0xBFBAu, 0x8FD9u, 0x9FF8u,
-    0x6E17u, 0x7E36u, 0x4E55u, 0x5E74u, 0x2E93u, 0x3EB2u, 0x0ED1u, 0x1EF0u
+    0x0000U, 0x1021U, 0x2042U, 0x3063U, 0x4084U, 0x50A5U, 0x60C6U, 0x70E7U,
+    0x8108U, 0x9129U, 0xA14AU, 0xB16BU, 0xC18CU, 0xD1ADU, 0xE1CEU, 0xF1EFU,
+    0x1231U, 0x0210U, 0x3273U, 0x2252U, 0x52B5U, 0x4294U, 0x72F7U, 0x62D6U,
+    0x9339U, 0x8318U, 0xB37BU, 0xA35AU, 0xD3BDU, 0xC39CU, 0xF3FFU, 0xE3DEU,
+    0x2462U, 0x3443U, 0x0420U, 0x1401U, 0x64E6U, 0x74C7U, 0x44A4U, 0x5485U,
+    0xA56AU, 0xB54BU, 0x8528U, 0x9509U, 0xE5EEU, 0xF5CFU, 0xC5ACU, 0xD58DU,
+    0x3653U, 0x2672U, 0x1611U, 0x0630U, 0x76D7U, 0x66F6U, 0x5695U, 0x46B4U,
+    0xB75BU, 0xA77AU, 0x9719U, 0x8738U, 0xF7DFU, 0xE7FEU, 0xD79DU, 0xC7BCU,
+    0x48C4U, 0x58E5U, 0x6886U, 0x78A7U, 0x0840U, 0x1861U, 0x2802U, 0x3823U,
+    0xC9CCU, 0xD9EDU, 0xE98EU, 0xF9AFU, 0x8948U, 0x9969U, 0xA90AU, 0xB92BU,
+    0x5AF5U, 0x4AD4U, 0x7AB7U, 0x6A96U, 0x1A71U, 0x0A50U, 0x3A33U, 0x2A12U,
+    0xDBFDU, 0xCBDCU, 0xFBBFU, 0xEB9EU, 0x9B79U, 0x8B58U, 0xBB3BU, 0xAB1AU,
+    0x6CA6U, 0x7C87U, 0x4CE4U, 0x5CC5U, 0x2C22U, 0x3C03U, 0x0C60U, 0x1C41U,
+    0xEDAEU, 0xFD8FU, 0xCDECU, 0xDDCDU, 0xAD2AU, 0xBD0BU, 0x8D68U, 0x9D49U,
+    0x7E97U, 0x6EB6U, 0x5ED5U, 0x4EF4U, 0x3E13U, 0x2E32U, 0x1E51U, 0x0E70U,
+    0xFF9FU, 0xEFBEU, 0xDFDDU, 0xCFFCU, 0xBF1BU, 0xAF3AU, 0x9F59U, 0x8F78U,
+    0x9188U, 0x81A9U, 0xB1CAU, 0xA1EBU, 0xD10CU, 0xC12DU, 0xF14EU, 0xE16FU,
+    0x1080U, 0x00A1U, 0x30C2U, 0x20E3U, 0x5004U, 0x4025U, 0x7046U, 0x6067U,
+    0x83B9U, 0x9398U, 0xA3FBU, 0xB3DAU, 0xC33DU, 0xD31CU, 0xE37FU, 0xF35EU,
+    0x02B1U, 0x1290U, 0x22F3U, 0x32D2U, 0x4235U, 0x5214U, 0x6277U, 0x7256U,
+    0xB5EAU, 0xA5CBU, 0x95A8U, 0x8589U, 0xF56EU, 0xE54FU, 0xD52CU, 0xC50DU,
+    0x34E2U, 0x24C3U, 0x14A0U, 0x0481U, 0x7466U, 0x6447U, 0x5424U, 0x4405U,
+    0xA7DBU, 0xB7FAU, 0x8799U, 0x97B8U, 0xE75FU, 0xF77EU, 0xC71DU, 0xD73CU,
+    0x26D3U, 0x36F2U, 0x0691U, 0x16B0U, 0x6657U, 0x7676U, 0x4615U, 0x5634U,
+    0xD94CU, 0xC96DU, 0xF90EU, 0xE92FU, 0x99C8U, 0x89E9U, 0xB98AU, 0xA9ABU,
+    0x5844U, 0x4865U, 0x7806U, 0x6827U, 0x18C0U, 0x08E1U, 0x3882U, 0x28A3U,
+    0xCB7DU, 0xDB5CU, 0xEB3FU, 0xFB1EU, 0x8BF9U, 0x9BD8U, 0xABBBU, 0xBB9AU,
+    0x4A75U, 0x5A54U, 0x6A37U, 0x7A16U, 0x0AF1U, 0x1AD0U, 0x2AB3U, 0x3A92U,
+    0xFD2EU, 0xED0FU, 0xDD6CU, 0xCD4DU, 0xBDAAU, 0xAD8BU, 0x9DE8U, 0x8DC9U,
+    0x7C26U, 0x6C07U, 0x5C64U, 0x4C45U, 0x3CA2U, 0x2C83U, 0x1CE0U, 0x0CC1U,
+    0xEF1FU, 0xFF3EU, 0xCF5DU, 0xDF7CU, 0xAF9BU, 0xBFBAU, 0x8FD9U, 0x9FF8U,
+    0x6E17U, 0x7E36U, 0x4E55U, 0x5E74U, 0x2E93U, 0x3EB2U, 0x0ED1U, 0x1EF0U
 };
 #endif
 #elif QLINK_CRC_FORM != QLINK_CRC_FORM_LOOP
@@ -404,38 +419,43 @@ static inline uint16_t qlink_check_start(void)
     return (uint16_t)QLINK_CRC_START_;
 }
 
+#if QLINK_CRC_FORM == QLINK_CRC_FORM_TABLE
 static inline uint16_t qlink_check_update(uint16_t crc, uint8_t byte)
 {
-#if QLINK_CRC_FORM == QLINK_CRC_FORM_TABLE
 #if QLINK_CRC_REFLECTED_
-    return (uint16_t)((crc >> 8) ^ QLINK_CRC_ENTRY_((crc ^ byte) & 0xFFu));
+    return (uint16_t)((crc >> 8) ^ QLINK_CRC_ENTRY_((crc ^ byte) & 0xFFU));
 #else
-    return (uint16_t)((crc << 8) ^ QLINK_CRC_ENTRY_(((crc >> 8) ^ byte) & 0xFFu));
-#endif
-#elif QLINK_CRC_FORM == QLINK_CRC_FORM_NIBBLE
-#if QLINK_CRC_REFLECTED_
-    crc = (uint16_t)((crc >> 4) ^ QLINK_CRC_ENTRY_((crc ^ byte) & 0x0Fu));
-    return (uint16_t)((crc >> 4) ^ QLINK_CRC_ENTRY_((crc ^ ((unsigned)byte >> 4)) & 0x0Fu));
-#else
-    crc = (uint16_t)((crc << 4) ^ QLINK_CRC_ENTRY_(((crc >> 12) ^ ((unsigned)byte >> 4)) & 0x0Fu));
-    return (uint16_t)((crc << 4) ^ QLINK_CRC_ENTRY_(((crc >> 12) ^ byte) & 0x0Fu));
-#endif
-#else
-    uint8_t bit;
-#if QLINK_CRC_REFLECTED_
-    crc = (uint16_t)(crc ^ byte);
-    for (bit = 8u; bit > 0u; --bit) {
-        crc = (uint16_t)((crc >> 1) ^ (((crc & 1u) != 0u) ? QLINK_CRC_FEEDBACK_ : 0u));
-    }
-#else
-    crc = (uint16_t)(crc ^ (uint16_t)((uint16_t)byte << 8));
-    for (bit = 8u; bit > 0u; --bit) {
-        crc = (uint16_t)(((uint16_t)(crc << 1) ^ (((crc & 0x8000u) != 0u) ? QLINK_CRC_FEEDBACK_ : 0u)));
-    }
-#endif
-    return crc;
+    return (uint16_t)((crc << 8) ^ QLINK_CRC_ENTRY_(((crc >> 8) ^ byte) & 0xFFU));
 #endif
 }
+#elif QLINK_CRC_FORM == QLINK_CRC_FORM_NIBBLE
+static inline uint16_t qlink_check_update(uint16_t crc, uint8_t byte)
+{
+#if QLINK_CRC_REFLECTED_
+    const uint16_t half = (uint16_t)((crc >> 4) ^ QLINK_CRC_ENTRY_((crc ^ byte) & 0x0FU));
+    return (uint16_t)((half >> 4) ^ QLINK_CRC_ENTRY_((half ^ ((unsigned)byte >> 4)) & 0x0FU));
+#else
+    const uint16_t half = (uint16_t)((crc << 4) ^ QLINK_CRC_ENTRY_(((crc >> 12) ^ ((unsigned)byte >> 4)) & 0x0FU));
+    return (uint16_t)((half << 4) ^ QLINK_CRC_ENTRY_(((half >> 12) ^ byte) & 0x0FU));
+#endif
+}
+#else
+static inline uint16_t qlink_check_update(uint16_t crc, uint8_t byte)
+{
+#if QLINK_CRC_REFLECTED_
+    uint16_t next = (uint16_t)(crc ^ byte);
+    for (uint8_t bit = 8U; bit > 0U; --bit) {
+        next = (uint16_t)((next >> 1) ^ (((next & 1U) != 0U) ? QLINK_CRC_FEEDBACK_ : 0U));
+    }
+#else
+    uint16_t next = (uint16_t)(crc ^ (uint16_t)((uint16_t)byte << 8));
+    for (uint8_t bit = 8U; bit > 0U; --bit) {
+        next = (uint16_t)(((uint16_t)(next << 1) ^ (((next & 0x8000U) != 0U) ? QLINK_CRC_FEEDBACK_ : 0U)));
+    }
+#endif
+    return next;
+}
+#endif
 
 static inline uint16_t qlink_check_finish(uint16_t crc)
 {
@@ -451,162 +471,185 @@ typedef struct qlink_frame {
     size_t size;
     const uint8_t *payload;
 } qlink_frame_t;
+
+/* Whether a frame with so many bytes of payload fits, as long as no byte is inserted. */
+static inline bool qlink_fits_(size_t capacity, size_t size)
+{
+    return capacity >= (size + 7U);
+}
+
+/* Where the payload of a frame that fits is written, so that completing the frame only moves bytes to the front. */
+static inline uint8_t *qlink_place_(uint8_t *wire, size_t capacity, size_t size)
+{
+    return &wire[capacity - 2U - size];
+}
+
 /* Completes a frame whose payload ends 2 bytes before the end of the buffer. One pass computes the check value,
  * inserts the stuffing and moves the bytes to the front: the place written to never overtakes the place read from
  * as long as the frame fits. */
-static inline int qlink_seal_(uint8_t id, uint8_t node, size_t size, uint8_t *wire, size_t capacity)
+static inline int qlink_seal_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
-    uint8_t *end;
-    uint8_t *from;
-    uint8_t *to;
-    uint8_t *check;
+    const size_t size = (size_t)payload_size;
+    size_t from;
+    size_t to = 2U;
+    uint8_t *head;
+    uint8_t *trailer;
     uint16_t value = qlink_check_start();
 
-    if (capacity < 7u || capacity - 7u < size) {
+    if (payload_size < 0) {
+        return payload_size;
+    }
+    if (size > QLINK_MAX_PAYLOAD_SIZE) {
+        return QLINK_ERROR_LENGTH;
+    }
+    if (!qlink_fits_(capacity, size)) {
         return QLINK_ERROR_CAPACITY;
     }
-    end = wire + capacity;
-    from = end - (size + 5u);
-    to = wire + 2;
-    wire[0] = 0xA5u;
-    wire[1] = 0xA5u;
-    from[0] = (uint8_t)(size + 4u);
-    from[1] = id;
-    from[2] = node;
-    check = end - 2;
-    while (from != end) {
+    from = capacity - 5U - size;
+    wire[0] = 0xA5U;
+    wire[1] = 0xA5U;
+    head = &wire[from];
+    head[0] = (uint8_t)(size + 4U);
+    head[1] = id;
+    head[2] = node;
+    trailer = &wire[capacity - 2U];
+    while (from != capacity) {
         uint8_t byte;
-        if (from == check) {
+        if (from == (capacity - 2U)) {
             value = qlink_check_finish(value);
-            (end - 2)[0] = (uint8_t)(value >> 8);
-            (end - 2)[1] = (uint8_t)(value);
+            trailer[0] = (uint8_t)(value >> 8);
+            trailer[1] = (uint8_t)(value);
         }
-        byte = *from;
+        byte = wire[from];
         ++from;
         value = qlink_check_update(value, byte);
-        *to = byte;
+        wire[to] = byte;
         ++to;
-        if (byte == 0xA5u) {
+        if (byte == 0xA5U) {
             if (to >= from) {
                 return QLINK_ERROR_CAPACITY;
             }
-            *to = 0x00u;
+            wire[to] = 0x00U;
             ++to;
         }
     }
-    return (int)(to - wire);
+    return (int)to;
 }
 
 /* Unpacks the frame at the front of received bytes into a body (the frame without preamble and stuffing). `used`
  * becomes the number of bytes taken; with QLINK_ERROR_TRUNCATED it is how many are needed at least. */
 static inline int qlink_scan_(const uint8_t *wire, size_t size, uint8_t *body, qlink_frame_t *frame, size_t *used)
 {
-    const uint8_t *from = wire + 2;
-    const uint8_t *const end = wire + size;
-    size_t at = 0u;
-    size_t total = 5u;
-    size_t payload = 0u;
+    size_t from = 2U;
+    size_t at = 0U;
+    size_t total = 5U;
+    size_t payload = 0U;
+    const uint8_t *end;
     uint16_t value = qlink_check_start();
 
-    if (size < 1u) {
-        *used = 1u;
+    if (size < 1U) {
+        *used = 1U;
         return QLINK_ERROR_TRUNCATED;
     }
-    if (wire[0] != 0xA5u) {
+    if (wire[0] != 0xA5U) {
         return QLINK_ERROR_FRAME;
     }
-    if (size < 2u) {
-        *used = 2u;
+    if (size < 2U) {
+        *used = 2U;
         return QLINK_ERROR_TRUNCATED;
     }
-    if (wire[1] != 0xA5u) {
+    if (wire[1] != 0xA5U) {
         return QLINK_ERROR_FRAME;
     }
     while (at < total) {
         uint8_t byte;
-        if (from == end) {
+        if (from == size) {
             *used = size + (total - at);
             return QLINK_ERROR_TRUNCATED;
         }
-        byte = *from;
+        byte = wire[from];
         ++from;
         body[at] = byte;
-        if (at < total - 2u) {
+        if (at < (total - 2U)) {
             value = qlink_check_update(value, byte);
         }
         ++at;
-        if (body[at - 1u] == 0xA5u) {
-            if (from != end) {
-                if (*from != 0x00u) {
-                    /* Behind the last byte its absence is no error. */
-                    if (at < total) {
-                        *used = (size_t)(from - wire) + 1u;
-                        return QLINK_ERROR_STUFFING;
-                    }
-                } else {
-                    ++from;
-                }
+        if (body[at - 1U] == 0xA5U) {
+            const bool inserted = (from < size) && (wire[from] == 0x00U);
+            if (inserted) {
+                ++from;
+            } else if ((from < size) && (at < total)) { /* behind the last byte its absence is no error */
+                *used = from + 1U;
+                return QLINK_ERROR_STUFFING;
+            } else {
+                /* not there yet */
             }
         }
-        if (at == 3u) {
-            if ((body[0] < 4u) || (body[0] > 30u)) {
+        if (at == 3U) {
+            if ((body[0] < 4U) || (body[0] > 30U)) {
                 return QLINK_ERROR_LENGTH;
             }
-            payload = (size_t)(body[0] - 4u);
-            total = payload + 5u;
+            payload = (size_t)(body[0] - 4U);
+            total = payload + 5U;
         }
     }
-    *used = (size_t)(from - wire);
+    *used = from;
+    end = &body[total - 2U];
     value = qlink_check_finish(value);
-    if (((body + total - 2)[0] != (uint8_t)(value >> 8)) || ((body + total - 2)[1] != (uint8_t)(value))) {
+    if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
         return QLINK_ERROR_CRC;
     }
     frame->id = body[1];
     frame->node = body[2];
     frame->size = payload;
-    frame->payload = body + 3;
+    frame->payload = &body[3];
     return QLINK_OK;
 }
 
-/* Where a payload is written, so that completing the frame only moves bytes to the front. */
-static inline uint8_t *qlink_place_(uint8_t *wire, size_t capacity, size_t size)
+/* The same for a message that the node 0..16 may have. */
+static inline int qlink_seal_0_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
-    return (capacity < size + 2u) ? wire : wire + (capacity - 2u - size);
+    return (node <= 16U) ? qlink_seal_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
-static inline size_t qlink_room_(size_t capacity)
+/* The same for a message that the node 1..16 may have. */
+static inline int qlink_seal_1_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
-    return capacity;
+    return ((node >= 1U) && (node <= 16U)) ? qlink_seal_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
+}
+
+/* The same for a message that the node 0 may have. */
+static inline int qlink_seal_0_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
+{
+    return (node == 0U) ? qlink_seal_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
 /* Makes a frame of any payload; returns its size on the wire. */
 static inline int qlink_frame_encode(
     uint8_t id, uint8_t node, const uint8_t *payload, size_t size, uint8_t *wire, size_t capacity)
 {
-    uint8_t *place;
     if (size > QLINK_MAX_PAYLOAD_SIZE) {
         return QLINK_ERROR_LENGTH;
     }
-    if (qlink_room_(capacity) < size) {
-        return QLINK_ERROR_CAPACITY;
+    if (qlink_fits_(capacity, size)) {
+        uint8_t *const place = qlink_place_(wire, capacity, size);
+        for (size_t index = 0U; index < size; ++index) {
+            place[index] = payload[index];
+        }
     }
-    place = qlink_place_(wire, capacity, size);
-    for (size_t index = 0u; index < size; ++index) {
-        place[index] = payload[index];
-    }
-    return qlink_seal_(id, node, size, wire, capacity);
+    return qlink_seal_(id, node, wire, capacity, (int)size);
 }
 
 /* Bytes that qlink_frame_decode needs for what it unpacks. */
-#define QLINK_DECODE_BUFFER_SIZE 31u
+#define QLINK_DECODE_BUFFER_SIZE 31U
 
 /* Takes exactly one whole frame apart. Framing and check value are verified; what the frame carries is checked by
  * qlink_request_check or _response_check or by decoding it. */
 static inline int qlink_frame_decode(qlink_frame_t *frame, uint8_t *buffer, const uint8_t *wire, size_t size)
 {
-    size_t used = 0u;
+    size_t used = 0U;
     const int status = qlink_scan_(wire, size, buffer, frame, &used);
-    return (status == QLINK_OK && used != size) ? QLINK_ERROR_LENGTH : status;
+    return ((status == QLINK_OK) && (used != size)) ? QLINK_ERROR_LENGTH : status;
 }
 
 /* ---- node_setup.request, id 0x01 (section 7.1): Give a node its number, its output delays and its way of
@@ -618,10 +661,10 @@ static inline int qlink_frame_decode(qlink_frame_t *frame, uint8_t *buffer, cons
  *      3  u8  position_type
  */
 #define QLINK_NODE_SETUP_REQUEST_ID 0x01
-#define QLINK_NODE_SETUP_REQUEST_MIN_SIZE 4u
-#define QLINK_NODE_SETUP_REQUEST_MAX_SIZE 4u
-#define QLINK_NODE_SETUP_REQUEST_MAX_FRAME_SIZE 11u
-#define QLINK_NODE_SETUP_REQUEST_MAX_WIRE_SIZE 17u
+#define QLINK_NODE_SETUP_REQUEST_MIN_SIZE 4U
+#define QLINK_NODE_SETUP_REQUEST_MAX_SIZE 4U
+#define QLINK_NODE_SETUP_REQUEST_MAX_FRAME_SIZE 11U
+#define QLINK_NODE_SETUP_REQUEST_MAX_WIRE_SIZE 17U
 /* t1_delay = (raw * FACTOR + BIAS) / DIVISOR s */
 #define QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR 1
 #define QLINK_NODE_SETUP_REQUEST_T1_DELAY_BIAS 0
@@ -638,15 +681,15 @@ typedef struct qlink_node_setup_request {
     uint8_t position_type; /* How the node asks its motor for the position; enum position_type */
 } qlink_node_setup_request_t;
 
-#define QLINK_NODE_SETUP_REQUEST_INIT { 1u, 10u, 10u, 0u }
+#define QLINK_NODE_SETUP_REQUEST_INIT { 1U, 10U, 10U, 0U }
 
 static inline int qlink_node_setup_request_encode(
     const qlink_node_setup_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->node_number < 1u) || (message->node_number > 16u)) {
+    if ((message->node_number < 1U) || (message->node_number > 16U)) {
         return QLINK_ERROR_RANGE;
     }
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->node_number;
@@ -659,11 +702,11 @@ static inline int qlink_node_setup_request_encode(
 static inline int qlink_node_setup_request_decode(
     qlink_node_setup_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return QLINK_ERROR_LENGTH;
     }
     message->node_number = payload[0];
-    if ((message->node_number < 1u) || (message->node_number > 16u)) {
+    if ((message->node_number < 1U) || (message->node_number > 16U)) {
         return QLINK_ERROR_RANGE;
     }
     message->t1_delay = payload[1];
@@ -675,47 +718,43 @@ static inline int qlink_node_setup_request_decode(
 static inline int qlink_node_setup_request_to_frame(
     const qlink_node_setup_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_NODE_SETUP_REQUEST_MAX_SIZE;
 
-    if (!(node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_NODE_SETUP_REQUEST_MAX_FRAME_SIZE) {
+        size = qlink_node_setup_request_encode(message, qlink_place_(wire, capacity, QLINK_NODE_SETUP_REQUEST_MAX_SIZE),
+            QLINK_NODE_SETUP_REQUEST_MAX_SIZE);
     }
-    if (capacity < QLINK_NODE_SETUP_REQUEST_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_node_setup_request_encode(message, qlink_place_(wire, capacity, QLINK_NODE_SETUP_REQUEST_MAX_SIZE),
-        QLINK_NODE_SETUP_REQUEST_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_NODE_SETUP_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_0_to_16_(QLINK_NODE_SETUP_REQUEST_ID, node, wire, capacity, size);
 }
 
 #if QLINK_ENABLE_FLOAT
 static inline double qlink_node_setup_request_t1_delay_physical(uint8_t raw)
 {
-    const double scaled = (double)raw * (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR +
+    const double scaled = ((double)raw * (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR) +
         (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_BIAS;
     return scaled / (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_DIVISOR;
 }
 
 static inline int qlink_node_setup_request_t1_delay_raw(double physical, uint8_t *raw)
 {
-    const double scaled = physical * (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_DIVISOR -
+    const double scaled = (physical * (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_DIVISOR) -
         (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_BIAS;
     const double steps = scaled / (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0u, 255u, raw);
+    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
 }
 static inline double qlink_node_setup_request_t2_delay_physical(uint8_t raw)
 {
-    const double scaled = (double)raw * (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_FACTOR +
+    const double scaled = ((double)raw * (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_FACTOR) +
         (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_BIAS;
     return scaled / (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_DIVISOR;
 }
 
 static inline int qlink_node_setup_request_t2_delay_raw(double physical, uint8_t *raw)
 {
-    const double scaled = physical * (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_DIVISOR -
+    const double scaled = (physical * (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_DIVISOR) -
         (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_BIAS;
     const double steps = scaled / (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0u, 255u, raw);
+    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
 }
 #endif
 
@@ -723,34 +762,28 @@ static inline int qlink_node_setup_request_t2_delay_raw(double physical, uint8_t
  * asking the motor for a position.
  */
 #define QLINK_NODE_SETUP_RESPONSE_ID 0x01
-#define QLINK_NODE_SETUP_RESPONSE_MIN_SIZE 0u
-#define QLINK_NODE_SETUP_RESPONSE_MAX_SIZE 0u
-#define QLINK_NODE_SETUP_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_NODE_SETUP_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_NODE_SETUP_RESPONSE_MIN_SIZE 0U
+#define QLINK_NODE_SETUP_RESPONSE_MAX_SIZE 0U
+#define QLINK_NODE_SETUP_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_NODE_SETUP_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_node_setup_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_NODE_SETUP_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_NODE_SETUP_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_info.request, id 0x02 (section 7.2): Read a node's firmware version, product, settings and
  * serial number.
  */
 #define QLINK_NODE_INFO_REQUEST_ID 0x02
-#define QLINK_NODE_INFO_REQUEST_MIN_SIZE 0u
-#define QLINK_NODE_INFO_REQUEST_MAX_SIZE 0u
-#define QLINK_NODE_INFO_REQUEST_MAX_FRAME_SIZE 7u
-#define QLINK_NODE_INFO_REQUEST_MAX_WIRE_SIZE 9u
+#define QLINK_NODE_INFO_REQUEST_MIN_SIZE 0U
+#define QLINK_NODE_INFO_REQUEST_MAX_SIZE 0U
+#define QLINK_NODE_INFO_REQUEST_MAX_FRAME_SIZE 7U
+#define QLINK_NODE_INFO_REQUEST_MAX_WIRE_SIZE 9U
 
 static inline int qlink_node_info_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_NODE_INFO_REQUEST_ID, node, 0u, wire, capacity);
+    return qlink_seal_0_to_16_(QLINK_NODE_INFO_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_info.response, id 0x02 (section 7.2): Read a node's firmware version, product, settings and
@@ -765,10 +798,10 @@ static inline int qlink_node_info_request_to_frame(uint8_t node, uint8_t *wire, 
  *      7  u32 be  serial_number
  */
 #define QLINK_NODE_INFO_RESPONSE_ID 0x02
-#define QLINK_NODE_INFO_RESPONSE_MIN_SIZE 11u
-#define QLINK_NODE_INFO_RESPONSE_MAX_SIZE 11u
-#define QLINK_NODE_INFO_RESPONSE_MAX_FRAME_SIZE 18u
-#define QLINK_NODE_INFO_RESPONSE_MAX_WIRE_SIZE 31u
+#define QLINK_NODE_INFO_RESPONSE_MIN_SIZE 11U
+#define QLINK_NODE_INFO_RESPONSE_MAX_SIZE 11U
+#define QLINK_NODE_INFO_RESPONSE_MAX_FRAME_SIZE 18U
+#define QLINK_NODE_INFO_RESPONSE_MAX_WIRE_SIZE 31U
 /* t1_delay = (raw * FACTOR + BIAS) / DIVISOR s */
 #define QLINK_NODE_INFO_RESPONSE_T1_DELAY_FACTOR 1
 #define QLINK_NODE_INFO_RESPONSE_T1_DELAY_BIAS 0
@@ -788,115 +821,105 @@ typedef struct qlink_node_info_response {
     uint32_t serial_number; /* Serial number of the node */
 } qlink_node_info_response_t;
 
-#define QLINK_NODE_INFO_RESPONSE_INIT { 0u, 0u, 0u, 10u, 10u, 0u, 0ul }
+#define QLINK_NODE_INFO_RESPONSE_INIT { 0U, 0U, 0U, 10U, 10U, 0U, 0UL }
 
 static inline int qlink_node_info_response_encode(
     const qlink_node_info_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 11u) {
+    if (capacity < 11U) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->version_major;
     payload[1] = message->version_minor;
-    qlink_put_u16_be_(payload + 2, message->product_id);
+    qlink_put_u16_be_(&payload[2], message->product_id);
     payload[4] = message->t1_delay;
     payload[5] = message->t2_delay;
     payload[6] = message->position_type;
-    qlink_put_u32_be_(payload + 7, message->serial_number);
+    qlink_put_u32_be_(&payload[7], message->serial_number);
     return (int)QLINK_NODE_INFO_RESPONSE_MAX_SIZE;
 }
 
 static inline int qlink_node_info_response_decode(
     qlink_node_info_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 11u) {
+    if (size != 11U) {
         return QLINK_ERROR_LENGTH;
     }
     message->version_major = payload[0];
     message->version_minor = payload[1];
-    message->product_id = qlink_get_u16_be_(payload + 2);
+    message->product_id = qlink_get_u16_be_(&payload[2]);
     message->t1_delay = payload[4];
     message->t2_delay = payload[5];
     message->position_type = payload[6];
-    message->serial_number = qlink_get_u32_be_(payload + 7);
+    message->serial_number = qlink_get_u32_be_(&payload[7]);
     return QLINK_OK;
 }
 
 static inline int qlink_node_info_response_to_frame(
     const qlink_node_info_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_NODE_INFO_RESPONSE_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_NODE_INFO_RESPONSE_MAX_FRAME_SIZE) {
+        size = qlink_node_info_response_encode(message, qlink_place_(wire, capacity, QLINK_NODE_INFO_RESPONSE_MAX_SIZE),
+            QLINK_NODE_INFO_RESPONSE_MAX_SIZE);
     }
-    if (capacity < QLINK_NODE_INFO_RESPONSE_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_node_info_response_encode(message, qlink_place_(wire, capacity, QLINK_NODE_INFO_RESPONSE_MAX_SIZE),
-        QLINK_NODE_INFO_RESPONSE_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_NODE_INFO_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_NODE_INFO_RESPONSE_ID, node, wire, capacity, size);
 }
 
 #if QLINK_ENABLE_FLOAT
 static inline double qlink_node_info_response_t1_delay_physical(uint8_t raw)
 {
-    const double scaled = (double)raw * (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_FACTOR +
+    const double scaled = ((double)raw * (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_FACTOR) +
         (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_BIAS;
     return scaled / (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_DIVISOR;
 }
 
 static inline int qlink_node_info_response_t1_delay_raw(double physical, uint8_t *raw)
 {
-    const double scaled = physical * (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_DIVISOR -
+    const double scaled = (physical * (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_DIVISOR) -
         (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_BIAS;
     const double steps = scaled / (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0u, 255u, raw);
+    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
 }
 static inline double qlink_node_info_response_t2_delay_physical(uint8_t raw)
 {
-    const double scaled = (double)raw * (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_FACTOR +
+    const double scaled = ((double)raw * (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_FACTOR) +
         (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_BIAS;
     return scaled / (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_DIVISOR;
 }
 
 static inline int qlink_node_info_response_t2_delay_raw(double physical, uint8_t *raw)
 {
-    const double scaled = physical * (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_DIVISOR -
+    const double scaled = (physical * (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_DIVISOR) -
         (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_BIAS;
     const double steps = scaled / (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0u, 255u, raw);
+    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
 }
 #endif
 
 /* ---- node_start.request, id 0x03 (section 7.3): Start one node, or all of them at the same time. */
 #define QLINK_NODE_START_REQUEST_ID 0x03
-#define QLINK_NODE_START_REQUEST_MIN_SIZE 0u
-#define QLINK_NODE_START_REQUEST_MAX_SIZE 0u
-#define QLINK_NODE_START_REQUEST_MAX_FRAME_SIZE 7u
-#define QLINK_NODE_START_REQUEST_MAX_WIRE_SIZE 9u
+#define QLINK_NODE_START_REQUEST_MIN_SIZE 0U
+#define QLINK_NODE_START_REQUEST_MAX_SIZE 0U
+#define QLINK_NODE_START_REQUEST_MAX_FRAME_SIZE 7U
+#define QLINK_NODE_START_REQUEST_MAX_WIRE_SIZE 9U
 
 static inline int qlink_node_start_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_NODE_START_REQUEST_ID, node, 0u, wire, capacity);
+    return qlink_seal_0_to_16_(QLINK_NODE_START_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_stop.request, id 0x04 (section 7.4): Stop one node, or all of them at the same time. */
 #define QLINK_NODE_STOP_REQUEST_ID 0x04
-#define QLINK_NODE_STOP_REQUEST_MIN_SIZE 0u
-#define QLINK_NODE_STOP_REQUEST_MAX_SIZE 0u
-#define QLINK_NODE_STOP_REQUEST_MAX_FRAME_SIZE 7u
-#define QLINK_NODE_STOP_REQUEST_MAX_WIRE_SIZE 9u
+#define QLINK_NODE_STOP_REQUEST_MIN_SIZE 0U
+#define QLINK_NODE_STOP_REQUEST_MAX_SIZE 0U
+#define QLINK_NODE_STOP_REQUEST_MAX_FRAME_SIZE 7U
+#define QLINK_NODE_STOP_REQUEST_MAX_WIRE_SIZE 9U
 
 static inline int qlink_node_stop_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_NODE_STOP_REQUEST_ID, node, 0u, wire, capacity);
+    return qlink_seal_0_to_16_(QLINK_NODE_STOP_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_sync.request, id 0x05 (section 7.5): Synchronise all nodes; sent at a fixed interval.
@@ -904,21 +927,21 @@ static inline int qlink_node_stop_request_to_frame(uint8_t node, uint8_t *wire, 
  *      0  u8  counter
  */
 #define QLINK_NODE_SYNC_REQUEST_ID 0x05
-#define QLINK_NODE_SYNC_REQUEST_MIN_SIZE 1u
-#define QLINK_NODE_SYNC_REQUEST_MAX_SIZE 1u
-#define QLINK_NODE_SYNC_REQUEST_MAX_FRAME_SIZE 8u
-#define QLINK_NODE_SYNC_REQUEST_MAX_WIRE_SIZE 11u
+#define QLINK_NODE_SYNC_REQUEST_MIN_SIZE 1U
+#define QLINK_NODE_SYNC_REQUEST_MAX_SIZE 1U
+#define QLINK_NODE_SYNC_REQUEST_MAX_FRAME_SIZE 8U
+#define QLINK_NODE_SYNC_REQUEST_MAX_WIRE_SIZE 11U
 
 typedef struct qlink_node_sync_request {
     uint8_t counter; /* One up for each sync sent, 255 wraps to 0: a jump tells a node what it missed */
 } qlink_node_sync_request_t;
 
-#define QLINK_NODE_SYNC_REQUEST_INIT { 0u }
+#define QLINK_NODE_SYNC_REQUEST_INIT { 0U }
 
 static inline int qlink_node_sync_request_encode(
     const qlink_node_sync_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 1u) {
+    if (capacity < 1U) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->counter;
@@ -928,7 +951,7 @@ static inline int qlink_node_sync_request_encode(
 static inline int qlink_node_sync_request_decode(
     qlink_node_sync_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 1u) {
+    if (size != 1U) {
         return QLINK_ERROR_LENGTH;
     }
     message->counter = payload[0];
@@ -938,17 +961,13 @@ static inline int qlink_node_sync_request_decode(
 static inline int qlink_node_sync_request_to_frame(
     const qlink_node_sync_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_NODE_SYNC_REQUEST_MAX_SIZE;
 
-    if (!(node == 0u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_NODE_SYNC_REQUEST_MAX_FRAME_SIZE) {
+        size = qlink_node_sync_request_encode(message, qlink_place_(wire, capacity, QLINK_NODE_SYNC_REQUEST_MAX_SIZE),
+            QLINK_NODE_SYNC_REQUEST_MAX_SIZE);
     }
-    if (capacity < QLINK_NODE_SYNC_REQUEST_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_node_sync_request_encode(message, qlink_place_(wire, capacity, QLINK_NODE_SYNC_REQUEST_MAX_SIZE),
-        QLINK_NODE_SYNC_REQUEST_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_NODE_SYNC_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_0_(QLINK_NODE_SYNC_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- node_program_load.request, id 0x06 (section 7.6): Load a program. The first request carries no
@@ -959,10 +978,10 @@ static inline int qlink_node_sync_request_to_frame(
  *      1  bytes[0..25]  program_data
  */
 #define QLINK_NODE_PROGRAM_LOAD_REQUEST_ID 0x06
-#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MIN_SIZE 1u
-#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MAX_SIZE 26u
-#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MAX_FRAME_SIZE 33u
-#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MAX_WIRE_SIZE 61u
+#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MIN_SIZE 1U
+#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MAX_SIZE 26U
+#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MAX_FRAME_SIZE 33U
+#define QLINK_NODE_PROGRAM_LOAD_REQUEST_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_node_program_load_request {
     uint8_t counter; /* Number of the piece, 0 for the first, 255 wraps to 0 */
@@ -970,25 +989,23 @@ typedef struct qlink_node_program_load_request {
     uint8_t program_data[25]; /* Piece of the Intel HEX text */
 } qlink_node_program_load_request_t;
 
-#define QLINK_NODE_PROGRAM_LOAD_REQUEST_INIT { 0u, 0u, {0} }
+#define QLINK_NODE_PROGRAM_LOAD_REQUEST_INIT { 0U, 0U, {0} }
 
 static inline int qlink_node_program_load_request_encode(
     const qlink_node_program_load_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = 1u + (size_t)message->program_data_size;
-    uint8_t *at;
+    const uint8_t program_data_size = message->program_data_size;
+    const size_t size = 1U + (size_t)program_data_size;
 
-    if (message->program_data_size > 25u) {
+    if (program_data_size > 25U) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->counter;
-    at = payload + 1;
-    for (size_t index = 0; index < message->program_data_size; ++index) {
-        at[0] = message->program_data[index];
-        at += 1;
+    for (uint8_t index = 0U; index < program_data_size; ++index) {
+        payload[1U + index] = message->program_data[index];
     }
     return (int)size;
 }
@@ -997,39 +1014,33 @@ static inline int qlink_node_program_load_request_decode(
     qlink_node_program_load_request_t *message, const uint8_t *payload, size_t size)
 {
     size_t program_data_count;
-    const uint8_t *at;
 
-    if (size == 0u) {
-        const qlink_node_program_load_request_t defaults = QLINK_NODE_PROGRAM_LOAD_REQUEST_INIT;
-        *message = defaults;
+    if (size == 0U) {
+        message->counter = 0U;
+        message->program_data_size = 0U;
         return QLINK_OK;
     }
-    if ((size < 1u) || (size > 26u)) {
+    if (size > 26U) {
         return QLINK_ERROR_LENGTH;
     }
     message->counter = payload[0];
-    program_data_count = size - 1u;
+    program_data_count = size - 1U;
     message->program_data_size = (uint8_t)program_data_count;
-    at = payload + 1;
-    for (size_t index = 0; index < program_data_count; ++index) {
-        message->program_data[index] = at[0];
-        at += 1;
-    }
+    qlink_copy_(message->program_data, &payload[1], program_data_count);
     return QLINK_OK;
 }
 
 static inline int qlink_node_program_load_request_to_frame(
     const qlink_node_program_load_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    const size_t payload_size = 1u + (size_t)message->program_data_size;
-    int size;
+    const size_t payload_size = 1U + (size_t)message->program_data_size;
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_node_program_load_request_encode(message, qlink_place_(wire, capacity, payload_size),
+            payload_size);
     }
-    size = qlink_node_program_load_request_encode(message, qlink_place_(wire, capacity, payload_size),
-        qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_NODE_PROGRAM_LOAD_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_NODE_PROGRAM_LOAD_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- node_program_load.response, id 0x06 (section 7.6): Load a program. The first request carries no
@@ -1038,21 +1049,21 @@ static inline int qlink_node_program_load_request_to_frame(
  *      0  u8  counter
  */
 #define QLINK_NODE_PROGRAM_LOAD_RESPONSE_ID 0x06
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MIN_SIZE 1u
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE 1u
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_FRAME_SIZE 8u
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_WIRE_SIZE 11u
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MIN_SIZE 1U
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE 1U
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_FRAME_SIZE 8U
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_WIRE_SIZE 11U
 
 typedef struct qlink_node_program_load_response {
     uint8_t counter; /* Counter of the request that is acknowledged */
 } qlink_node_program_load_response_t;
 
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT { 0u }
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT { 0U }
 
 static inline int qlink_node_program_load_response_encode(
     const qlink_node_program_load_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 1u) {
+    if (capacity < 1U) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->counter;
@@ -1062,7 +1073,7 @@ static inline int qlink_node_program_load_response_encode(
 static inline int qlink_node_program_load_response_decode(
     qlink_node_program_load_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 1u) {
+    if (size != 1U) {
         return QLINK_ERROR_LENGTH;
     }
     message->counter = payload[0];
@@ -1072,65 +1083,52 @@ static inline int qlink_node_program_load_response_decode(
 static inline int qlink_node_program_load_response_to_frame(
     const qlink_node_program_load_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_FRAME_SIZE) {
+        size = qlink_node_program_load_response_encode(message,
+            qlink_place_(wire, capacity, QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE),
+            QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE);
     }
-    if (capacity < QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_node_program_load_response_encode(message,
-        qlink_place_(wire, capacity, QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE),
-        QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_NODE_PROGRAM_LOAD_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_NODE_PROGRAM_LOAD_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- node_reset.request, id 0x07 (section 7.7): Reset a node; it answers first. */
 #define QLINK_NODE_RESET_REQUEST_ID 0x07
-#define QLINK_NODE_RESET_REQUEST_MIN_SIZE 0u
-#define QLINK_NODE_RESET_REQUEST_MAX_SIZE 0u
-#define QLINK_NODE_RESET_REQUEST_MAX_FRAME_SIZE 7u
-#define QLINK_NODE_RESET_REQUEST_MAX_WIRE_SIZE 9u
+#define QLINK_NODE_RESET_REQUEST_MIN_SIZE 0U
+#define QLINK_NODE_RESET_REQUEST_MAX_SIZE 0U
+#define QLINK_NODE_RESET_REQUEST_MAX_FRAME_SIZE 7U
+#define QLINK_NODE_RESET_REQUEST_MAX_WIRE_SIZE 9U
 
 static inline int qlink_node_reset_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_NODE_RESET_REQUEST_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_NODE_RESET_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_reset.response, id 0x07 (section 7.7): Reset a node; it answers first. */
 #define QLINK_NODE_RESET_RESPONSE_ID 0x07
-#define QLINK_NODE_RESET_RESPONSE_MIN_SIZE 0u
-#define QLINK_NODE_RESET_RESPONSE_MAX_SIZE 0u
-#define QLINK_NODE_RESET_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_NODE_RESET_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_NODE_RESET_RESPONSE_MIN_SIZE 0U
+#define QLINK_NODE_RESET_RESPONSE_MAX_SIZE 0U
+#define QLINK_NODE_RESET_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_NODE_RESET_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_node_reset_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_NODE_RESET_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_NODE_RESET_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- motor_response_poll.request, id 0x15 (section 7.8): Ask whether the last motor request is completed,
  * and what the motor returned.
  */
 #define QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID 0x15
-#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MIN_SIZE 0u
-#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MAX_SIZE 0u
-#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MAX_FRAME_SIZE 7u
-#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MAX_WIRE_SIZE 9u
+#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MIN_SIZE 0U
+#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MAX_SIZE 0U
+#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MAX_FRAME_SIZE 7U
+#define QLINK_MOTOR_RESPONSE_POLL_REQUEST_MAX_WIRE_SIZE 9U
 
 static inline int qlink_motor_response_poll_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- motor_response_poll.response, id 0x15 (section 7.8): Ask whether the last motor request is
@@ -1140,10 +1138,10 @@ static inline int qlink_motor_response_poll_request_to_frame(uint8_t node, uint8
  *      1  bytes[0..25]  motor_data
  */
 #define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_ID 0x15
-#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MIN_SIZE 1u
-#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MAX_SIZE 26u
-#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MAX_FRAME_SIZE 33u
-#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MAX_WIRE_SIZE 61u
+#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MIN_SIZE 1U
+#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MAX_SIZE 26U
+#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MAX_FRAME_SIZE 33U
+#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_motor_response_poll_response {
     uint8_t last_completion; /* Command number of the last completed request, 0 while it is not completed */
@@ -1151,25 +1149,23 @@ typedef struct qlink_motor_response_poll_response {
     uint8_t motor_data[25]; /* What the motor returned */
 } qlink_motor_response_poll_response_t;
 
-#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_INIT { 0u, 0u, {0} }
+#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_INIT { 0U, 0U, {0} }
 
 static inline int qlink_motor_response_poll_response_encode(
     const qlink_motor_response_poll_response_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = 1u + (size_t)message->motor_data_size;
-    uint8_t *at;
+    const uint8_t motor_data_size = message->motor_data_size;
+    const size_t size = 1U + (size_t)motor_data_size;
 
-    if (message->motor_data_size > 25u) {
+    if (motor_data_size > 25U) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->last_completion;
-    at = payload + 1;
-    for (size_t index = 0; index < message->motor_data_size; ++index) {
-        at[0] = message->motor_data[index];
-        at += 1;
+    for (uint8_t index = 0U; index < motor_data_size; ++index) {
+        payload[1U + index] = message->motor_data[index];
     }
     return (int)size;
 }
@@ -1178,34 +1174,28 @@ static inline int qlink_motor_response_poll_response_decode(
     qlink_motor_response_poll_response_t *message, const uint8_t *payload, size_t size)
 {
     size_t motor_data_count;
-    const uint8_t *at;
 
-    if ((size < 1u) || (size > 26u)) {
+    if ((size < 1U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     message->last_completion = payload[0];
-    motor_data_count = size - 1u;
+    motor_data_count = size - 1U;
     message->motor_data_size = (uint8_t)motor_data_count;
-    at = payload + 1;
-    for (size_t index = 0; index < motor_data_count; ++index) {
-        message->motor_data[index] = at[0];
-        at += 1;
-    }
+    qlink_copy_(message->motor_data, &payload[1], motor_data_count);
     return QLINK_OK;
 }
 
 static inline int qlink_motor_response_poll_response_to_frame(
     const qlink_motor_response_poll_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    const size_t payload_size = 1u + (size_t)message->motor_data_size;
-    int size;
+    const size_t payload_size = 1U + (size_t)message->motor_data_size;
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_motor_response_poll_response_encode(message, qlink_place_(wire, capacity, payload_size),
+            payload_size);
     }
-    size = qlink_motor_response_poll_response_encode(message, qlink_place_(wire, capacity, payload_size),
-        qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_MOTOR_RESPONSE_POLL_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTOR_RESPONSE_POLL_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- motor_request.request, id 0x16 (section 7.9): Send a request to the motor behind a node; the result
@@ -1214,34 +1204,32 @@ static inline int qlink_motor_response_poll_response_to_frame(
  *      0  bytes[1..26]  motor_data
  */
 #define QLINK_MOTOR_REQUEST_REQUEST_ID 0x16
-#define QLINK_MOTOR_REQUEST_REQUEST_MIN_SIZE 1u
-#define QLINK_MOTOR_REQUEST_REQUEST_MAX_SIZE 26u
-#define QLINK_MOTOR_REQUEST_REQUEST_MAX_FRAME_SIZE 33u
-#define QLINK_MOTOR_REQUEST_REQUEST_MAX_WIRE_SIZE 61u
+#define QLINK_MOTOR_REQUEST_REQUEST_MIN_SIZE 1U
+#define QLINK_MOTOR_REQUEST_REQUEST_MAX_SIZE 26U
+#define QLINK_MOTOR_REQUEST_REQUEST_MAX_FRAME_SIZE 33U
+#define QLINK_MOTOR_REQUEST_REQUEST_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_motor_request_request {
     uint8_t motor_data_size; /* bytes in motor_data */
     uint8_t motor_data[26]; /* Passed to the motor as it is */
 } qlink_motor_request_request_t;
 
-#define QLINK_MOTOR_REQUEST_REQUEST_INIT { 1u, {0x00u} }
+#define QLINK_MOTOR_REQUEST_REQUEST_INIT { 1U, {0} }
 
 static inline int qlink_motor_request_request_encode(
     const qlink_motor_request_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = (size_t)message->motor_data_size;
-    uint8_t *at;
+    const uint8_t motor_data_size = message->motor_data_size;
+    const size_t size = (size_t)motor_data_size;
 
-    if ((message->motor_data_size < 1u) || (message->motor_data_size > 26u)) {
+    if ((motor_data_size < 1U) || (motor_data_size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
-    at = payload;
-    for (size_t index = 0; index < message->motor_data_size; ++index) {
-        at[0] = message->motor_data[index];
-        at += 1;
+    for (uint8_t index = 0U; index < motor_data_size; ++index) {
+        payload[index] = message->motor_data[index];
     }
     return (int)size;
 }
@@ -1250,18 +1238,13 @@ static inline int qlink_motor_request_request_decode(
     qlink_motor_request_request_t *message, const uint8_t *payload, size_t size)
 {
     size_t motor_data_count;
-    const uint8_t *at;
 
-    if ((size < 1u) || (size > 26u)) {
+    if ((size < 1U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     motor_data_count = size;
     message->motor_data_size = (uint8_t)motor_data_count;
-    at = payload;
-    for (size_t index = 0; index < motor_data_count; ++index) {
-        message->motor_data[index] = at[0];
-        at += 1;
-    }
+    qlink_copy_(message->motor_data, payload, motor_data_count);
     return QLINK_OK;
 }
 
@@ -1269,31 +1252,26 @@ static inline int qlink_motor_request_request_to_frame(
     const qlink_motor_request_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
     const size_t payload_size = (size_t)message->motor_data_size;
-    int size;
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_motor_request_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    size = qlink_motor_request_request_encode(message, qlink_place_(wire, capacity, payload_size),
-        qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_MOTOR_REQUEST_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTOR_REQUEST_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- motor_request.response, id 0x16 (section 7.9): Send a request to the motor behind a node; the result
  * is read with motor_response_poll.
  */
 #define QLINK_MOTOR_REQUEST_RESPONSE_ID 0x16
-#define QLINK_MOTOR_REQUEST_RESPONSE_MIN_SIZE 0u
-#define QLINK_MOTOR_REQUEST_RESPONSE_MAX_SIZE 0u
-#define QLINK_MOTOR_REQUEST_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_MOTOR_REQUEST_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_MOTOR_REQUEST_RESPONSE_MIN_SIZE 0U
+#define QLINK_MOTOR_REQUEST_RESPONSE_MAX_SIZE 0U
+#define QLINK_MOTOR_REQUEST_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_MOTOR_REQUEST_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_motor_request_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_MOTOR_REQUEST_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTOR_REQUEST_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- motion.request, id 0x20 (section 7.10): Hand path segments and outputs to a node, and read back its
@@ -1304,10 +1282,10 @@ static inline int qlink_motor_request_response_to_frame(uint8_t node, uint8_t *w
  *      2  u16[0..12] be  segments
  */
 #define QLINK_MOTION_REQUEST_ID 0x20
-#define QLINK_MOTION_REQUEST_MIN_SIZE 2u
-#define QLINK_MOTION_REQUEST_MAX_SIZE 26u
-#define QLINK_MOTION_REQUEST_MAX_FRAME_SIZE 33u
-#define QLINK_MOTION_REQUEST_MAX_WIRE_SIZE 61u
+#define QLINK_MOTION_REQUEST_MIN_SIZE 2U
+#define QLINK_MOTION_REQUEST_MAX_SIZE 26U
+#define QLINK_MOTION_REQUEST_MAX_FRAME_SIZE 33U
+#define QLINK_MOTION_REQUEST_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_motion_request {
     uint8_t counter; /* One up for each answered motion, 255 wraps to 0; a repeat carries the same number */
@@ -1316,14 +1294,14 @@ typedef struct qlink_motion_request {
     uint16_t segments[12]; /* Words of path data for the FIFO */
 } qlink_motion_request_t;
 
-#define QLINK_MOTION_REQUEST_INIT { 0u, 0u, 0u, {0} }
+#define QLINK_MOTION_REQUEST_INIT { 0U, 0U, 0U, {0} }
 
 static inline int qlink_motion_request_encode(const qlink_motion_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = 2u + 2u * (size_t)message->segments_count;
-    uint8_t *at;
+    const uint8_t segments_count = message->segments_count;
+    const size_t size = 2U + (2U * (size_t)segments_count);
 
-    if (message->segments_count > 12u) {
+    if (segments_count > 12U) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
@@ -1331,10 +1309,8 @@ static inline int qlink_motion_request_encode(const qlink_motion_request_t *mess
     }
     payload[0] = message->counter;
     payload[1] = message->outputs;
-    at = payload + 2;
-    for (size_t index = 0; index < message->segments_count; ++index) {
-        qlink_put_u16_be_(at, message->segments[index]);
-        at += 2;
+    for (uint8_t index = 0U; index < segments_count; ++index) {
+        qlink_put_u16_be_(&payload[2U + (2U * index)], message->segments[index]);
     }
     return (int)size;
 }
@@ -1342,22 +1318,19 @@ static inline int qlink_motion_request_encode(const qlink_motion_request_t *mess
 static inline int qlink_motion_request_decode(qlink_motion_request_t *message, const uint8_t *payload, size_t size)
 {
     size_t segments_count;
-    const uint8_t *at;
 
-    if ((size < 2u) || (size > 26u)) {
+    if ((size < 2U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     message->counter = payload[0];
     message->outputs = payload[1];
-    if ((size - 2u) % 2u != 0u) {
+    if (((size - 2U) % 2U) != 0U) {
         return QLINK_ERROR_LENGTH;
     }
-    segments_count = (size - 2u) / 2u;
+    segments_count = (size - 2U) / 2U;
     message->segments_count = (uint8_t)segments_count;
-    at = payload + 2;
-    for (size_t index = 0; index < segments_count; ++index) {
-        message->segments[index] = qlink_get_u16_be_(at);
-        at += 2;
+    for (size_t index = 0U; index < segments_count; ++index) {
+        message->segments[index] = qlink_get_u16_be_(&payload[2U + (2U * index)]);
     }
     return QLINK_OK;
 }
@@ -1365,14 +1338,13 @@ static inline int qlink_motion_request_decode(qlink_motion_request_t *message, c
 static inline int qlink_motion_request_to_frame(
     const qlink_motion_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    const size_t payload_size = 2u + 2u * (size_t)message->segments_count;
-    int size;
+    const size_t payload_size = 2U + (2U * (size_t)message->segments_count);
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_motion_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    size = qlink_motion_request_encode(message, qlink_place_(wire, capacity, payload_size), qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_MOTION_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTION_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- motion.response, id 0x20 (section 7.10): Hand path segments and outputs to a node, and read back its
@@ -1385,10 +1357,10 @@ static inline int qlink_motion_request_to_frame(
  *      8  u8      fifo_space
  */
 #define QLINK_MOTION_RESPONSE_ID 0x20
-#define QLINK_MOTION_RESPONSE_MIN_SIZE 9u
-#define QLINK_MOTION_RESPONSE_MAX_SIZE 9u
-#define QLINK_MOTION_RESPONSE_MAX_FRAME_SIZE 16u
-#define QLINK_MOTION_RESPONSE_MAX_WIRE_SIZE 27u
+#define QLINK_MOTION_RESPONSE_MIN_SIZE 9U
+#define QLINK_MOTION_RESPONSE_MAX_SIZE 9U
+#define QLINK_MOTION_RESPONSE_MAX_FRAME_SIZE 16U
+#define QLINK_MOTION_RESPONSE_MAX_WIRE_SIZE 27U
 
 typedef struct qlink_motion_response {
     uint8_t counter; /* Counter of the request that is answered */
@@ -1398,31 +1370,31 @@ typedef struct qlink_motion_response {
     uint8_t fifo_space; /* Words that still fit into the FIFO; in words */
 } qlink_motion_response_t;
 
-#define QLINK_MOTION_RESPONSE_INIT { 0u, 0u, 0l, 0u, 0u }
+#define QLINK_MOTION_RESPONSE_INIT { 0U, 0U, 0L, 0U, 0U }
 
 static inline int qlink_motion_response_encode(
     const qlink_motion_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 9u) {
+    if (capacity < 9U) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->counter;
     payload[1] = message->inputs;
-    qlink_put_u32_be_(payload + 2, (uint32_t)message->position);
-    qlink_put_u16_be_(payload + 6, message->motor_status);
+    qlink_put_u32_be_(&payload[2], (uint32_t)message->position);
+    qlink_put_u16_be_(&payload[6], message->motor_status);
     payload[8] = message->fifo_space;
     return (int)QLINK_MOTION_RESPONSE_MAX_SIZE;
 }
 
 static inline int qlink_motion_response_decode(qlink_motion_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 9u) {
+    if (size != 9U) {
         return QLINK_ERROR_LENGTH;
     }
     message->counter = payload[0];
     message->inputs = payload[1];
-    message->position = (int32_t)qlink_get_u32_be_(payload + 2);
-    message->motor_status = qlink_get_u16_be_(payload + 6);
+    message->position = (int32_t)qlink_get_u32_be_(&payload[2]);
+    message->motor_status = qlink_get_u16_be_(&payload[6]);
     message->fifo_space = payload[8];
     return QLINK_OK;
 }
@@ -1430,32 +1402,25 @@ static inline int qlink_motion_response_decode(qlink_motion_response_t *message,
 static inline int qlink_motion_response_to_frame(
     const qlink_motion_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_MOTION_RESPONSE_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_MOTION_RESPONSE_MAX_FRAME_SIZE) {
+        size = qlink_motion_response_encode(message, qlink_place_(wire, capacity, QLINK_MOTION_RESPONSE_MAX_SIZE),
+            QLINK_MOTION_RESPONSE_MAX_SIZE);
     }
-    if (capacity < QLINK_MOTION_RESPONSE_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_motion_response_encode(message, qlink_place_(wire, capacity, QLINK_MOTION_RESPONSE_MAX_SIZE),
-        QLINK_MOTION_RESPONSE_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_MOTION_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTION_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- motor_position.request, id 0x21 (section 7.11): Read the motor position. */
 #define QLINK_MOTOR_POSITION_REQUEST_ID 0x21
-#define QLINK_MOTOR_POSITION_REQUEST_MIN_SIZE 0u
-#define QLINK_MOTOR_POSITION_REQUEST_MAX_SIZE 0u
-#define QLINK_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE 7u
-#define QLINK_MOTOR_POSITION_REQUEST_MAX_WIRE_SIZE 9u
+#define QLINK_MOTOR_POSITION_REQUEST_MIN_SIZE 0U
+#define QLINK_MOTOR_POSITION_REQUEST_MAX_SIZE 0U
+#define QLINK_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE 7U
+#define QLINK_MOTOR_POSITION_REQUEST_MAX_WIRE_SIZE 9U
 
 static inline int qlink_motor_position_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_MOTOR_POSITION_REQUEST_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTOR_POSITION_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- motor_position.response, id 0x21 (section 7.11): Read the motor position.
@@ -1463,21 +1428,21 @@ static inline int qlink_motor_position_request_to_frame(uint8_t node, uint8_t *w
  *      0  i32 be  position
  */
 #define QLINK_MOTOR_POSITION_RESPONSE_ID 0x21
-#define QLINK_MOTOR_POSITION_RESPONSE_MIN_SIZE 4u
-#define QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE 4u
-#define QLINK_MOTOR_POSITION_RESPONSE_MAX_FRAME_SIZE 11u
-#define QLINK_MOTOR_POSITION_RESPONSE_MAX_WIRE_SIZE 17u
+#define QLINK_MOTOR_POSITION_RESPONSE_MIN_SIZE 4U
+#define QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE 4U
+#define QLINK_MOTOR_POSITION_RESPONSE_MAX_FRAME_SIZE 11U
+#define QLINK_MOTOR_POSITION_RESPONSE_MAX_WIRE_SIZE 17U
 
 typedef struct qlink_motor_position_response {
     int32_t position; /* Motor position; in encoder counts */
 } qlink_motor_position_response_t;
 
-#define QLINK_MOTOR_POSITION_RESPONSE_INIT { 0l }
+#define QLINK_MOTOR_POSITION_RESPONSE_INIT { 0L }
 
 static inline int qlink_motor_position_response_encode(
     const qlink_motor_position_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return QLINK_ERROR_CAPACITY;
     }
     qlink_put_u32_be_(payload, (uint32_t)message->position);
@@ -1487,7 +1452,7 @@ static inline int qlink_motor_position_response_encode(
 static inline int qlink_motor_position_response_decode(
     qlink_motor_position_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return QLINK_ERROR_LENGTH;
     }
     message->position = (int32_t)qlink_get_u32_be_(payload);
@@ -1497,47 +1462,38 @@ static inline int qlink_motor_position_response_decode(
 static inline int qlink_motor_position_response_to_frame(
     const qlink_motor_position_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_MOTOR_POSITION_RESPONSE_MAX_FRAME_SIZE) {
+        size = qlink_motor_position_response_encode(message,
+            qlink_place_(wire, capacity, QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE),
+            QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE);
     }
-    if (capacity < QLINK_MOTOR_POSITION_RESPONSE_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_motor_position_response_encode(message,
-        qlink_place_(wire, capacity, QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE), QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_MOTOR_POSITION_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_MOTOR_POSITION_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- clear_fifo.request, id 0x22 (section 7.12): Drop all path segments that wait in the FIFO. */
 #define QLINK_CLEAR_FIFO_REQUEST_ID 0x22
-#define QLINK_CLEAR_FIFO_REQUEST_MIN_SIZE 0u
-#define QLINK_CLEAR_FIFO_REQUEST_MAX_SIZE 0u
-#define QLINK_CLEAR_FIFO_REQUEST_MAX_FRAME_SIZE 7u
-#define QLINK_CLEAR_FIFO_REQUEST_MAX_WIRE_SIZE 9u
+#define QLINK_CLEAR_FIFO_REQUEST_MIN_SIZE 0U
+#define QLINK_CLEAR_FIFO_REQUEST_MAX_SIZE 0U
+#define QLINK_CLEAR_FIFO_REQUEST_MAX_FRAME_SIZE 7U
+#define QLINK_CLEAR_FIFO_REQUEST_MAX_WIRE_SIZE 9U
 
 static inline int qlink_clear_fifo_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_CLEAR_FIFO_REQUEST_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_CLEAR_FIFO_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- clear_fifo.response, id 0x22 (section 7.12): Drop all path segments that wait in the FIFO. */
 #define QLINK_CLEAR_FIFO_RESPONSE_ID 0x22
-#define QLINK_CLEAR_FIFO_RESPONSE_MIN_SIZE 0u
-#define QLINK_CLEAR_FIFO_RESPONSE_MAX_SIZE 0u
-#define QLINK_CLEAR_FIFO_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_CLEAR_FIFO_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_CLEAR_FIFO_RESPONSE_MIN_SIZE 0U
+#define QLINK_CLEAR_FIFO_RESPONSE_MAX_SIZE 0U
+#define QLINK_CLEAR_FIFO_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_CLEAR_FIFO_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_clear_fifo_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_CLEAR_FIFO_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_CLEAR_FIFO_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- preset_motor_position.request, id 0x23 (section 7.13): Set the motor position; not allowed while the
@@ -1546,21 +1502,21 @@ static inline int qlink_clear_fifo_response_to_frame(uint8_t node, uint8_t *wire
  *      0  i32 be  position
  */
 #define QLINK_PRESET_MOTOR_POSITION_REQUEST_ID 0x23
-#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MIN_SIZE 4u
-#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE 4u
-#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE 11u
-#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_WIRE_SIZE 17u
+#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MIN_SIZE 4U
+#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE 4U
+#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE 11U
+#define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_WIRE_SIZE 17U
 
 typedef struct qlink_preset_motor_position_request {
     int32_t position; /* Position that the motor has from now on; in encoder counts */
 } qlink_preset_motor_position_request_t;
 
-#define QLINK_PRESET_MOTOR_POSITION_REQUEST_INIT { 0l }
+#define QLINK_PRESET_MOTOR_POSITION_REQUEST_INIT { 0L }
 
 static inline int qlink_preset_motor_position_request_encode(
     const qlink_preset_motor_position_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4u) {
+    if (capacity < 4U) {
         return QLINK_ERROR_CAPACITY;
     }
     qlink_put_u32_be_(payload, (uint32_t)message->position);
@@ -1570,7 +1526,7 @@ static inline int qlink_preset_motor_position_request_encode(
 static inline int qlink_preset_motor_position_request_decode(
     qlink_preset_motor_position_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4u) {
+    if (size != 4U) {
         return QLINK_ERROR_LENGTH;
     }
     message->position = (int32_t)qlink_get_u32_be_(payload);
@@ -1580,35 +1536,28 @@ static inline int qlink_preset_motor_position_request_decode(
 static inline int qlink_preset_motor_position_request_to_frame(
     const qlink_preset_motor_position_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE) {
+        size = qlink_preset_motor_position_request_encode(message,
+            qlink_place_(wire, capacity, QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE),
+            QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE);
     }
-    if (capacity < QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_preset_motor_position_request_encode(message,
-        qlink_place_(wire, capacity, QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE),
-        QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_PRESET_MOTOR_POSITION_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_PRESET_MOTOR_POSITION_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- preset_motor_position.response, id 0x23 (section 7.13): Set the motor position; not allowed while
  * the motor runs.
  */
 #define QLINK_PRESET_MOTOR_POSITION_RESPONSE_ID 0x23
-#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MIN_SIZE 0u
-#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MAX_SIZE 0u
-#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MIN_SIZE 0U
+#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MAX_SIZE 0U
+#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_preset_motor_position_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_PRESET_MOTOR_POSITION_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_PRESET_MOTOR_POSITION_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- read.request, id 0x81 (section 7.14): Read bytes of the input image.
@@ -1617,24 +1566,24 @@ static inline int qlink_preset_motor_position_response_to_frame(uint8_t node, ui
  *      1  u8  offset
  */
 #define QLINK_READ_REQUEST_ID 0x81
-#define QLINK_READ_REQUEST_MIN_SIZE 2u
-#define QLINK_READ_REQUEST_MAX_SIZE 2u
-#define QLINK_READ_REQUEST_MAX_FRAME_SIZE 9u
-#define QLINK_READ_REQUEST_MAX_WIRE_SIZE 13u
+#define QLINK_READ_REQUEST_MIN_SIZE 2U
+#define QLINK_READ_REQUEST_MAX_SIZE 2U
+#define QLINK_READ_REQUEST_MAX_FRAME_SIZE 9U
+#define QLINK_READ_REQUEST_MAX_WIRE_SIZE 13U
 
 typedef struct qlink_read_request {
     uint8_t size; /* Bytes to read; 1..26 */
     uint8_t offset; /* First byte, 0 is the least significant */
 } qlink_read_request_t;
 
-#define QLINK_READ_REQUEST_INIT { 1u, 0u }
+#define QLINK_READ_REQUEST_INIT { 1U, 0U }
 
 static inline int qlink_read_request_encode(const qlink_read_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->size < 1u) || (message->size > 26u)) {
+    if ((message->size < 1U) || (message->size > 26U)) {
         return QLINK_ERROR_RANGE;
     }
-    if (capacity < 2u) {
+    if (capacity < 2U) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->size;
@@ -1644,11 +1593,11 @@ static inline int qlink_read_request_encode(const qlink_read_request_t *message,
 
 static inline int qlink_read_request_decode(qlink_read_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2u) {
+    if (size != 2U) {
         return QLINK_ERROR_LENGTH;
     }
     message->size = payload[0];
-    if ((message->size < 1u) || (message->size > 26u)) {
+    if ((message->size < 1U) || (message->size > 26U)) {
         return QLINK_ERROR_RANGE;
     }
     message->offset = payload[1];
@@ -1658,17 +1607,13 @@ static inline int qlink_read_request_decode(qlink_read_request_t *message, const
 static inline int qlink_read_request_to_frame(
     const qlink_read_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_READ_REQUEST_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_READ_REQUEST_MAX_FRAME_SIZE) {
+        size = qlink_read_request_encode(message, qlink_place_(wire, capacity, QLINK_READ_REQUEST_MAX_SIZE),
+            QLINK_READ_REQUEST_MAX_SIZE);
     }
-    if (capacity < QLINK_READ_REQUEST_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_read_request_encode(message, qlink_place_(wire, capacity, QLINK_READ_REQUEST_MAX_SIZE),
-        QLINK_READ_REQUEST_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_READ_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_READ_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- read.response, id 0x81 (section 7.14): Read bytes of the input image.
@@ -1676,33 +1621,31 @@ static inline int qlink_read_request_to_frame(
  *      0  bytes[1..26]  data
  */
 #define QLINK_READ_RESPONSE_ID 0x81
-#define QLINK_READ_RESPONSE_MIN_SIZE 1u
-#define QLINK_READ_RESPONSE_MAX_SIZE 26u
-#define QLINK_READ_RESPONSE_MAX_FRAME_SIZE 33u
-#define QLINK_READ_RESPONSE_MAX_WIRE_SIZE 61u
+#define QLINK_READ_RESPONSE_MIN_SIZE 1U
+#define QLINK_READ_RESPONSE_MAX_SIZE 26U
+#define QLINK_READ_RESPONSE_MAX_FRAME_SIZE 33U
+#define QLINK_READ_RESPONSE_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_read_response {
     uint8_t data_size; /* bytes in data */
     uint8_t data[26]; /* Input bytes, least significant first */
 } qlink_read_response_t;
 
-#define QLINK_READ_RESPONSE_INIT { 1u, {0x00u} }
+#define QLINK_READ_RESPONSE_INIT { 1U, {0} }
 
 static inline int qlink_read_response_encode(const qlink_read_response_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = (size_t)message->data_size;
-    uint8_t *at;
+    const uint8_t data_size = message->data_size;
+    const size_t size = (size_t)data_size;
 
-    if ((message->data_size < 1u) || (message->data_size > 26u)) {
+    if ((data_size < 1U) || (data_size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
-    at = payload;
-    for (size_t index = 0; index < message->data_size; ++index) {
-        at[0] = message->data[index];
-        at += 1;
+    for (uint8_t index = 0U; index < data_size; ++index) {
+        payload[index] = message->data[index];
     }
     return (int)size;
 }
@@ -1710,18 +1653,13 @@ static inline int qlink_read_response_encode(const qlink_read_response_t *messag
 static inline int qlink_read_response_decode(qlink_read_response_t *message, const uint8_t *payload, size_t size)
 {
     size_t data_count;
-    const uint8_t *at;
 
-    if ((size < 1u) || (size > 26u)) {
+    if ((size < 1U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     data_count = size;
     message->data_size = (uint8_t)data_count;
-    at = payload;
-    for (size_t index = 0; index < data_count; ++index) {
-        message->data[index] = at[0];
-        at += 1;
-    }
+    qlink_copy_(message->data, payload, data_count);
     return QLINK_OK;
 }
 
@@ -1729,13 +1667,12 @@ static inline int qlink_read_response_to_frame(
     const qlink_read_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
     const size_t payload_size = (size_t)message->data_size;
-    int size;
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_read_response_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    size = qlink_read_response_encode(message, qlink_place_(wire, capacity, payload_size), qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_READ_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_READ_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- write.request, id 0x82 (section 7.15): Write bytes of the output image.
@@ -1744,10 +1681,10 @@ static inline int qlink_read_response_to_frame(
  *      1  bytes[1..25]  data
  */
 #define QLINK_WRITE_REQUEST_ID 0x82
-#define QLINK_WRITE_REQUEST_MIN_SIZE 2u
-#define QLINK_WRITE_REQUEST_MAX_SIZE 26u
-#define QLINK_WRITE_REQUEST_MAX_FRAME_SIZE 33u
-#define QLINK_WRITE_REQUEST_MAX_WIRE_SIZE 61u
+#define QLINK_WRITE_REQUEST_MIN_SIZE 2U
+#define QLINK_WRITE_REQUEST_MAX_SIZE 26U
+#define QLINK_WRITE_REQUEST_MAX_FRAME_SIZE 33U
+#define QLINK_WRITE_REQUEST_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_write_request {
     uint8_t offset; /* First byte, 0 is the least significant */
@@ -1755,24 +1692,22 @@ typedef struct qlink_write_request {
     uint8_t data[25]; /* Output bytes, least significant first */
 } qlink_write_request_t;
 
-#define QLINK_WRITE_REQUEST_INIT { 0u, 1u, {0x00u} }
+#define QLINK_WRITE_REQUEST_INIT { 0U, 1U, {0} }
 
 static inline int qlink_write_request_encode(const qlink_write_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = 1u + (size_t)message->data_size;
-    uint8_t *at;
+    const uint8_t data_size = message->data_size;
+    const size_t size = 1U + (size_t)data_size;
 
-    if ((message->data_size < 1u) || (message->data_size > 25u)) {
+    if ((data_size < 1U) || (data_size > 25U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->offset;
-    at = payload + 1;
-    for (size_t index = 0; index < message->data_size; ++index) {
-        at[0] = message->data[index];
-        at += 1;
+    for (uint8_t index = 0U; index < data_size; ++index) {
+        payload[1U + index] = message->data[index];
     }
     return (int)size;
 }
@@ -1780,48 +1715,39 @@ static inline int qlink_write_request_encode(const qlink_write_request_t *messag
 static inline int qlink_write_request_decode(qlink_write_request_t *message, const uint8_t *payload, size_t size)
 {
     size_t data_count;
-    const uint8_t *at;
 
-    if ((size < 2u) || (size > 26u)) {
+    if ((size < 2U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     message->offset = payload[0];
-    data_count = size - 1u;
+    data_count = size - 1U;
     message->data_size = (uint8_t)data_count;
-    at = payload + 1;
-    for (size_t index = 0; index < data_count; ++index) {
-        message->data[index] = at[0];
-        at += 1;
-    }
+    qlink_copy_(message->data, &payload[1], data_count);
     return QLINK_OK;
 }
 
 static inline int qlink_write_request_to_frame(
     const qlink_write_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    const size_t payload_size = 1u + (size_t)message->data_size;
-    int size;
+    const size_t payload_size = 1U + (size_t)message->data_size;
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_write_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    size = qlink_write_request_encode(message, qlink_place_(wire, capacity, payload_size), qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_WRITE_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_WRITE_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- write.response, id 0x82 (section 7.15): Write bytes of the output image. */
 #define QLINK_WRITE_RESPONSE_ID 0x82
-#define QLINK_WRITE_RESPONSE_MIN_SIZE 0u
-#define QLINK_WRITE_RESPONSE_MAX_SIZE 0u
-#define QLINK_WRITE_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_WRITE_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_WRITE_RESPONSE_MIN_SIZE 0U
+#define QLINK_WRITE_RESPONSE_MAX_SIZE 0U
+#define QLINK_WRITE_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_WRITE_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_write_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_WRITE_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_WRITE_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- write_read.request, id 0x83 (section 7.16): Write 24 outputs and read 24 inputs at once.
@@ -1829,24 +1755,24 @@ static inline int qlink_write_response_to_frame(uint8_t node, uint8_t *wire, siz
  *      0  u24 le  outputs
  */
 #define QLINK_WRITE_READ_REQUEST_ID 0x83
-#define QLINK_WRITE_READ_REQUEST_MIN_SIZE 3u
-#define QLINK_WRITE_READ_REQUEST_MAX_SIZE 3u
-#define QLINK_WRITE_READ_REQUEST_MAX_FRAME_SIZE 10u
-#define QLINK_WRITE_READ_REQUEST_MAX_WIRE_SIZE 15u
+#define QLINK_WRITE_READ_REQUEST_MIN_SIZE 3U
+#define QLINK_WRITE_READ_REQUEST_MAX_SIZE 3U
+#define QLINK_WRITE_READ_REQUEST_MAX_FRAME_SIZE 10U
+#define QLINK_WRITE_READ_REQUEST_MAX_WIRE_SIZE 15U
 
 typedef struct qlink_write_read_request {
     uint32_t outputs; /* Bit 0 is output 1 */
 } qlink_write_read_request_t;
 
-#define QLINK_WRITE_READ_REQUEST_INIT { 0ul }
+#define QLINK_WRITE_READ_REQUEST_INIT { 0UL }
 
 static inline int qlink_write_read_request_encode(
     const qlink_write_read_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->outputs > 16777215ul) {
+    if (message->outputs > 16777215UL) {
         return QLINK_ERROR_RANGE;
     }
-    if (capacity < 3u) {
+    if (capacity < 3U) {
         return QLINK_ERROR_CAPACITY;
     }
     qlink_put_u24_le_(payload, message->outputs);
@@ -1856,7 +1782,7 @@ static inline int qlink_write_read_request_encode(
 static inline int qlink_write_read_request_decode(
     qlink_write_read_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 3u) {
+    if (size != 3U) {
         return QLINK_ERROR_LENGTH;
     }
     message->outputs = qlink_get_u24_le_(payload);
@@ -1866,17 +1792,13 @@ static inline int qlink_write_read_request_decode(
 static inline int qlink_write_read_request_to_frame(
     const qlink_write_read_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_WRITE_READ_REQUEST_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_WRITE_READ_REQUEST_MAX_FRAME_SIZE) {
+        size = qlink_write_read_request_encode(message, qlink_place_(wire, capacity, QLINK_WRITE_READ_REQUEST_MAX_SIZE),
+            QLINK_WRITE_READ_REQUEST_MAX_SIZE);
     }
-    if (capacity < QLINK_WRITE_READ_REQUEST_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_write_read_request_encode(message, qlink_place_(wire, capacity, QLINK_WRITE_READ_REQUEST_MAX_SIZE),
-        QLINK_WRITE_READ_REQUEST_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_WRITE_READ_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_WRITE_READ_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- write_read.response, id 0x83 (section 7.16): Write 24 outputs and read 24 inputs at once.
@@ -1884,24 +1806,24 @@ static inline int qlink_write_read_request_to_frame(
  *      0  u24 le  inputs
  */
 #define QLINK_WRITE_READ_RESPONSE_ID 0x83
-#define QLINK_WRITE_READ_RESPONSE_MIN_SIZE 3u
-#define QLINK_WRITE_READ_RESPONSE_MAX_SIZE 3u
-#define QLINK_WRITE_READ_RESPONSE_MAX_FRAME_SIZE 10u
-#define QLINK_WRITE_READ_RESPONSE_MAX_WIRE_SIZE 15u
+#define QLINK_WRITE_READ_RESPONSE_MIN_SIZE 3U
+#define QLINK_WRITE_READ_RESPONSE_MAX_SIZE 3U
+#define QLINK_WRITE_READ_RESPONSE_MAX_FRAME_SIZE 10U
+#define QLINK_WRITE_READ_RESPONSE_MAX_WIRE_SIZE 15U
 
 typedef struct qlink_write_read_response {
     uint32_t inputs; /* Bit 0 is input 1 */
 } qlink_write_read_response_t;
 
-#define QLINK_WRITE_READ_RESPONSE_INIT { 0ul }
+#define QLINK_WRITE_READ_RESPONSE_INIT { 0UL }
 
 static inline int qlink_write_read_response_encode(
     const qlink_write_read_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->inputs > 16777215ul) {
+    if (message->inputs > 16777215UL) {
         return QLINK_ERROR_RANGE;
     }
-    if (capacity < 3u) {
+    if (capacity < 3U) {
         return QLINK_ERROR_CAPACITY;
     }
     qlink_put_u24_le_(payload, message->inputs);
@@ -1911,7 +1833,7 @@ static inline int qlink_write_read_response_encode(
 static inline int qlink_write_read_response_decode(
     qlink_write_read_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 3u) {
+    if (size != 3U) {
         return QLINK_ERROR_LENGTH;
     }
     message->inputs = qlink_get_u24_le_(payload);
@@ -1921,17 +1843,13 @@ static inline int qlink_write_read_response_decode(
 static inline int qlink_write_read_response_to_frame(
     const qlink_write_read_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_WRITE_READ_RESPONSE_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_WRITE_READ_RESPONSE_MAX_FRAME_SIZE) {
+        size = qlink_write_read_response_encode(message,
+            qlink_place_(wire, capacity, QLINK_WRITE_READ_RESPONSE_MAX_SIZE), QLINK_WRITE_READ_RESPONSE_MAX_SIZE);
     }
-    if (capacity < QLINK_WRITE_READ_RESPONSE_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_write_read_response_encode(message, qlink_place_(wire, capacity, QLINK_WRITE_READ_RESPONSE_MAX_SIZE),
-        QLINK_WRITE_READ_RESPONSE_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_WRITE_READ_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_WRITE_READ_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- set_outputs.request, id 0x84 (section 7.17): Set the outputs whose bits are set in a mask.
@@ -1939,24 +1857,24 @@ static inline int qlink_write_read_response_to_frame(
  *      0  u24 le  mask
  */
 #define QLINK_SET_OUTPUTS_REQUEST_ID 0x84
-#define QLINK_SET_OUTPUTS_REQUEST_MIN_SIZE 3u
-#define QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE 3u
-#define QLINK_SET_OUTPUTS_REQUEST_MAX_FRAME_SIZE 10u
-#define QLINK_SET_OUTPUTS_REQUEST_MAX_WIRE_SIZE 15u
+#define QLINK_SET_OUTPUTS_REQUEST_MIN_SIZE 3U
+#define QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE 3U
+#define QLINK_SET_OUTPUTS_REQUEST_MAX_FRAME_SIZE 10U
+#define QLINK_SET_OUTPUTS_REQUEST_MAX_WIRE_SIZE 15U
 
 typedef struct qlink_set_outputs_request {
     uint32_t mask; /* Bit 0 is output 1 */
 } qlink_set_outputs_request_t;
 
-#define QLINK_SET_OUTPUTS_REQUEST_INIT { 0ul }
+#define QLINK_SET_OUTPUTS_REQUEST_INIT { 0UL }
 
 static inline int qlink_set_outputs_request_encode(
     const qlink_set_outputs_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->mask > 16777215ul) {
+    if (message->mask > 16777215UL) {
         return QLINK_ERROR_RANGE;
     }
-    if (capacity < 3u) {
+    if (capacity < 3U) {
         return QLINK_ERROR_CAPACITY;
     }
     qlink_put_u24_le_(payload, message->mask);
@@ -1966,7 +1884,7 @@ static inline int qlink_set_outputs_request_encode(
 static inline int qlink_set_outputs_request_decode(
     qlink_set_outputs_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 3u) {
+    if (size != 3U) {
         return QLINK_ERROR_LENGTH;
     }
     message->mask = qlink_get_u24_le_(payload);
@@ -1976,32 +1894,25 @@ static inline int qlink_set_outputs_request_decode(
 static inline int qlink_set_outputs_request_to_frame(
     const qlink_set_outputs_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_SET_OUTPUTS_REQUEST_MAX_FRAME_SIZE) {
+        size = qlink_set_outputs_request_encode(message,
+            qlink_place_(wire, capacity, QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE), QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE);
     }
-    if (capacity < QLINK_SET_OUTPUTS_REQUEST_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_set_outputs_request_encode(message, qlink_place_(wire, capacity, QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE),
-        QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_SET_OUTPUTS_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_SET_OUTPUTS_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- set_outputs.response, id 0x84 (section 7.17): Set the outputs whose bits are set in a mask. */
 #define QLINK_SET_OUTPUTS_RESPONSE_ID 0x84
-#define QLINK_SET_OUTPUTS_RESPONSE_MIN_SIZE 0u
-#define QLINK_SET_OUTPUTS_RESPONSE_MAX_SIZE 0u
-#define QLINK_SET_OUTPUTS_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_SET_OUTPUTS_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_SET_OUTPUTS_RESPONSE_MIN_SIZE 0U
+#define QLINK_SET_OUTPUTS_RESPONSE_MAX_SIZE 0U
+#define QLINK_SET_OUTPUTS_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_SET_OUTPUTS_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_set_outputs_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_SET_OUTPUTS_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_SET_OUTPUTS_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- clear_outputs.request, id 0x85 (section 7.18): Clear the outputs whose bits are set in a mask.
@@ -2009,24 +1920,24 @@ static inline int qlink_set_outputs_response_to_frame(uint8_t node, uint8_t *wir
  *      0  u24 le  mask
  */
 #define QLINK_CLEAR_OUTPUTS_REQUEST_ID 0x85
-#define QLINK_CLEAR_OUTPUTS_REQUEST_MIN_SIZE 3u
-#define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE 3u
-#define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_FRAME_SIZE 10u
-#define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_WIRE_SIZE 15u
+#define QLINK_CLEAR_OUTPUTS_REQUEST_MIN_SIZE 3U
+#define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE 3U
+#define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_FRAME_SIZE 10U
+#define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_WIRE_SIZE 15U
 
 typedef struct qlink_clear_outputs_request {
     uint32_t mask; /* Bit 0 is output 1 */
 } qlink_clear_outputs_request_t;
 
-#define QLINK_CLEAR_OUTPUTS_REQUEST_INIT { 0ul }
+#define QLINK_CLEAR_OUTPUTS_REQUEST_INIT { 0UL }
 
 static inline int qlink_clear_outputs_request_encode(
     const qlink_clear_outputs_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->mask > 16777215ul) {
+    if (message->mask > 16777215UL) {
         return QLINK_ERROR_RANGE;
     }
-    if (capacity < 3u) {
+    if (capacity < 3U) {
         return QLINK_ERROR_CAPACITY;
     }
     qlink_put_u24_le_(payload, message->mask);
@@ -2036,7 +1947,7 @@ static inline int qlink_clear_outputs_request_encode(
 static inline int qlink_clear_outputs_request_decode(
     qlink_clear_outputs_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 3u) {
+    if (size != 3U) {
         return QLINK_ERROR_LENGTH;
     }
     message->mask = qlink_get_u24_le_(payload);
@@ -2046,32 +1957,25 @@ static inline int qlink_clear_outputs_request_decode(
 static inline int qlink_clear_outputs_request_to_frame(
     const qlink_clear_outputs_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (capacity >= QLINK_CLEAR_OUTPUTS_REQUEST_MAX_FRAME_SIZE) {
+        size = qlink_clear_outputs_request_encode(message,
+            qlink_place_(wire, capacity, QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE), QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE);
     }
-    if (capacity < QLINK_CLEAR_OUTPUTS_REQUEST_MAX_FRAME_SIZE) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    size = qlink_clear_outputs_request_encode(message,
-        qlink_place_(wire, capacity, QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE), QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE);
-    return (size < 0) ? size : qlink_seal_(QLINK_CLEAR_OUTPUTS_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_CLEAR_OUTPUTS_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- clear_outputs.response, id 0x85 (section 7.18): Clear the outputs whose bits are set in a mask. */
 #define QLINK_CLEAR_OUTPUTS_RESPONSE_ID 0x85
-#define QLINK_CLEAR_OUTPUTS_RESPONSE_MIN_SIZE 0u
-#define QLINK_CLEAR_OUTPUTS_RESPONSE_MAX_SIZE 0u
-#define QLINK_CLEAR_OUTPUTS_RESPONSE_MAX_FRAME_SIZE 7u
-#define QLINK_CLEAR_OUTPUTS_RESPONSE_MAX_WIRE_SIZE 9u
+#define QLINK_CLEAR_OUTPUTS_RESPONSE_MIN_SIZE 0U
+#define QLINK_CLEAR_OUTPUTS_RESPONSE_MAX_SIZE 0U
+#define QLINK_CLEAR_OUTPUTS_RESPONSE_MAX_FRAME_SIZE 7U
+#define QLINK_CLEAR_OUTPUTS_RESPONSE_MAX_WIRE_SIZE 9U
 
 static inline int qlink_clear_outputs_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
-    }
-    return qlink_seal_(QLINK_CLEAR_OUTPUTS_RESPONSE_ID, node, 0u, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_CLEAR_OUTPUTS_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- loop_back.request, id 0xA4 (section 7.19): Test the line; the node returns what it was sent.
@@ -2080,10 +1984,10 @@ static inline int qlink_clear_outputs_response_to_frame(uint8_t node, uint8_t *w
  *      1  bytes[1..25]  data
  */
 #define QLINK_LOOP_BACK_REQUEST_ID 0xA4
-#define QLINK_LOOP_BACK_REQUEST_MIN_SIZE 2u
-#define QLINK_LOOP_BACK_REQUEST_MAX_SIZE 26u
-#define QLINK_LOOP_BACK_REQUEST_MAX_FRAME_SIZE 33u
-#define QLINK_LOOP_BACK_REQUEST_MAX_WIRE_SIZE 61u
+#define QLINK_LOOP_BACK_REQUEST_MIN_SIZE 2U
+#define QLINK_LOOP_BACK_REQUEST_MAX_SIZE 26U
+#define QLINK_LOOP_BACK_REQUEST_MAX_FRAME_SIZE 33U
+#define QLINK_LOOP_BACK_REQUEST_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_loop_back_request {
     uint8_t offset; /* Returned as it is */
@@ -2091,25 +1995,23 @@ typedef struct qlink_loop_back_request {
     uint8_t data[25]; /* Returned as it is */
 } qlink_loop_back_request_t;
 
-#define QLINK_LOOP_BACK_REQUEST_INIT { 0u, 1u, {0x00u} }
+#define QLINK_LOOP_BACK_REQUEST_INIT { 0U, 1U, {0} }
 
 static inline int qlink_loop_back_request_encode(
     const qlink_loop_back_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = 1u + (size_t)message->data_size;
-    uint8_t *at;
+    const uint8_t data_size = message->data_size;
+    const size_t size = 1U + (size_t)data_size;
 
-    if ((message->data_size < 1u) || (message->data_size > 25u)) {
+    if ((data_size < 1U) || (data_size > 25U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->offset;
-    at = payload + 1;
-    for (size_t index = 0; index < message->data_size; ++index) {
-        at[0] = message->data[index];
-        at += 1;
+    for (uint8_t index = 0U; index < data_size; ++index) {
+        payload[1U + index] = message->data[index];
     }
     return (int)size;
 }
@@ -2118,33 +2020,27 @@ static inline int qlink_loop_back_request_decode(
     qlink_loop_back_request_t *message, const uint8_t *payload, size_t size)
 {
     size_t data_count;
-    const uint8_t *at;
 
-    if ((size < 2u) || (size > 26u)) {
+    if ((size < 2U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     message->offset = payload[0];
-    data_count = size - 1u;
+    data_count = size - 1U;
     message->data_size = (uint8_t)data_count;
-    at = payload + 1;
-    for (size_t index = 0; index < data_count; ++index) {
-        message->data[index] = at[0];
-        at += 1;
-    }
+    qlink_copy_(message->data, &payload[1], data_count);
     return QLINK_OK;
 }
 
 static inline int qlink_loop_back_request_to_frame(
     const qlink_loop_back_request_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    const size_t payload_size = 1u + (size_t)message->data_size;
-    int size;
+    const size_t payload_size = 1U + (size_t)message->data_size;
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_loop_back_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    size = qlink_loop_back_request_encode(message, qlink_place_(wire, capacity, payload_size), qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_LOOP_BACK_REQUEST_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_LOOP_BACK_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- loop_back.response, id 0xA4 (section 7.19): Test the line; the node returns what it was sent.
@@ -2153,10 +2049,10 @@ static inline int qlink_loop_back_request_to_frame(
  *      1  bytes[1..25]  data
  */
 #define QLINK_LOOP_BACK_RESPONSE_ID 0xA4
-#define QLINK_LOOP_BACK_RESPONSE_MIN_SIZE 2u
-#define QLINK_LOOP_BACK_RESPONSE_MAX_SIZE 26u
-#define QLINK_LOOP_BACK_RESPONSE_MAX_FRAME_SIZE 33u
-#define QLINK_LOOP_BACK_RESPONSE_MAX_WIRE_SIZE 61u
+#define QLINK_LOOP_BACK_RESPONSE_MIN_SIZE 2U
+#define QLINK_LOOP_BACK_RESPONSE_MAX_SIZE 26U
+#define QLINK_LOOP_BACK_RESPONSE_MAX_FRAME_SIZE 33U
+#define QLINK_LOOP_BACK_RESPONSE_MAX_WIRE_SIZE 61U
 
 typedef struct qlink_loop_back_response {
     uint8_t offset; /* Offset of the request */
@@ -2164,25 +2060,23 @@ typedef struct qlink_loop_back_response {
     uint8_t data[25]; /* Data of the request */
 } qlink_loop_back_response_t;
 
-#define QLINK_LOOP_BACK_RESPONSE_INIT { 0u, 1u, {0x00u} }
+#define QLINK_LOOP_BACK_RESPONSE_INIT { 0U, 1U, {0} }
 
 static inline int qlink_loop_back_response_encode(
     const qlink_loop_back_response_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = 1u + (size_t)message->data_size;
-    uint8_t *at;
+    const uint8_t data_size = message->data_size;
+    const size_t size = 1U + (size_t)data_size;
 
-    if ((message->data_size < 1u) || (message->data_size > 25u)) {
+    if ((data_size < 1U) || (data_size > 25U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->offset;
-    at = payload + 1;
-    for (size_t index = 0; index < message->data_size; ++index) {
-        at[0] = message->data[index];
-        at += 1;
+    for (uint8_t index = 0U; index < data_size; ++index) {
+        payload[1U + index] = message->data[index];
     }
     return (int)size;
 }
@@ -2191,33 +2085,27 @@ static inline int qlink_loop_back_response_decode(
     qlink_loop_back_response_t *message, const uint8_t *payload, size_t size)
 {
     size_t data_count;
-    const uint8_t *at;
 
-    if ((size < 2u) || (size > 26u)) {
+    if ((size < 2U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     message->offset = payload[0];
-    data_count = size - 1u;
+    data_count = size - 1U;
     message->data_size = (uint8_t)data_count;
-    at = payload + 1;
-    for (size_t index = 0; index < data_count; ++index) {
-        message->data[index] = at[0];
-        at += 1;
-    }
+    qlink_copy_(message->data, &payload[1], data_count);
     return QLINK_OK;
 }
 
 static inline int qlink_loop_back_response_to_frame(
     const qlink_loop_back_response_t *message, uint8_t node, uint8_t *wire, size_t capacity)
 {
-    const size_t payload_size = 1u + (size_t)message->data_size;
-    int size;
+    const size_t payload_size = 1U + (size_t)message->data_size;
+    int size = (int)payload_size;
 
-    if (!(node >= 1u && node <= 16u)) {
-        return QLINK_ERROR_RANGE;
+    if (qlink_fits_(capacity, payload_size)) {
+        size = qlink_loop_back_response_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    size = qlink_loop_back_response_encode(message, qlink_place_(wire, capacity, payload_size), qlink_room_(capacity));
-    return (size < 0) ? size : qlink_seal_(QLINK_LOOP_BACK_RESPONSE_ID, node, (size_t)size, wire, capacity);
+    return qlink_seal_1_to_16_(QLINK_LOOP_BACK_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* What a request carries is right: id, address, size, ranges. */
@@ -2230,115 +2118,115 @@ static inline int qlink_request_check(const qlink_frame_t *frame)
     case QLINK_NODE_SETUP_REQUEST_ID: {
         qlink_node_setup_request_t message;
         status = qlink_node_setup_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node <= 16u;
+        allowed = frame->node <= 16U;
         break;
     }
     case QLINK_NODE_INFO_REQUEST_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = frame->node <= 16U;
         break;
     }
     case QLINK_NODE_START_REQUEST_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = frame->node <= 16U;
         break;
     }
     case QLINK_NODE_STOP_REQUEST_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = frame->node <= 16U;
         break;
     }
     case QLINK_NODE_SYNC_REQUEST_ID: {
         qlink_node_sync_request_t message;
         status = qlink_node_sync_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node == 0u;
+        allowed = frame->node == 0U;
         break;
     }
     case QLINK_NODE_PROGRAM_LOAD_REQUEST_ID: {
         qlink_node_program_load_request_t message;
         status = qlink_node_program_load_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_NODE_RESET_REQUEST_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTOR_REQUEST_REQUEST_ID: {
         qlink_motor_request_request_t message;
         status = qlink_motor_request_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTION_REQUEST_ID: {
         qlink_motion_request_t message;
         status = qlink_motion_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTOR_POSITION_REQUEST_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_CLEAR_FIFO_REQUEST_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_PRESET_MOTOR_POSITION_REQUEST_ID: {
         qlink_preset_motor_position_request_t message;
         status = qlink_preset_motor_position_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_READ_REQUEST_ID: {
         qlink_read_request_t message;
         status = qlink_read_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_WRITE_REQUEST_ID: {
         qlink_write_request_t message;
         status = qlink_write_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_WRITE_READ_REQUEST_ID: {
         qlink_write_read_request_t message;
         status = qlink_write_read_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_SET_OUTPUTS_REQUEST_ID: {
         qlink_set_outputs_request_t message;
         status = qlink_set_outputs_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_CLEAR_OUTPUTS_REQUEST_ID: {
         qlink_clear_outputs_request_t message;
         status = qlink_clear_outputs_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_LOOP_BACK_REQUEST_ID: {
         qlink_loop_back_request_t message;
         status = qlink_loop_back_request_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     default:
         status = QLINK_ERROR_UNKNOWN;
         break;
     }
-    return (status == QLINK_OK && !allowed) ? QLINK_ERROR_RANGE : status;
+    return ((status == QLINK_OK) && !allowed) ? QLINK_ERROR_RANGE : status;
 }
 
 /* What a response carries is right: id, address, size, ranges. */
@@ -2349,98 +2237,98 @@ static inline int qlink_response_check(const qlink_frame_t *frame)
 
     switch (frame->id) {
     case QLINK_NODE_SETUP_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_NODE_INFO_RESPONSE_ID: {
         qlink_node_info_response_t message;
         status = qlink_node_info_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_NODE_PROGRAM_LOAD_RESPONSE_ID: {
         qlink_node_program_load_response_t message;
         status = qlink_node_program_load_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_NODE_RESET_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTOR_RESPONSE_POLL_RESPONSE_ID: {
         qlink_motor_response_poll_response_t message;
         status = qlink_motor_response_poll_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTOR_REQUEST_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTION_RESPONSE_ID: {
         qlink_motion_response_t message;
         status = qlink_motion_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_MOTOR_POSITION_RESPONSE_ID: {
         qlink_motor_position_response_t message;
         status = qlink_motor_position_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_CLEAR_FIFO_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_PRESET_MOTOR_POSITION_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_READ_RESPONSE_ID: {
         qlink_read_response_t message;
         status = qlink_read_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_WRITE_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_WRITE_READ_RESPONSE_ID: {
         qlink_write_read_response_t message;
         status = qlink_write_read_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_SET_OUTPUTS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_CLEAR_OUTPUTS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     case QLINK_LOOP_BACK_RESPONSE_ID: {
         qlink_loop_back_response_t message;
         status = qlink_loop_back_response_decode(&message, frame->payload, frame->size);
-        allowed = frame->node >= 1u && frame->node <= 16u;
+        allowed = (frame->node >= 1U) && (frame->node <= 16U);
         break;
     }
     default:
         status = QLINK_ERROR_UNKNOWN;
         break;
     }
-    return (status == QLINK_OK && !allowed) ? QLINK_ERROR_RANGE : status;
+    return ((status == QLINK_OK) && !allowed) ? QLINK_ERROR_RANGE : status;
 }
 /* ---- Receiver: one byte at a time, each in constant time, so that it can run in an interrupt ----
  * The preamble is found nowhere else on the wire: nothing is looked at twice, and after any disturbance the next
@@ -2453,16 +2341,16 @@ typedef struct qlink_receiver {
     uint8_t body[31]; /* the frame without preamble and stuffing */
 } qlink_receiver_t;
 
-#define QLINK_HUNTING_ 0u  /* no byte of a preamble */
-#define QLINK_FIRST_ 1u    /* one byte of a preamble */
-#define QLINK_PREAMBLE_ 2u /* a preamble: the length follows, or another byte of a longer run */
-#define QLINK_BODY_ 3u     /* in the body */
-#define QLINK_ESCAPE_ 4u   /* in the body, behind a byte that is followed by an inserted one */
+#define QLINK_HUNTING_ 0U  /* no byte of a preamble */
+#define QLINK_FIRST_ 1U    /* one byte of a preamble */
+#define QLINK_PREAMBLE_ 2U /* a preamble: the length follows, or another byte of a longer run */
+#define QLINK_BODY_ 3U     /* in the body */
+#define QLINK_ESCAPE_ 4U   /* in the body, behind a byte that is followed by an inserted one */
 
 static inline void qlink_receiver_init(qlink_receiver_t *receiver)
 {
     receiver->state = QLINK_HUNTING_;
-    receiver->position = 0u;
+    receiver->position = 0U;
 }
 
 /* The frame that qlink_receive has just announced. */
@@ -2472,8 +2360,8 @@ static inline qlink_frame_t qlink_receiver_frame(const qlink_receiver_t *receive
     const uint8_t *const body = receiver->body;
     frame.id = body[1];
     frame.node = body[2];
-    frame.size = (size_t)(body[0] - 4u);
-    frame.payload = body + 3;
+    frame.size = (size_t)(body[0] - 4U);
+    frame.payload = &body[3];
     return frame;
 }
 
@@ -2485,7 +2373,7 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
     const uint8_t state = receiver->state;
     const uint8_t *end;
 
-    if (byte == 0xA5u) {
+    if (byte == 0xA5U) {
         if (state != QLINK_BODY_) {
             receiver->state = (state == QLINK_HUNTING_) ? QLINK_FIRST_ : QLINK_PREAMBLE_;
             return (state == QLINK_ESCAPE_) ? QLINK_EVENT_TRUNCATED : QLINK_EVENT_NONE;
@@ -2493,34 +2381,36 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
         receiver->state = QLINK_ESCAPE_;
     } else if (state == QLINK_PREAMBLE_) {
         receiver->state = QLINK_HUNTING_;
-        if ((byte < 4u) || (byte > 30u)) {
+        if ((byte < 4U) || (byte > 30U)) {
             return QLINK_EVENT_LENGTH;
         }
         receiver->state = QLINK_BODY_;
-        position = 0u;
+        position = 0U;
         receiver->check = qlink_check_start();
     } else if (state != QLINK_BODY_) {
         receiver->state = QLINK_HUNTING_;
         if (state == QLINK_ESCAPE_) {
-            if (byte != 0x00u) {
+            if (byte != 0x00U) {
                 return QLINK_EVENT_STUFFING;
             }
             receiver->state = QLINK_BODY_;
         }
         return QLINK_EVENT_NONE;
+    } else {
+        /* one more byte of the body */
     }
 
     body[position] = byte;
     ++position;
     receiver->position = position;
-    if (position <= body[0] - 1u) {
+    if (position <= (body[0] - 1U)) {
         receiver->check = qlink_check_update(receiver->check, byte);
     }
-    if (position < body[0] + 1u) {
+    if (position < (body[0] + 1U)) {
         return QLINK_EVENT_NONE;
     }
-    receiver->state = (byte == 0xA5u) ? QLINK_FIRST_ : QLINK_HUNTING_;
-    end = body + position - 2;
+    receiver->state = (byte == 0xA5U) ? QLINK_FIRST_ : QLINK_HUNTING_;
+    end = &body[position - 2U];
     {
         const uint16_t value = qlink_check_finish(receiver->check);
         if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
@@ -2545,23 +2435,23 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
 #define QLINK_REPEAT_BY_COUNTER 2 /* yes, with the same number in the field that is named */
 
 /* The slave may take _RESPONSE_BITS bit times and _RESPONSE_US microseconds to answer; this is the sum in microseconds,
- * such as QLINK_RESPONSE_US(NODE_SETUP, 115200ul). A command that is not answered has neither. */
+ * such as QLINK_RESPONSE_US(NODE_SETUP, 115200UL). A command that is not answered has neither. */
 #define QLINK_RESPONSE_US(command, baud) \
-    (QLINK_##command##_RESPONSE_US + (QLINK_##command##_RESPONSE_BITS * 1000000ul + (baud) - 1ul) / (baud))
+    (QLINK_##command##_RESPONSE_US + (QLINK_##command##_RESPONSE_BITS * 1000000UL + (baud) - 1UL) / (baud))
 
 #define QLINK_NODE_SETUP_ANSWERED 1
 #define QLINK_NODE_SETUP_ADDRESSING QLINK_ADDRESSING_ANSWERED_BROADCAST
 #define QLINK_NODE_SETUP_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_NODE_SETUP_IN_FLIGHT 1
-#define QLINK_NODE_SETUP_RESPONSE_BITS 30ul
-#define QLINK_NODE_SETUP_RESPONSE_US 0ul
+#define QLINK_NODE_SETUP_RESPONSE_BITS 30UL
+#define QLINK_NODE_SETUP_RESPONSE_US 0UL
 
 #define QLINK_NODE_INFO_ANSWERED 1
 #define QLINK_NODE_INFO_ADDRESSING QLINK_ADDRESSING_ANSWERED_BROADCAST
 #define QLINK_NODE_INFO_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_NODE_INFO_IN_FLIGHT 1
-#define QLINK_NODE_INFO_RESPONSE_BITS 30ul
-#define QLINK_NODE_INFO_RESPONSE_US 0ul
+#define QLINK_NODE_INFO_RESPONSE_BITS 30UL
+#define QLINK_NODE_INFO_RESPONSE_US 0UL
 
 #define QLINK_NODE_START_ANSWERED 0
 #define QLINK_NODE_START_ADDRESSING QLINK_ADDRESSING_EITHER
@@ -2582,99 +2472,99 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
 #define QLINK_NODE_PROGRAM_LOAD_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_NODE_PROGRAM_LOAD_REPEAT QLINK_REPEAT_BY_COUNTER /* field counter */
 #define QLINK_NODE_PROGRAM_LOAD_IN_FLIGHT 1
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_BITS 0ul
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_US 10000ul
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_BITS 0UL
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_US 10000UL
 
 #define QLINK_NODE_RESET_ANSWERED 1
 #define QLINK_NODE_RESET_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_NODE_RESET_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_NODE_RESET_IN_FLIGHT 1
-#define QLINK_NODE_RESET_RESPONSE_BITS 30ul
-#define QLINK_NODE_RESET_RESPONSE_US 0ul
+#define QLINK_NODE_RESET_RESPONSE_BITS 30UL
+#define QLINK_NODE_RESET_RESPONSE_US 0UL
 
 #define QLINK_MOTOR_RESPONSE_POLL_ANSWERED 1
 #define QLINK_MOTOR_RESPONSE_POLL_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_MOTOR_RESPONSE_POLL_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_MOTOR_RESPONSE_POLL_IN_FLIGHT 1
-#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_BITS 30ul
-#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_US 0ul
+#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_BITS 30UL
+#define QLINK_MOTOR_RESPONSE_POLL_RESPONSE_US 0UL
 
 #define QLINK_MOTOR_REQUEST_ANSWERED 1
 #define QLINK_MOTOR_REQUEST_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_MOTOR_REQUEST_REPEAT QLINK_REPEAT_UNSAFE
 #define QLINK_MOTOR_REQUEST_IN_FLIGHT 1
-#define QLINK_MOTOR_REQUEST_RESPONSE_BITS 30ul
-#define QLINK_MOTOR_REQUEST_RESPONSE_US 0ul
+#define QLINK_MOTOR_REQUEST_RESPONSE_BITS 30UL
+#define QLINK_MOTOR_REQUEST_RESPONSE_US 0UL
 
 #define QLINK_MOTION_ANSWERED 1
 #define QLINK_MOTION_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_MOTION_REPEAT QLINK_REPEAT_BY_COUNTER /* field counter */
 #define QLINK_MOTION_IN_FLIGHT 1
-#define QLINK_MOTION_RESPONSE_BITS 30ul
-#define QLINK_MOTION_RESPONSE_US 0ul
+#define QLINK_MOTION_RESPONSE_BITS 30UL
+#define QLINK_MOTION_RESPONSE_US 0UL
 
 #define QLINK_MOTOR_POSITION_ANSWERED 1
 #define QLINK_MOTOR_POSITION_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_MOTOR_POSITION_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_MOTOR_POSITION_IN_FLIGHT 1
-#define QLINK_MOTOR_POSITION_RESPONSE_BITS 30ul
-#define QLINK_MOTOR_POSITION_RESPONSE_US 0ul
+#define QLINK_MOTOR_POSITION_RESPONSE_BITS 30UL
+#define QLINK_MOTOR_POSITION_RESPONSE_US 0UL
 
 #define QLINK_CLEAR_FIFO_ANSWERED 1
 #define QLINK_CLEAR_FIFO_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_CLEAR_FIFO_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_CLEAR_FIFO_IN_FLIGHT 1
-#define QLINK_CLEAR_FIFO_RESPONSE_BITS 30ul
-#define QLINK_CLEAR_FIFO_RESPONSE_US 0ul
+#define QLINK_CLEAR_FIFO_RESPONSE_BITS 30UL
+#define QLINK_CLEAR_FIFO_RESPONSE_US 0UL
 
 #define QLINK_PRESET_MOTOR_POSITION_ANSWERED 1
 #define QLINK_PRESET_MOTOR_POSITION_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_PRESET_MOTOR_POSITION_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_PRESET_MOTOR_POSITION_IN_FLIGHT 1
-#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_BITS 30ul
-#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_US 0ul
+#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_BITS 30UL
+#define QLINK_PRESET_MOTOR_POSITION_RESPONSE_US 0UL
 
 #define QLINK_READ_ANSWERED 1
 #define QLINK_READ_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_READ_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_READ_IN_FLIGHT 1
-#define QLINK_READ_RESPONSE_BITS 30ul
-#define QLINK_READ_RESPONSE_US 0ul
+#define QLINK_READ_RESPONSE_BITS 30UL
+#define QLINK_READ_RESPONSE_US 0UL
 
 #define QLINK_WRITE_ANSWERED 1
 #define QLINK_WRITE_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_WRITE_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_WRITE_IN_FLIGHT 1
-#define QLINK_WRITE_RESPONSE_BITS 30ul
-#define QLINK_WRITE_RESPONSE_US 0ul
+#define QLINK_WRITE_RESPONSE_BITS 30UL
+#define QLINK_WRITE_RESPONSE_US 0UL
 
 #define QLINK_WRITE_READ_ANSWERED 1
 #define QLINK_WRITE_READ_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_WRITE_READ_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_WRITE_READ_IN_FLIGHT 1
-#define QLINK_WRITE_READ_RESPONSE_BITS 30ul
-#define QLINK_WRITE_READ_RESPONSE_US 0ul
+#define QLINK_WRITE_READ_RESPONSE_BITS 30UL
+#define QLINK_WRITE_READ_RESPONSE_US 0UL
 
 #define QLINK_SET_OUTPUTS_ANSWERED 1
 #define QLINK_SET_OUTPUTS_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_SET_OUTPUTS_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_SET_OUTPUTS_IN_FLIGHT 1
-#define QLINK_SET_OUTPUTS_RESPONSE_BITS 30ul
-#define QLINK_SET_OUTPUTS_RESPONSE_US 0ul
+#define QLINK_SET_OUTPUTS_RESPONSE_BITS 30UL
+#define QLINK_SET_OUTPUTS_RESPONSE_US 0UL
 
 #define QLINK_CLEAR_OUTPUTS_ANSWERED 1
 #define QLINK_CLEAR_OUTPUTS_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_CLEAR_OUTPUTS_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_CLEAR_OUTPUTS_IN_FLIGHT 1
-#define QLINK_CLEAR_OUTPUTS_RESPONSE_BITS 30ul
-#define QLINK_CLEAR_OUTPUTS_RESPONSE_US 0ul
+#define QLINK_CLEAR_OUTPUTS_RESPONSE_BITS 30UL
+#define QLINK_CLEAR_OUTPUTS_RESPONSE_US 0UL
 
 #define QLINK_LOOP_BACK_ANSWERED 1
 #define QLINK_LOOP_BACK_ADDRESSING QLINK_ADDRESSING_NODE
 #define QLINK_LOOP_BACK_REPEAT QLINK_REPEAT_SAFE
 #define QLINK_LOOP_BACK_IN_FLIGHT 1
-#define QLINK_LOOP_BACK_RESPONSE_BITS 30ul
-#define QLINK_LOOP_BACK_RESPONSE_US 0ul
+#define QLINK_LOOP_BACK_RESPONSE_BITS 30UL
+#define QLINK_LOOP_BACK_RESPONSE_US 0UL
 
 /* ---- Slave ----
  * One function for each command. A command without one is not answered, nor is one whose function returns false; a
@@ -2710,309 +2600,383 @@ struct qlink_slave {
         qlink_loop_back_response_t *response);
 };
 
-static inline size_t qlink_slave_node_setup_(
+static inline int qlink_slave_node_setup_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_node_setup_request_t request;
-    int size;
+    int size = 0;
 
-    if (slave->node_setup == NULL || qlink_node_setup_request_decode(&request, frame->payload,
-        frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->node_setup == NULL) {
+        return 0;
     }
-    if (!slave->node_setup(slave, &request)) {
-        return 0u;
+    if (qlink_node_setup_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->node_setup(slave, &request);
+        if (answers) {
+            size = qlink_node_setup_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_node_setup_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_node_info_(
+static inline int qlink_slave_node_info_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_node_info_response_t response = QLINK_NODE_INFO_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->node_info == NULL || frame->size != 0u) {
-        return 0u;
+    if (slave->node_info == NULL) {
+        return 0;
     }
-    if (!slave->node_info(slave, &response)) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->node_info(slave, &response);
+        if (answers) {
+            size = qlink_node_info_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_node_info_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_node_start_(
-    qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+static inline int qlink_slave_node_start_(qlink_slave_t *slave, const qlink_frame_t *frame)
 {
-    (void)wire;
-    (void)capacity;
-
-    if (slave->node_start == NULL || frame->size != 0u) {
-        return 0u;
+    if (slave->node_start == NULL) {
+        return 0;
     }
-    slave->node_start(slave);
-    return 0u;
+    if (frame->size == 0U) {
+        slave->node_start(slave);
+    }
+    return 0;
 }
 
-static inline size_t qlink_slave_node_stop_(
-    qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+static inline int qlink_slave_node_stop_(qlink_slave_t *slave, const qlink_frame_t *frame)
 {
-    (void)wire;
-    (void)capacity;
-
-    if (slave->node_stop == NULL || frame->size != 0u) {
-        return 0u;
+    if (slave->node_stop == NULL) {
+        return 0;
     }
-    slave->node_stop(slave);
-    return 0u;
+    if (frame->size == 0U) {
+        slave->node_stop(slave);
+    }
+    return 0;
 }
 
-static inline size_t qlink_slave_node_sync_(
-    qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+static inline int qlink_slave_node_sync_(qlink_slave_t *slave, const qlink_frame_t *frame)
 {
     qlink_node_sync_request_t request;
-    (void)wire;
-    (void)capacity;
 
-    if (slave->node_sync == NULL || qlink_node_sync_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->node_sync == NULL) {
+        return 0;
     }
-    slave->node_sync(slave, &request);
-    return 0u;
+    if (qlink_node_sync_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        slave->node_sync(slave, &request);
+    }
+    return 0;
 }
 
-static inline size_t qlink_slave_node_program_load_(
+static inline int qlink_slave_node_program_load_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_node_program_load_request_t request;
     qlink_node_program_load_response_t response = QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->node_program_load == NULL ||
-        qlink_node_program_load_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->node_program_load == NULL) {
+        return 0;
     }
-    if (!slave->node_program_load(slave, &request, &response)) {
-        return 0u;
+    if (qlink_node_program_load_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->node_program_load(slave, &request, &response);
+        if (answers) {
+            size = qlink_node_program_load_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_node_program_load_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_node_reset_(
+static inline int qlink_slave_node_reset_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
-    if (slave->node_reset == NULL || frame->size != 0u) {
-        return 0u;
+    if (slave->node_reset == NULL) {
+        return 0;
     }
-    if (!slave->node_reset(slave)) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->node_reset(slave);
+        if (answers) {
+            size = qlink_node_reset_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_node_reset_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_motor_response_poll_(
+static inline int qlink_slave_motor_response_poll_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motor_response_poll_response_t response = QLINK_MOTOR_RESPONSE_POLL_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->motor_response_poll == NULL || frame->size != 0u) {
-        return 0u;
+    if (slave->motor_response_poll == NULL) {
+        return 0;
     }
-    if (!slave->motor_response_poll(slave, &response)) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->motor_response_poll(slave, &response);
+        if (answers) {
+            size = qlink_motor_response_poll_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_motor_response_poll_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_motor_request_(
+static inline int qlink_slave_motor_request_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motor_request_request_t request;
-    int size;
+    int size = 0;
 
-    if (slave->motor_request == NULL ||
-        qlink_motor_request_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->motor_request == NULL) {
+        return 0;
     }
-    if (!slave->motor_request(slave, &request)) {
-        return 0u;
+    if (qlink_motor_request_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->motor_request(slave, &request);
+        if (answers) {
+            size = qlink_motor_request_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_motor_request_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_motion_(
-    qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+static inline int qlink_slave_motion_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motion_request_t request;
     qlink_motion_response_t response = QLINK_MOTION_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->motion == NULL || qlink_motion_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->motion == NULL) {
+        return 0;
     }
-    if (!slave->motion(slave, &request, &response)) {
-        return 0u;
+    if (qlink_motion_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->motion(slave, &request, &response);
+        if (answers) {
+            size = qlink_motion_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_motion_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_motor_position_(
+static inline int qlink_slave_motor_position_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_motor_position_response_t response = QLINK_MOTOR_POSITION_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->motor_position == NULL || frame->size != 0u) {
-        return 0u;
+    if (slave->motor_position == NULL) {
+        return 0;
     }
-    if (!slave->motor_position(slave, &response)) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->motor_position(slave, &response);
+        if (answers) {
+            size = qlink_motor_position_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_motor_position_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_clear_fifo_(
+static inline int qlink_slave_clear_fifo_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = 0;
 
-    if (slave->clear_fifo == NULL || frame->size != 0u) {
-        return 0u;
+    if (slave->clear_fifo == NULL) {
+        return 0;
     }
-    if (!slave->clear_fifo(slave)) {
-        return 0u;
+    if (frame->size == 0U) {
+        const bool answers = slave->clear_fifo(slave);
+        if (answers) {
+            size = qlink_clear_fifo_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_clear_fifo_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_preset_motor_position_(
+static inline int qlink_slave_preset_motor_position_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_preset_motor_position_request_t request;
-    int size;
+    int size = 0;
 
-    if (slave->preset_motor_position == NULL ||
-        qlink_preset_motor_position_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->preset_motor_position == NULL) {
+        return 0;
     }
-    if (!slave->preset_motor_position(slave, &request)) {
-        return 0u;
+    if (qlink_preset_motor_position_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->preset_motor_position(slave, &request);
+        if (answers) {
+            size = qlink_preset_motor_position_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_preset_motor_position_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_read_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+static inline int qlink_slave_read_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_read_request_t request;
     qlink_read_response_t response = QLINK_READ_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->read == NULL || qlink_read_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->read == NULL) {
+        return 0;
     }
-    if (!slave->read(slave, &request, &response)) {
-        return 0u;
+    if (qlink_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->read(slave, &request, &response);
+        if (answers) {
+            size = qlink_read_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_read_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_write_(
-    qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+static inline int qlink_slave_write_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_write_request_t request;
-    int size;
+    int size = 0;
 
-    if (slave->write == NULL || qlink_write_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->write == NULL) {
+        return 0;
     }
-    if (!slave->write(slave, &request)) {
-        return 0u;
+    if (qlink_write_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->write(slave, &request);
+        if (answers) {
+            size = qlink_write_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_write_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_write_read_(
+static inline int qlink_slave_write_read_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_write_read_request_t request;
     qlink_write_read_response_t response = QLINK_WRITE_READ_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->write_read == NULL || qlink_write_read_request_decode(&request, frame->payload,
-        frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->write_read == NULL) {
+        return 0;
     }
-    if (!slave->write_read(slave, &request, &response)) {
-        return 0u;
+    if (qlink_write_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->write_read(slave, &request, &response);
+        if (answers) {
+            size = qlink_write_read_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_write_read_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_set_outputs_(
+static inline int qlink_slave_set_outputs_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_set_outputs_request_t request;
-    int size;
+    int size = 0;
 
-    if (slave->set_outputs == NULL || qlink_set_outputs_request_decode(&request, frame->payload,
-        frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->set_outputs == NULL) {
+        return 0;
     }
-    if (!slave->set_outputs(slave, &request)) {
-        return 0u;
+    if (qlink_set_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->set_outputs(slave, &request);
+        if (answers) {
+            size = qlink_set_outputs_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_set_outputs_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_clear_outputs_(
+static inline int qlink_slave_clear_outputs_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_clear_outputs_request_t request;
-    int size;
+    int size = 0;
 
-    if (slave->clear_outputs == NULL ||
-        qlink_clear_outputs_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->clear_outputs == NULL) {
+        return 0;
     }
-    if (!slave->clear_outputs(slave, &request)) {
-        return 0u;
+    if (qlink_clear_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->clear_outputs(slave, &request);
+        if (answers) {
+            size = qlink_clear_outputs_response_to_frame(slave->node, wire, capacity);
+        }
     }
-    size = qlink_clear_outputs_response_to_frame(slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
 }
 
-static inline size_t qlink_slave_loop_back_(
+static inline int qlink_slave_loop_back_(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     qlink_loop_back_request_t request;
     qlink_loop_back_response_t response = QLINK_LOOP_BACK_RESPONSE_INIT;
-    int size;
+    int size = 0;
 
-    if (slave->loop_back == NULL || qlink_loop_back_request_decode(&request, frame->payload, frame->size) != QLINK_OK) {
-        return 0u;
+    if (slave->loop_back == NULL) {
+        return 0;
     }
-    if (!slave->loop_back(slave, &request, &response)) {
-        return 0u;
+    if (qlink_loop_back_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
+        const bool answers = slave->loop_back(slave, &request, &response);
+        if (answers) {
+            size = qlink_loop_back_response_to_frame(&response, slave->node, wire, capacity);
+        }
     }
-    size = qlink_loop_back_response_to_frame(&response, slave->node, wire, capacity);
-    return (size < 0) ? 0u : (size_t)size;
+    return size;
+}
+
+/* Requests that go to one node. */
+static inline int qlink_handle_own_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+{
+    switch (frame->id) {
+    case QLINK_NODE_PROGRAM_LOAD_REQUEST_ID:
+        return qlink_slave_node_program_load_(slave, frame, wire, capacity);
+    case QLINK_NODE_RESET_REQUEST_ID:
+        return qlink_slave_node_reset_(slave, frame, wire, capacity);
+    case QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID:
+        return qlink_slave_motor_response_poll_(slave, frame, wire, capacity);
+    case QLINK_MOTOR_REQUEST_REQUEST_ID:
+        return qlink_slave_motor_request_(slave, frame, wire, capacity);
+    case QLINK_MOTION_REQUEST_ID:
+        return qlink_slave_motion_(slave, frame, wire, capacity);
+    case QLINK_MOTOR_POSITION_REQUEST_ID:
+        return qlink_slave_motor_position_(slave, frame, wire, capacity);
+    case QLINK_CLEAR_FIFO_REQUEST_ID:
+        return qlink_slave_clear_fifo_(slave, frame, wire, capacity);
+    case QLINK_PRESET_MOTOR_POSITION_REQUEST_ID:
+        return qlink_slave_preset_motor_position_(slave, frame, wire, capacity);
+    case QLINK_READ_REQUEST_ID:
+        return qlink_slave_read_(slave, frame, wire, capacity);
+    case QLINK_WRITE_REQUEST_ID:
+        return qlink_slave_write_(slave, frame, wire, capacity);
+    case QLINK_WRITE_READ_REQUEST_ID:
+        return qlink_slave_write_read_(slave, frame, wire, capacity);
+    case QLINK_SET_OUTPUTS_REQUEST_ID:
+        return qlink_slave_set_outputs_(slave, frame, wire, capacity);
+    case QLINK_CLEAR_OUTPUTS_REQUEST_ID:
+        return qlink_slave_clear_outputs_(slave, frame, wire, capacity);
+    case QLINK_LOOP_BACK_REQUEST_ID:
+        return qlink_slave_loop_back_(slave, frame, wire, capacity);
+    default:
+        return 0;
+    }
+}
+
+/* Requests that all nodes may get; the others must not be broadcast. */
+static inline int qlink_handle_any_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
+{
+    switch (frame->id) {
+    case QLINK_NODE_SETUP_REQUEST_ID:
+        return qlink_slave_node_setup_(slave, frame, wire, capacity);
+    case QLINK_NODE_INFO_REQUEST_ID:
+        return qlink_slave_node_info_(slave, frame, wire, capacity);
+    case QLINK_NODE_START_REQUEST_ID:
+        return qlink_slave_node_start_(slave, frame);
+    case QLINK_NODE_STOP_REQUEST_ID:
+        return qlink_slave_node_stop_(slave, frame);
+    case QLINK_NODE_SYNC_REQUEST_ID:
+        return slave->broadcast ? qlink_slave_node_sync_(slave, frame) : 0;
+    default:
+        return slave->broadcast ? 0 : qlink_handle_own_(slave, frame, wire, capacity);
+    }
 }
 
 /* Handles a request; returns the bytes of the answer in `wire`, 0 where there is nothing to send. `wire` may take
@@ -3020,52 +2984,12 @@ static inline size_t qlink_slave_loop_back_(
 static inline size_t qlink_slave_dispatch(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
+    int size = 0;
     slave->broadcast = frame->node == QLINK_BROADCAST;
-    if (!slave->broadcast && frame->node != slave->node) {
-        return 0u;
+    if (slave->broadcast || (frame->node == slave->node)) {
+        size = qlink_handle_any_(slave, frame, wire, capacity);
     }
-    switch (frame->id) {
-    case QLINK_NODE_SETUP_REQUEST_ID:
-        return qlink_slave_node_setup_(slave, frame, wire, capacity);
-    case QLINK_NODE_INFO_REQUEST_ID:
-        return qlink_slave_node_info_(slave, frame, wire, capacity);
-    case QLINK_NODE_START_REQUEST_ID:
-        return qlink_slave_node_start_(slave, frame, wire, capacity);
-    case QLINK_NODE_STOP_REQUEST_ID:
-        return qlink_slave_node_stop_(slave, frame, wire, capacity);
-    case QLINK_NODE_SYNC_REQUEST_ID:
-        return !slave->broadcast ? 0u : qlink_slave_node_sync_(slave, frame, wire, capacity);
-    case QLINK_NODE_PROGRAM_LOAD_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_node_program_load_(slave, frame, wire, capacity);
-    case QLINK_NODE_RESET_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_node_reset_(slave, frame, wire, capacity);
-    case QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_motor_response_poll_(slave, frame, wire, capacity);
-    case QLINK_MOTOR_REQUEST_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_motor_request_(slave, frame, wire, capacity);
-    case QLINK_MOTION_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_motion_(slave, frame, wire, capacity);
-    case QLINK_MOTOR_POSITION_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_motor_position_(slave, frame, wire, capacity);
-    case QLINK_CLEAR_FIFO_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_clear_fifo_(slave, frame, wire, capacity);
-    case QLINK_PRESET_MOTOR_POSITION_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_preset_motor_position_(slave, frame, wire, capacity);
-    case QLINK_READ_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_read_(slave, frame, wire, capacity);
-    case QLINK_WRITE_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_write_(slave, frame, wire, capacity);
-    case QLINK_WRITE_READ_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_write_read_(slave, frame, wire, capacity);
-    case QLINK_SET_OUTPUTS_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_set_outputs_(slave, frame, wire, capacity);
-    case QLINK_CLEAR_OUTPUTS_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_clear_outputs_(slave, frame, wire, capacity);
-    case QLINK_LOOP_BACK_REQUEST_ID:
-        return slave->broadcast ? 0u : qlink_slave_loop_back_(slave, frame, wire, capacity);
-    default:
-        return 0u;
-    }
+    return (size > 0) ? (size_t)size : 0U;
 }
 
 /* ---- Master ----
@@ -3101,11 +3025,11 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     int status;
     switch (frame->id) {
     case QLINK_NODE_SETUP_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->node_setup != NULL) {
+        if ((status == QLINK_OK) && (master->node_setup != NULL)) {
             master->node_setup(master, frame->node);
         }
         break;
@@ -3113,10 +3037,10 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_NODE_INFO_RESPONSE_ID: {
         qlink_node_info_response_t message;
         status = qlink_node_info_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->node_info != NULL) {
+        if ((status == QLINK_OK) && (master->node_info != NULL)) {
             master->node_info(master, frame->node, &message);
         }
         break;
@@ -3124,20 +3048,20 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_NODE_PROGRAM_LOAD_RESPONSE_ID: {
         qlink_node_program_load_response_t message;
         status = qlink_node_program_load_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->node_program_load != NULL) {
+        if ((status == QLINK_OK) && (master->node_program_load != NULL)) {
             master->node_program_load(master, frame->node, &message);
         }
         break;
     }
     case QLINK_NODE_RESET_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->node_reset != NULL) {
+        if ((status == QLINK_OK) && (master->node_reset != NULL)) {
             master->node_reset(master, frame->node);
         }
         break;
@@ -3145,20 +3069,20 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_MOTOR_RESPONSE_POLL_RESPONSE_ID: {
         qlink_motor_response_poll_response_t message;
         status = qlink_motor_response_poll_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->motor_response_poll != NULL) {
+        if ((status == QLINK_OK) && (master->motor_response_poll != NULL)) {
             master->motor_response_poll(master, frame->node, &message);
         }
         break;
     }
     case QLINK_MOTOR_REQUEST_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->motor_request != NULL) {
+        if ((status == QLINK_OK) && (master->motor_request != NULL)) {
             master->motor_request(master, frame->node);
         }
         break;
@@ -3166,10 +3090,10 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_MOTION_RESPONSE_ID: {
         qlink_motion_response_t message;
         status = qlink_motion_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->motion != NULL) {
+        if ((status == QLINK_OK) && (master->motion != NULL)) {
             master->motion(master, frame->node, &message);
         }
         break;
@@ -3177,30 +3101,30 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_MOTOR_POSITION_RESPONSE_ID: {
         qlink_motor_position_response_t message;
         status = qlink_motor_position_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->motor_position != NULL) {
+        if ((status == QLINK_OK) && (master->motor_position != NULL)) {
             master->motor_position(master, frame->node, &message);
         }
         break;
     }
     case QLINK_CLEAR_FIFO_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->clear_fifo != NULL) {
+        if ((status == QLINK_OK) && (master->clear_fifo != NULL)) {
             master->clear_fifo(master, frame->node);
         }
         break;
     }
     case QLINK_PRESET_MOTOR_POSITION_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->preset_motor_position != NULL) {
+        if ((status == QLINK_OK) && (master->preset_motor_position != NULL)) {
             master->preset_motor_position(master, frame->node);
         }
         break;
@@ -3208,20 +3132,20 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_READ_RESPONSE_ID: {
         qlink_read_response_t message;
         status = qlink_read_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->read != NULL) {
+        if ((status == QLINK_OK) && (master->read != NULL)) {
             master->read(master, frame->node, &message);
         }
         break;
     }
     case QLINK_WRITE_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->write != NULL) {
+        if ((status == QLINK_OK) && (master->write != NULL)) {
             master->write(master, frame->node);
         }
         break;
@@ -3229,30 +3153,30 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_WRITE_READ_RESPONSE_ID: {
         qlink_write_read_response_t message;
         status = qlink_write_read_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->write_read != NULL) {
+        if ((status == QLINK_OK) && (master->write_read != NULL)) {
             master->write_read(master, frame->node, &message);
         }
         break;
     }
     case QLINK_SET_OUTPUTS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->set_outputs != NULL) {
+        if ((status == QLINK_OK) && (master->set_outputs != NULL)) {
             master->set_outputs(master, frame->node);
         }
         break;
     }
     case QLINK_CLEAR_OUTPUTS_RESPONSE_ID: {
-        status = (frame->size == 0u) ? QLINK_OK : QLINK_ERROR_LENGTH;
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        status = (frame->size == 0U) ? QLINK_OK : QLINK_ERROR_LENGTH;
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->clear_outputs != NULL) {
+        if ((status == QLINK_OK) && (master->clear_outputs != NULL)) {
             master->clear_outputs(master, frame->node);
         }
         break;
@@ -3260,10 +3184,10 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
     case QLINK_LOOP_BACK_RESPONSE_ID: {
         qlink_loop_back_response_t message;
         status = qlink_loop_back_response_decode(&message, frame->payload, frame->size);
-        if (status == QLINK_OK && !(frame->node >= 1u && frame->node <= 16u)) {
+        if ((status == QLINK_OK) && !((frame->node >= 1U) && (frame->node <= 16U))) {
             status = QLINK_ERROR_RANGE;
         }
-        if (status == QLINK_OK && master->loop_back != NULL) {
+        if ((status == QLINK_OK) && (master->loop_back != NULL)) {
             master->loop_back(master, frame->node, &message);
         }
         break;

@@ -50,6 +50,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#if defined(__AVR__)
+#include <avr/pgmspace.h>
+#endif
 
 #ifdef __cplusplus
 extern "C" {
@@ -64,10 +67,11 @@ extern "C" {
 
 /* What the code relies on: bytes of eight bits, and two's complement where an unsigned number becomes a signed one. */
 typedef char trio_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
-typedef char trio_needs_twos_complement_[((int8_t)0xFFu == -1 && (int16_t)0xFFFFu == -1) ? 1 : -1];
+typedef char trio_needs_twos_complement_[(((int8_t)0xFFU == -1) && ((int16_t)0xFFFFU == -1)) ? 1 : -1];
 typedef char trio_needs_sizes_in_int_[(INT_MAX >= 258) ? 1 : -1];
 
-typedef enum trio_status {
+/* What went wrong; functions return it as an int, which may also be a number of bytes. */
+enum {
     TRIO_OK = 0,
     TRIO_ERROR_CAPACITY = -1,  /* the buffer is too small */
     TRIO_ERROR_LENGTH = -2,    /* a size or count that the message cannot have */
@@ -78,7 +82,8 @@ typedef enum trio_status {
     TRIO_ERROR_TRUNCATED = -7, /* the frame is not complete */
     TRIO_ERROR_FRAME = -8,     /* preamble, header or end is wrong */
     TRIO_ERROR_ILLEGAL = -9    /* the slave does not know the command */
-} trio_status_t;
+};
+typedef int trio_status_t;
 
 /* What a received byte completed. */
 typedef enum trio_event {
@@ -92,17 +97,17 @@ typedef enum trio_event {
     TRIO_EVENT_FRAMING
 } trio_event_t;
 
-#define TRIO_MAX_PAYLOAD_SIZE 256u
-#define TRIO_MAX_FRAME_SIZE 258u
-#define TRIO_MAX_WIRE_SIZE 258u
-#define TRIO_FIRST_NODE 1u
-#define TRIO_LAST_NODE 15u
-#define TRIO_BITS_PER_BYTE 10u
+#define TRIO_MAX_PAYLOAD_SIZE 256U
+#define TRIO_MAX_FRAME_SIZE 258U
+#define TRIO_MAX_WIRE_SIZE 258U
+#define TRIO_FIRST_NODE 1U
+#define TRIO_LAST_NODE 15U
+#define TRIO_BITS_PER_BYTE 10U
 
 /* Enum keypad_mode (section Message types): What a keypad sends for a key. */
 typedef uint8_t trio_keypad_mode_t;
-#define TRIO_KEYPAD_MODE_ON_ONLY 0u /* One character when the key goes down */
-#define TRIO_KEYPAD_MODE_ON_OFF 127u /* Separate characters when the key goes down and up */
+#define TRIO_KEYPAD_MODE_ON_ONLY 0U /* One character when the key goes down */
+#define TRIO_KEYPAD_MODE_ON_OFF 127U /* Separate characters when the key goes down and up */
 
 static inline bool trio_keypad_mode_is_valid(trio_keypad_mode_t value)
 {
@@ -134,59 +139,66 @@ static inline const char *trio_keypad_mode_name(trio_keypad_mode_t value)
 /* 14 bits in 2 bytes: bits 0..6, 7..13 */
 static inline void trio_put_u14_groups_(uint8_t *at, uint16_t value)
 {
-    at[0] = (uint8_t)((value) & 0x7Fu);
-    at[1] = (uint8_t)((value >> 7) & 0x7Fu);
+    at[0] = (uint8_t)((value) & 0x7FU);
+    at[1] = (uint8_t)((value >> 7) & 0x7FU);
 }
 static inline uint16_t trio_get_u14_groups_(const uint8_t *at)
 {
     return (uint16_t)(
-        (uint16_t)(at[0] & 0x7Fu) |
-        (uint16_t)((uint16_t)(at[1] & 0x7Fu) << 7));
+        (uint16_t)(at[0] & 0x7FU) |
+        (uint16_t)((uint16_t)(at[1] & 0x7FU) << 7));
 }
 static inline bool trio_misfit_u14_groups_(const uint8_t *at)
 {
-    return ((at[0] & 0x80u) | (at[1] & 0x80u)) != 0u;
+    return ((at[0] & 0x80U) | (at[1] & 0x80U)) != 0U;
 }
 
 /* 64 bits in 10 bytes: bits 32..38, 39..45, 46..52, 53..59, 60..63, 0..6, 7..13, 14..20, 21..27, 28..31 */
 static inline void trio_put_u64_groups_(uint8_t *at, uint64_t value)
 {
-    at[0] = (uint8_t)((value >> 32) & 0x7Fu);
-    at[1] = (uint8_t)((value >> 39) & 0x7Fu);
-    at[2] = (uint8_t)((value >> 46) & 0x7Fu);
-    at[3] = (uint8_t)((value >> 53) & 0x7Fu);
-    at[4] = (uint8_t)((value >> 60) & 0x0Fu);
-    at[5] = (uint8_t)((value) & 0x7Fu);
-    at[6] = (uint8_t)((value >> 7) & 0x7Fu);
-    at[7] = (uint8_t)((value >> 14) & 0x7Fu);
-    at[8] = (uint8_t)((value >> 21) & 0x7Fu);
-    at[9] = (uint8_t)((value >> 28) & 0x0Fu);
+    at[0] = (uint8_t)((value >> 32) & 0x7FU);
+    at[1] = (uint8_t)((value >> 39) & 0x7FU);
+    at[2] = (uint8_t)((value >> 46) & 0x7FU);
+    at[3] = (uint8_t)((value >> 53) & 0x7FU);
+    at[4] = (uint8_t)((value >> 60) & 0x0FU);
+    at[5] = (uint8_t)((value) & 0x7FU);
+    at[6] = (uint8_t)((value >> 7) & 0x7FU);
+    at[7] = (uint8_t)((value >> 14) & 0x7FU);
+    at[8] = (uint8_t)((value >> 21) & 0x7FU);
+    at[9] = (uint8_t)((value >> 28) & 0x0FU);
 }
 static inline uint64_t trio_get_u64_groups_(const uint8_t *at)
 {
     return (uint64_t)(
-        (uint64_t)((uint64_t)(at[0] & 0x7Fu) << 32) |
-        (uint64_t)((uint64_t)(at[1] & 0x7Fu) << 39) |
-        (uint64_t)((uint64_t)(at[2] & 0x7Fu) << 46) |
-        (uint64_t)((uint64_t)(at[3] & 0x7Fu) << 53) |
-        (uint64_t)((uint64_t)(at[4] & 0x0Fu) << 60) |
-        (uint64_t)(at[5] & 0x7Fu) |
-        (uint64_t)((uint64_t)(at[6] & 0x7Fu) << 7) |
-        (uint64_t)((uint64_t)(at[7] & 0x7Fu) << 14) |
-        (uint64_t)((uint64_t)(at[8] & 0x7Fu) << 21) |
-        (uint64_t)((uint64_t)(at[9] & 0x0Fu) << 28));
+        (uint64_t)((uint64_t)(at[0] & 0x7FU) << 32) |
+        (uint64_t)((uint64_t)(at[1] & 0x7FU) << 39) |
+        (uint64_t)((uint64_t)(at[2] & 0x7FU) << 46) |
+        (uint64_t)((uint64_t)(at[3] & 0x7FU) << 53) |
+        (uint64_t)((uint64_t)(at[4] & 0x0FU) << 60) |
+        (uint64_t)(at[5] & 0x7FU) |
+        (uint64_t)((uint64_t)(at[6] & 0x7FU) << 7) |
+        (uint64_t)((uint64_t)(at[7] & 0x7FU) << 14) |
+        (uint64_t)((uint64_t)(at[8] & 0x7FU) << 21) |
+        (uint64_t)((uint64_t)(at[9] & 0x0FU) << 28));
 }
 static inline bool trio_misfit_u64_groups_(const uint8_t *at)
 {
-    return ((at[0] & 0x80u) | (at[1] & 0x80u) | (at[2] & 0x80u) | (at[3] & 0x80u) | (at[4] & 0xF0u) | (at[5] & 0x80u) |
-        (at[6] & 0x80u) | (at[7] & 0x80u) | (at[8] & 0x80u) | (at[9] & 0xF0u)) != 0u;
+    return ((at[0] & 0x80U) | (at[1] & 0x80U) | (at[2] & 0x80U) | (at[3] & 0x80U) | (at[4] & 0xF0U) | (at[5] & 0x80U) |
+        (at[6] & 0x80U) | (at[7] & 0x80U) | (at[8] & 0x80U) | (at[9] & 0xF0U)) != 0U;
+}
+
+static inline void trio_copy_(uint8_t *to, const uint8_t *from, size_t count)
+{
+    for (size_t index = 0U; index < count; ++index) {
+        to[index] = from[index];
+    }
 }
 
 /* Characters of seven bits. */
 static inline bool trio_is_text_(const uint8_t *bytes, size_t size)
 {
-    for (size_t index = 0u; index < size; ++index) {
-        if (bytes[index] > 0x7Fu) {
+    for (size_t index = 0U; index < size; ++index) {
+        if (bytes[index] > 0x7FU) {
             return false;
         }
     }
@@ -199,18 +211,22 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 {
     int64_t whole;
     double rest;
-    if (!(steps >= (double)least - 0.5 && steps <= (double)most + 0.5)) {
+    if (!((steps >= ((double)least - 0.5)) && (steps <= ((double)most + 0.5)))) {
         return TRIO_ERROR_RANGE;
     }
-    if (steps <= (double)least || steps >= (double)most) {
-        *raw = (steps <= (double)least) ? least : most;
+    if (steps <= (double)least) {
+        *raw = least;
+        return TRIO_OK;
+    }
+    if (steps >= (double)most) {
+        *raw = most;
         return TRIO_OK;
     }
     whole = (int64_t)steps;
     rest = steps - (double)whole;
-    if (rest > 0.5 || (rest == 0.5 && (whole & 1) != 0)) {
+    if ((rest > 0.5) || ((rest == 0.5) && ((whole & 1) != 0))) {
         ++whole;
-    } else if (rest < -0.5 || (rest == -0.5 && (whole & 1) != 0)) {
+    } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1) != 0))) {
         --whole;
     } else {
         /* already the nearest */
@@ -225,37 +241,37 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 /* Any 16-bit algorithm of the CRC catalogue: (polynomial, start value, reflected, final XOR).
  * Choose one with -DTRIO_CRC=TRIO_CRC_16_XMODEM, or write a tuple of your own. The check value is the CRC of
  * the nine characters 123456789. */
-#define TRIO_CRC_16_ARC (0x8005u, 0x0000u, 1, 0x0000u) /* check value 0xBB3D */
-#define TRIO_CRC_16_CDMA2000 (0xC867u, 0xFFFFu, 0, 0x0000u) /* check value 0x4C06 */
-#define TRIO_CRC_16_CMS (0x8005u, 0xFFFFu, 0, 0x0000u) /* check value 0xAEE7 */
-#define TRIO_CRC_16_DDS_110 (0x8005u, 0x800Du, 0, 0x0000u) /* check value 0x9ECF */
-#define TRIO_CRC_16_DECT_R (0x0589u, 0x0000u, 0, 0x0001u) /* check value 0x007E */
-#define TRIO_CRC_16_DECT_X (0x0589u, 0x0000u, 0, 0x0000u) /* check value 0x007F */
-#define TRIO_CRC_16_DNP (0x3D65u, 0x0000u, 1, 0xFFFFu) /* check value 0xEA82 */
-#define TRIO_CRC_16_EN_13757 (0x3D65u, 0x0000u, 0, 0xFFFFu) /* check value 0xC2B7 */
-#define TRIO_CRC_16_GENIBUS (0x1021u, 0xFFFFu, 0, 0xFFFFu) /* check value 0xD64E */
-#define TRIO_CRC_16_GSM (0x1021u, 0x0000u, 0, 0xFFFFu) /* check value 0xCE3C */
-#define TRIO_CRC_16_IBM_3740 (0x1021u, 0xFFFFu, 0, 0x0000u) /* check value 0x29B1 */
-#define TRIO_CRC_16_IBM_SDLC (0x1021u, 0xFFFFu, 1, 0xFFFFu) /* check value 0x906E */
-#define TRIO_CRC_16_ISO_IEC_14443_3_A (0x1021u, 0xC6C6u, 1, 0x0000u) /* check value 0xBF05 */
-#define TRIO_CRC_16_KERMIT (0x1021u, 0x0000u, 1, 0x0000u) /* check value 0x2189 */
-#define TRIO_CRC_16_LJ1200 (0x6F63u, 0x0000u, 0, 0x0000u) /* check value 0xBDF4 */
-#define TRIO_CRC_16_M17 (0x5935u, 0xFFFFu, 0, 0x0000u) /* check value 0x772B */
-#define TRIO_CRC_16_MAXIM_DOW (0x8005u, 0x0000u, 1, 0xFFFFu) /* check value 0x44C2 */
-#define TRIO_CRC_16_MCRF4XX (0x1021u, 0xFFFFu, 1, 0x0000u) /* check value 0x6F91 */
-#define TRIO_CRC_16_MODBUS (0x8005u, 0xFFFFu, 1, 0x0000u) /* check value 0x4B37 */
-#define TRIO_CRC_16_NRSC_5 (0x080Bu, 0xFFFFu, 1, 0x0000u) /* check value 0xA066 */
-#define TRIO_CRC_16_OPENSAFETY_A (0x5935u, 0x0000u, 0, 0x0000u) /* check value 0x5D38 */
-#define TRIO_CRC_16_OPENSAFETY_B (0x755Bu, 0x0000u, 0, 0x0000u) /* check value 0x20FE */
-#define TRIO_CRC_16_PROFIBUS (0x1DCFu, 0xFFFFu, 0, 0xFFFFu) /* check value 0xA819 */
-#define TRIO_CRC_16_RIELLO (0x1021u, 0xB2AAu, 1, 0x0000u) /* check value 0x63D0 */
-#define TRIO_CRC_16_SPI_FUJITSU (0x1021u, 0x1D0Fu, 0, 0x0000u) /* check value 0xE5CC */
-#define TRIO_CRC_16_T10_DIF (0x8BB7u, 0x0000u, 0, 0x0000u) /* check value 0xD0DB */
-#define TRIO_CRC_16_TELEDISK (0xA097u, 0x0000u, 0, 0x0000u) /* check value 0x0FB3 */
-#define TRIO_CRC_16_TMS37157 (0x1021u, 0x89ECu, 1, 0x0000u) /* check value 0x26B1 */
-#define TRIO_CRC_16_UMTS (0x8005u, 0x0000u, 0, 0x0000u) /* check value 0xFEE8 */
-#define TRIO_CRC_16_USB (0x8005u, 0xFFFFu, 1, 0xFFFFu) /* check value 0xB4C8 */
-#define TRIO_CRC_16_XMODEM (0x1021u, 0x0000u, 0, 0x0000u) /* check value 0x31C3 */
+#define TRIO_CRC_16_ARC (0x8005U, 0x0000U, 1, 0x0000U) /* check value 0xBB3D */
+#define TRIO_CRC_16_CDMA2000 (0xC867U, 0xFFFFU, 0, 0x0000U) /* check value 0x4C06 */
+#define TRIO_CRC_16_CMS (0x8005U, 0xFFFFU, 0, 0x0000U) /* check value 0xAEE7 */
+#define TRIO_CRC_16_DDS_110 (0x8005U, 0x800DU, 0, 0x0000U) /* check value 0x9ECF */
+#define TRIO_CRC_16_DECT_R (0x0589U, 0x0000U, 0, 0x0001U) /* check value 0x007E */
+#define TRIO_CRC_16_DECT_X (0x0589U, 0x0000U, 0, 0x0000U) /* check value 0x007F */
+#define TRIO_CRC_16_DNP (0x3D65U, 0x0000U, 1, 0xFFFFU) /* check value 0xEA82 */
+#define TRIO_CRC_16_EN_13757 (0x3D65U, 0x0000U, 0, 0xFFFFU) /* check value 0xC2B7 */
+#define TRIO_CRC_16_GENIBUS (0x1021U, 0xFFFFU, 0, 0xFFFFU) /* check value 0xD64E */
+#define TRIO_CRC_16_GSM (0x1021U, 0x0000U, 0, 0xFFFFU) /* check value 0xCE3C */
+#define TRIO_CRC_16_IBM_3740 (0x1021U, 0xFFFFU, 0, 0x0000U) /* check value 0x29B1 */
+#define TRIO_CRC_16_IBM_SDLC (0x1021U, 0xFFFFU, 1, 0xFFFFU) /* check value 0x906E */
+#define TRIO_CRC_16_ISO_IEC_14443_3_A (0x1021U, 0xC6C6U, 1, 0x0000U) /* check value 0xBF05 */
+#define TRIO_CRC_16_KERMIT (0x1021U, 0x0000U, 1, 0x0000U) /* check value 0x2189 */
+#define TRIO_CRC_16_LJ1200 (0x6F63U, 0x0000U, 0, 0x0000U) /* check value 0xBDF4 */
+#define TRIO_CRC_16_M17 (0x5935U, 0xFFFFU, 0, 0x0000U) /* check value 0x772B */
+#define TRIO_CRC_16_MAXIM_DOW (0x8005U, 0x0000U, 1, 0xFFFFU) /* check value 0x44C2 */
+#define TRIO_CRC_16_MCRF4XX (0x1021U, 0xFFFFU, 1, 0x0000U) /* check value 0x6F91 */
+#define TRIO_CRC_16_MODBUS (0x8005U, 0xFFFFU, 1, 0x0000U) /* check value 0x4B37 */
+#define TRIO_CRC_16_NRSC_5 (0x080BU, 0xFFFFU, 1, 0x0000U) /* check value 0xA066 */
+#define TRIO_CRC_16_OPENSAFETY_A (0x5935U, 0x0000U, 0, 0x0000U) /* check value 0x5D38 */
+#define TRIO_CRC_16_OPENSAFETY_B (0x755BU, 0x0000U, 0, 0x0000U) /* check value 0x20FE */
+#define TRIO_CRC_16_PROFIBUS (0x1DCFU, 0xFFFFU, 0, 0xFFFFU) /* check value 0xA819 */
+#define TRIO_CRC_16_RIELLO (0x1021U, 0xB2AAU, 1, 0x0000U) /* check value 0x63D0 */
+#define TRIO_CRC_16_SPI_FUJITSU (0x1021U, 0x1D0FU, 0, 0x0000U) /* check value 0xE5CC */
+#define TRIO_CRC_16_T10_DIF (0x8BB7U, 0x0000U, 0, 0x0000U) /* check value 0xD0DB */
+#define TRIO_CRC_16_TELEDISK (0xA097U, 0x0000U, 0, 0x0000U) /* check value 0x0FB3 */
+#define TRIO_CRC_16_TMS37157 (0x1021U, 0x89ECU, 1, 0x0000U) /* check value 0x26B1 */
+#define TRIO_CRC_16_UMTS (0x8005U, 0x0000U, 0, 0x0000U) /* check value 0xFEE8 */
+#define TRIO_CRC_16_USB (0x8005U, 0xFFFFU, 1, 0xFFFFU) /* check value 0xB4C8 */
+#define TRIO_CRC_16_XMODEM (0x1021U, 0x0000U, 0, 0x0000U) /* check value 0x31C3 */
 #ifndef TRIO_CRC
 #define TRIO_CRC TRIO_CRC_16_IBM_3740
 #endif
@@ -282,10 +298,10 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #define TRIO_CRC_XOROUT_ TRIO_CRC_EXPAND_(TRIO_CRC_TAKE_4_ TRIO_CRC)
 
 /* A reflected CRC keeps its register turned round, so that nothing has to be turned for each byte. */
-#define TRIO_SWAP_1_(x) ((((x) & 0x5555u) << 1) | (((x) >> 1) & 0x5555u))
-#define TRIO_SWAP_2_(x) ((((x) & 0x3333u) << 2) | (((x) >> 2) & 0x3333u))
-#define TRIO_SWAP_4_(x) ((((x) & 0x0F0Fu) << 4) | (((x) >> 4) & 0x0F0Fu))
-#define TRIO_SWAP_8_(x) ((((x) & 0x00FFu) << 8) | (((x) >> 8) & 0x00FFu))
+#define TRIO_SWAP_1_(x) ((((x) & 0x5555U) << 1) | (((x) >> 1) & 0x5555U))
+#define TRIO_SWAP_2_(x) ((((x) & 0x3333U) << 2) | (((x) >> 2) & 0x3333U))
+#define TRIO_SWAP_4_(x) ((((x) & 0x0F0FU) << 4) | (((x) >> 4) & 0x0F0FU))
+#define TRIO_SWAP_8_(x) ((((x) & 0x00FFU) << 8) | (((x) >> 8) & 0x00FFU))
 #define TRIO_TURNED_(x) TRIO_SWAP_8_(TRIO_SWAP_4_(TRIO_SWAP_2_(TRIO_SWAP_1_(x))))
 #if TRIO_CRC_REFLECTED_
 #define TRIO_CRC_FEEDBACK_ TRIO_TURNED_(TRIO_CRC_POLY_)
@@ -304,13 +320,12 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #endif
 
 #if TRIO_CRC_FORM == TRIO_CRC_FORM_TABLE && \
-    (TRIO_CRC_POLY_ != 0x1021u || TRIO_CRC_REFLECTED_ != 0)
+    (TRIO_CRC_POLY_ != 0x1021U || TRIO_CRC_REFLECTED_ != 0)
 #error "The 256-entry table is that of crc-16/ibm-3740: choose TRIO_CRC_FORM_NIBBLE, or generate with --set crc=NAME"
 #endif
 
 #if TRIO_CRC_FORM != TRIO_CRC_FORM_LOOP
 #if defined(__AVR__) /* tables stay in flash */
-#include <avr/pgmspace.h>
 #define TRIO_CRC_STORAGE_ PROGMEM
 #define TRIO_CRC_ENTRY_(index) pgm_read_word(&trio_crc_table[(index)])
 #else
@@ -335,63 +350,63 @@ extern const uint16_t trio_crc_table[];
 #if TRIO_CRC_HERE_
 /* A step is linear: an entry is the sum of what its four bits do, so the compiler can compute the table. */
 #if TRIO_CRC_REFLECTED_
-#define TRIO_CRC_CLOCK_(x) (((x) >> 1) ^ (((x) & 1u) * TRIO_CRC_FEEDBACK_))
+#define TRIO_CRC_CLOCK_(x) (((x) >> 1) ^ (((x) & 1U) * TRIO_CRC_FEEDBACK_))
 #define TRIO_CRC_BIT_3_ TRIO_CRC_FEEDBACK_
 #define TRIO_CRC_BIT_2_ TRIO_CRC_CLOCK_(TRIO_CRC_BIT_3_)
 #define TRIO_CRC_BIT_1_ TRIO_CRC_CLOCK_(TRIO_CRC_BIT_2_)
 #define TRIO_CRC_BIT_0_ TRIO_CRC_CLOCK_(TRIO_CRC_BIT_1_)
 #else
-#define TRIO_CRC_CLOCK_(x) ((((x) << 1) & 0xFFFFu) ^ ((((x) >> 15) & 1u) * TRIO_CRC_FEEDBACK_))
+#define TRIO_CRC_CLOCK_(x) ((((x) << 1) & 0xFFFFU) ^ ((((x) >> 15) & 1U) * TRIO_CRC_FEEDBACK_))
 #define TRIO_CRC_BIT_0_ TRIO_CRC_FEEDBACK_
 #define TRIO_CRC_BIT_1_ TRIO_CRC_CLOCK_(TRIO_CRC_BIT_0_)
 #define TRIO_CRC_BIT_2_ TRIO_CRC_CLOCK_(TRIO_CRC_BIT_1_)
 #define TRIO_CRC_BIT_3_ TRIO_CRC_CLOCK_(TRIO_CRC_BIT_2_)
 #endif
 #define TRIO_CRC_SUM_(i) \
-    ((uint16_t)((((i) & 1u) * TRIO_CRC_BIT_0_) ^ ((((i) >> 1) & 1u) * TRIO_CRC_BIT_1_) ^ \
-                ((((i) >> 2) & 1u) * TRIO_CRC_BIT_2_) ^ ((((i) >> 3) & 1u) * TRIO_CRC_BIT_3_)))
+    ((uint16_t)((((i) & 1U) * TRIO_CRC_BIT_0_) ^ ((((i) >> 1) & 1U) * TRIO_CRC_BIT_1_) ^ \
+                ((((i) >> 2) & 1U) * TRIO_CRC_BIT_2_) ^ ((((i) >> 3) & 1U) * TRIO_CRC_BIT_3_)))
 TRIO_CRC_DECLARE_ uint16_t trio_crc_table[16] TRIO_CRC_STORAGE_ = {
-    TRIO_CRC_SUM_(0u), TRIO_CRC_SUM_(1u), TRIO_CRC_SUM_(2u), TRIO_CRC_SUM_(3u),
-    TRIO_CRC_SUM_(4u), TRIO_CRC_SUM_(5u), TRIO_CRC_SUM_(6u), TRIO_CRC_SUM_(7u),
-    TRIO_CRC_SUM_(8u), TRIO_CRC_SUM_(9u), TRIO_CRC_SUM_(10u), TRIO_CRC_SUM_(11u),
-    TRIO_CRC_SUM_(12u), TRIO_CRC_SUM_(13u), TRIO_CRC_SUM_(14u), TRIO_CRC_SUM_(15u)
+    TRIO_CRC_SUM_(0U), TRIO_CRC_SUM_(1U), TRIO_CRC_SUM_(2U), TRIO_CRC_SUM_(3U),
+    TRIO_CRC_SUM_(4U), TRIO_CRC_SUM_(5U), TRIO_CRC_SUM_(6U), TRIO_CRC_SUM_(7U),
+    TRIO_CRC_SUM_(8U), TRIO_CRC_SUM_(9U), TRIO_CRC_SUM_(10U), TRIO_CRC_SUM_(11U),
+    TRIO_CRC_SUM_(12U), TRIO_CRC_SUM_(13U), TRIO_CRC_SUM_(14U), TRIO_CRC_SUM_(15U)
 };
 #endif
 #elif TRIO_CRC_FORM == TRIO_CRC_FORM_TABLE
 #if TRIO_CRC_HERE_
 TRIO_CRC_DECLARE_ uint16_t trio_crc_table[256] TRIO_CRC_STORAGE_ = {
-    0x0000u, 0x1021u, 0x2042u, 0x3063u, 0x4084u, 0x50A5u, 0x60C6u, 0x70E7u,
-    0x8108u, 0x9129u, 0xA14Au, 0xB16Bu, 0xC18Cu, 0xD1ADu, 0xE1CEu, 0xF1EFu,
-    0x1231u, 0x0210u, 0x3273u, 0x2252u, 0x52B5u, 0x4294u, 0x72F7u, 0x62D6u,
-    0x9339u, 0x8318u, 0xB37Bu, 0xA35Au, 0xD3BDu, 0xC39Cu, 0xF3FFu, 0xE3DEu,
-    0x2462u, 0x3443u, 0x0420u, 0x1401u, 0x64E6u, 0x74C7u, 0x44A4u, 0x5485u,
-    0xA56Au, 0xB54Bu, 0x8528u, 0x9509u, 0xE5EEu, 0xF5CFu, 0xC5ACu, 0xD58Du,
-    0x3653u, 0x2672u, 0x1611u, 0x0630u, 0x76D7u, 0x66F6u, 0x5695u, 0x46B4u,
-    0xB75Bu, 0xA77Au, 0x9719u, 0x8738u, 0xF7DFu, 0xE7FEu, 0xD79Du, 0xC7BCu,
-    0x48C4u, 0x58E5u, 0x6886u, 0x78A7u, 0x0840u, 0x1861u, 0x2802u, 0x3823u,
-    0xC9CCu, 0xD9EDu, 0xE98Eu, 0xF9AFu, 0x8948u, 0x9969u, 0xA90Au, 0xB92Bu,
-    0x5AF5u, 0x4AD4u, 0x7AB7u, 0x6A96u, 0x1A71u, 0x0A50u, 0x3A33u, 0x2A12u,
-    0xDBFDu, 0xCBDCu, 0xFBBFu, 0xEB9Eu, 0x9B79u, 0x8B58u, 0xBB3Bu, 0xAB1Au,
-    0x6CA6u, 0x7C87u, 0x4CE4u, 0x5CC5u, 0x2C22u, 0x3C03u, 0x0C60u, 0x1C41u,
-    0xEDAEu, 0xFD8Fu, 0xCDECu, 0xDDCDu, 0xAD2Au, 0xBD0Bu, 0x8D68u, 0x9D49u,
-    0x7E97u, 0x6EB6u, 0x5ED5u, 0x4EF4u, 0x3E13u, 0x2E32u, 0x1E51u, 0x0E70u,
-    0xFF9Fu, 0xEFBEu, 0xDFDDu, 0xCFFCu, 0xBF1Bu, 0xAF3Au, 0x9F59u, 0x8F78u,
-    0x9188u, 0x81A9u, 0xB1CAu, 0xA1EBu, 0xD10Cu, 0xC12Du, 0xF14Eu, 0xE16Fu,
-    0x1080u, 0x00A1u, 0x30C2u, 0x20E3u, 0x5004u, 0x4025u, 0x7046u, 0x6067u,
-    0x83B9u, 0x9398u, 0xA3FBu, 0xB3DAu, 0xC33Du, 0xD31Cu, 0xE37Fu, 0xF35Eu,
-    0x02B1u, 0x1290u, 0x22F3u, 0x32D2u, 0x4235u, 0x5214u, 0x6277u, 0x7256u,
-    0xB5EAu, 0xA5CBu, 0x95A8u, 0x8589u, 0xF56Eu, 0xE54Fu, 0xD52Cu, 0xC50Du,
-    0x34E2u, 0x24C3u, 0x14A0u, 0x0481u, 0x7466u, 0x6447u, 0x5424u, 0x4405u,
-    0xA7DBu, 0xB7FAu, 0x8799u, 0x97B8u, 0xE75Fu, 0xF77Eu, 0xC71Du, 0xD73Cu,
-    0x26D3u, 0x36F2u, 0x0691u, 0x16B0u, 0x6657u, 0x7676u, 0x4615u, 0x5634u,
-    0xD94Cu, 0xC96Du, 0xF90Eu, 0xE92Fu, 0x99C8u, 0x89E9u, 0xB98Au, 0xA9ABu,
-    0x5844u, 0x4865u, 0x7806u, 0x6827u, 0x18C0u, 0x08E1u, 0x3882u, 0x28A3u,
-    0xCB7Du, 0xDB5Cu, 0xEB3Fu, 0xFB1Eu, 0x8BF9u, 0x9BD8u, 0xABBBu, 0xBB9Au,
-    0x4A75u, 0x5A54u, 0x6A37u, 0x7A16u, 0x0AF1u, 0x1AD0u, 0x2AB3u, 0x3A92u,
-    0xFD2Eu, 0xED0Fu, 0xDD6Cu, 0xCD4Du, 0xBDAAu, 0xAD8Bu, 0x9DE8u, 0x8DC9u,
-    0x7C26u, 0x6C07u, 0x5C64u, 0x4C45u, 0x3CA2u, 0x2C83u, 0x1CE0u, 0x0CC1u,
-    0xEF1Fu, 0xFF3Eu, 0xCF5Du, 0xDF7Cu, 0xAF9Bu, 0xBFBAu, 0x8FD9u, 0x9FF8u,
-    0x6E17u, 0x7E36u, 0x4E55u, 0x5E74u, 0x2E93u, 0x3EB2u, 0x0ED1u, 0x1EF0u
+    0x0000U, 0x1021U, 0x2042U, 0x3063U, 0x4084U, 0x50A5U, 0x60C6U, 0x70E7U,
+    0x8108U, 0x9129U, 0xA14AU, 0xB16BU, 0xC18CU, 0xD1ADU, 0xE1CEU, 0xF1EFU,
+    0x1231U, 0x0210U, 0x3273U, 0x2252U, 0x52B5U, 0x4294U, 0x72F7U, 0x62D6U,
+    0x9339U, 0x8318U, 0xB37BU, 0xA35AU, 0xD3BDU, 0xC39CU, 0xF3FFU, 0xE3DEU,
+    0x2462U, 0x3443U, 0x0420U, 0x1401U, 0x64E6U, 0x74C7U, 0x44A4U, 0x5485U,
+    0xA56AU, 0xB54BU, 0x8528U, 0x9509U, 0xE5EEU, 0xF5CFU, 0xC5ACU, 0xD58DU,
+    0x3653U, 0x2672U, 0x1611U, 0x0630U, 0x76D7U, 0x66F6U, 0x5695U, 0x46B4U,
+    0xB75BU, 0xA77AU, 0x9719U, 0x8738U, 0xF7DFU, 0xE7FEU, 0xD79DU, 0xC7BCU,
+    0x48C4U, 0x58E5U, 0x6886U, 0x78A7U, 0x0840U, 0x1861U, 0x2802U, 0x3823U,
+    0xC9CCU, 0xD9EDU, 0xE98EU, 0xF9AFU, 0x8948U, 0x9969U, 0xA90AU, 0xB92BU,
+    0x5AF5U, 0x4AD4U, 0x7AB7U, 0x6A96U, 0x1A71U, 0x0A50U, 0x3A33U, 0x2A12U,
+    0xDBFDU, 0xCBDCU, 0xFBBFU, 0xEB9EU, 0x9B79U, 0x8B58U, 0xBB3BU, 0xAB1AU,
+    0x6CA6U, 0x7C87U, 0x4CE4U, 0x5CC5U, 0x2C22U, 0x3C03U, 0x0C60U, 0x1C41U,
+    0xEDAEU, 0xFD8FU, 0xCDECU, 0xDDCDU, 0xAD2AU, 0xBD0BU, 0x8D68U, 0x9D49U,
+    0x7E97U, 0x6EB6U, 0x5ED5U, 0x4EF4U, 0x3E13U, 0x2E32U, 0x1E51U, 0x0E70U,
+    0xFF9FU, 0xEFBEU, 0xDFDDU, 0xCFFCU, 0xBF1BU, 0xAF3AU, 0x9F59U, 0x8F78U,
+    0x9188U, 0x81A9U, 0xB1CAU, 0xA1EBU, 0xD10CU, 0xC12DU, 0xF14EU, 0xE16FU,
+    0x1080U, 0x00A1U, 0x30C2U, 0x20E3U, 0x5004U, 0x4025U, 0x7046U, 0x6067U,
+    0x83B9U, 0x9398U, 0xA3FBU, 0xB3DAU, 0xC33DU, 0xD31CU, 0xE37FU, 0xF35EU,
+    0x02B1U, 0x1290U, 0x22F3U, 0x32D2U, 0x4235U, 0x5214U, 0x6277U, 0x7256U,
+    0xB5EAU, 0xA5CBU, 0x95A8U, 0x8589U, 0xF56EU, 0xE54FU, 0xD52CU, 0xC50DU,
+    0x34E2U, 0x24C3U, 0x14A0U, 0x0481U, 0x7466U, 0x6447U, 0x5424U, 0x4405U,
+    0xA7DBU, 0xB7FAU, 0x8799U, 0x97B8U, 0xE75FU, 0xF77EU, 0xC71DU, 0xD73CU,
+    0x26D3U, 0x36F2U, 0x0691U, 0x16B0U, 0x6657U, 0x7676U, 0x4615U, 0x5634U,
+    0xD94CU, 0xC96DU, 0xF90EU, 0xE92FU, 0x99C8U, 0x89E9U, 0xB98AU, 0xA9ABU,
+    0x5844U, 0x4865U, 0x7806U, 0x6827U, 0x18C0U, 0x08E1U, 0x3882U, 0x28A3U,
+    0xCB7DU, 0xDB5CU, 0xEB3FU, 0xFB1EU, 0x8BF9U, 0x9BD8U, 0xABBBU, 0xBB9AU,
+    0x4A75U, 0x5A54U, 0x6A37U, 0x7A16U, 0x0AF1U, 0x1AD0U, 0x2AB3U, 0x3A92U,
+    0xFD2EU, 0xED0FU, 0xDD6CU, 0xCD4DU, 0xBDAAU, 0xAD8BU, 0x9DE8U, 0x8DC9U,
+    0x7C26U, 0x6C07U, 0x5C64U, 0x4C45U, 0x3CA2U, 0x2C83U, 0x1CE0U, 0x0CC1U,
+    0xEF1FU, 0xFF3EU, 0xCF5DU, 0xDF7CU, 0xAF9BU, 0xBFBAU, 0x8FD9U, 0x9FF8U,
+    0x6E17U, 0x7E36U, 0x4E55U, 0x5E74U, 0x2E93U, 0x3EB2U, 0x0ED1U, 0x1EF0U
 };
 #endif
 #elif TRIO_CRC_FORM != TRIO_CRC_FORM_LOOP
@@ -404,38 +419,43 @@ static inline uint16_t trio_check_start(void)
     return (uint16_t)TRIO_CRC_START_;
 }
 
+#if TRIO_CRC_FORM == TRIO_CRC_FORM_TABLE
 static inline uint16_t trio_check_update(uint16_t crc, uint8_t byte)
 {
-#if TRIO_CRC_FORM == TRIO_CRC_FORM_TABLE
 #if TRIO_CRC_REFLECTED_
-    return (uint16_t)((crc >> 8) ^ TRIO_CRC_ENTRY_((crc ^ byte) & 0xFFu));
+    return (uint16_t)((crc >> 8) ^ TRIO_CRC_ENTRY_((crc ^ byte) & 0xFFU));
 #else
-    return (uint16_t)((crc << 8) ^ TRIO_CRC_ENTRY_(((crc >> 8) ^ byte) & 0xFFu));
-#endif
-#elif TRIO_CRC_FORM == TRIO_CRC_FORM_NIBBLE
-#if TRIO_CRC_REFLECTED_
-    crc = (uint16_t)((crc >> 4) ^ TRIO_CRC_ENTRY_((crc ^ byte) & 0x0Fu));
-    return (uint16_t)((crc >> 4) ^ TRIO_CRC_ENTRY_((crc ^ ((unsigned)byte >> 4)) & 0x0Fu));
-#else
-    crc = (uint16_t)((crc << 4) ^ TRIO_CRC_ENTRY_(((crc >> 12) ^ ((unsigned)byte >> 4)) & 0x0Fu));
-    return (uint16_t)((crc << 4) ^ TRIO_CRC_ENTRY_(((crc >> 12) ^ byte) & 0x0Fu));
-#endif
-#else
-    uint8_t bit;
-#if TRIO_CRC_REFLECTED_
-    crc = (uint16_t)(crc ^ byte);
-    for (bit = 8u; bit > 0u; --bit) {
-        crc = (uint16_t)((crc >> 1) ^ (((crc & 1u) != 0u) ? TRIO_CRC_FEEDBACK_ : 0u));
-    }
-#else
-    crc = (uint16_t)(crc ^ (uint16_t)((uint16_t)byte << 8));
-    for (bit = 8u; bit > 0u; --bit) {
-        crc = (uint16_t)(((uint16_t)(crc << 1) ^ (((crc & 0x8000u) != 0u) ? TRIO_CRC_FEEDBACK_ : 0u)));
-    }
-#endif
-    return crc;
+    return (uint16_t)((crc << 8) ^ TRIO_CRC_ENTRY_(((crc >> 8) ^ byte) & 0xFFU));
 #endif
 }
+#elif TRIO_CRC_FORM == TRIO_CRC_FORM_NIBBLE
+static inline uint16_t trio_check_update(uint16_t crc, uint8_t byte)
+{
+#if TRIO_CRC_REFLECTED_
+    const uint16_t half = (uint16_t)((crc >> 4) ^ TRIO_CRC_ENTRY_((crc ^ byte) & 0x0FU));
+    return (uint16_t)((half >> 4) ^ TRIO_CRC_ENTRY_((half ^ ((unsigned)byte >> 4)) & 0x0FU));
+#else
+    const uint16_t half = (uint16_t)((crc << 4) ^ TRIO_CRC_ENTRY_(((crc >> 12) ^ ((unsigned)byte >> 4)) & 0x0FU));
+    return (uint16_t)((half << 4) ^ TRIO_CRC_ENTRY_(((half >> 12) ^ byte) & 0x0FU));
+#endif
+}
+#else
+static inline uint16_t trio_check_update(uint16_t crc, uint8_t byte)
+{
+#if TRIO_CRC_REFLECTED_
+    uint16_t next = (uint16_t)(crc ^ byte);
+    for (uint8_t bit = 8U; bit > 0U; --bit) {
+        next = (uint16_t)((next >> 1) ^ (((next & 1U) != 0U) ? TRIO_CRC_FEEDBACK_ : 0U));
+    }
+#else
+    uint16_t next = (uint16_t)(crc ^ (uint16_t)((uint16_t)byte << 8));
+    for (uint8_t bit = 8U; bit > 0U; --bit) {
+        next = (uint16_t)(((uint16_t)(next << 1) ^ (((next & 0x8000U) != 0U) ? TRIO_CRC_FEEDBACK_ : 0U)));
+    }
+#endif
+    return next;
+}
+#endif
 
 static inline uint16_t trio_check_finish(uint16_t crc)
 {
@@ -457,131 +477,144 @@ typedef struct trio_frame {
 #define TRIO_KEYPAD_OFFSET_ID 0x03
 #define TRIO_KEYPAD_MODE_MESSAGE_ID 0x04
 
+/* Whether a frame with so many bytes of payload fits. */
+static inline bool trio_fits_(size_t capacity, size_t size)
+{
+    return (capacity >= 2U) && ((capacity - 2U) >= size);
+}
+
+/* Where the payload of a frame that fits is written, its place in the frame. */
+static inline uint8_t *trio_place_(uint8_t *wire, size_t capacity, size_t size)
+{
+    (void)capacity;
+    (void)size;
+    return &wire[1];
+}
+
 /* What a message of an id looks like: fewest and most bytes, and whether a check value follows them. */
 static inline bool trio_shape_(uint8_t id, size_t *least, size_t *most, bool *checked)
 {
     switch (id) {
     case TRIO_CHARACTER_TRANSFER_ID:
-        *least = 1u;
-        *most = 256u;
+        *least = 1U;
+        *most = 256U;
         *checked = false;
         return true;
     case TRIO_DIRECT_VARIABLE_TRANSFER_ID:
-        *least = 12u;
-        *most = 12u;
+        *least = 12U;
+        *most = 12U;
         *checked = true;
         return true;
     case TRIO_KEYPAD_OFFSET_ID:
-        *least = 1u;
-        *most = 1u;
+        *least = 1U;
+        *most = 1U;
         *checked = false;
         return true;
     case TRIO_KEYPAD_MODE_MESSAGE_ID:
-        *least = 1u;
-        *most = 1u;
+        *least = 1U;
+        *most = 1U;
         *checked = false;
         return true;
     default:
         break;
     }
-    *least = 0u;
-    *most = 0u;
+    *least = 0U;
+    *most = 0U;
     *checked = false;
     return false;
 }
 
-/* Where a payload is written: its place in the frame. */
-static inline uint8_t *trio_place_(uint8_t *wire, size_t capacity, size_t size)
-{
-    (void)size;
-    return (capacity == 0u) ? wire : wire + 1;
-}
-
-static inline size_t trio_room_(size_t capacity)
-{
-    return (capacity == 0u) ? 0u : capacity - 1u;
-}
-
 /* Completes a frame whose payload already stands in its place. */
-static inline int trio_seal_(uint8_t id, uint8_t address, size_t size, uint8_t *wire, size_t capacity, bool checked)
+static inline int trio_seal_(
+    uint8_t id, uint8_t address, uint8_t *wire, size_t capacity, int payload_size, bool checked)
 {
-    const size_t overhead = checked ? 4u : 2u;
-    size_t at = size + 1u;
+    const size_t size = (size_t)payload_size;
+    size_t at = size + 1U;
 
-    if (capacity < overhead || capacity - overhead < size) {
+    if (payload_size < 0) {
+        return payload_size;
+    }
+    if (size > TRIO_MAX_PAYLOAD_SIZE) {
+        return TRIO_ERROR_LENGTH;
+    }
+    if (checked && (capacity < (at + 3U))) {
         return TRIO_ERROR_CAPACITY;
     }
-    wire[0] = (uint8_t)(0x80u | ((unsigned)address << 3) | (unsigned)id);
+    if (capacity < (at + 1U)) {
+        return TRIO_ERROR_CAPACITY;
+    }
+    wire[0] = (uint8_t)(0x80U | ((unsigned)address << 3) | (unsigned)id);
     if (checked) {
         uint16_t value = trio_check_start();
-        for (size_t index = 1u; index < at; ++index) {
+        for (size_t index = 1U; index < at; ++index) {
             value = trio_check_update(value, wire[index]);
         }
         value = trio_check_finish(value);
-        wire[at + 0u] = (uint8_t)(value & 0x7Fu);
-        wire[at + 1u] = (uint8_t)((value >> 8) & 0x7Fu);
-        at += 2u;
+        wire[at + 0U] = (uint8_t)(value & 0x7FU);
+        wire[at + 1U] = (uint8_t)((value >> 8) & 0x7FU);
+        at += 2U;
     }
-    wire[at] = (uint8_t)(0x80u | ((unsigned)address << 3) | (unsigned)0x00u);
-    return (int)(at + 1u);
+    wire[at] = (uint8_t)(0x80U | ((unsigned)address << 3));
+    ++at;
+    return (int)at;
 }
 
 /* Unpacks exactly one whole frame. Framing and check value are verified; what the frame carries is checked by
  * trio_message_check or by decoding it. */
 static inline int trio_frame_decode(trio_frame_t *frame, const uint8_t *wire, size_t size)
 {
-    const uint8_t *const payload = wire + 1;
+    const uint8_t *const payload = &wire[1];
     size_t least;
     size_t most;
     size_t count;
     bool checked;
     uint8_t byte;
 
-    if (size < 2u) {
+    if (size < 2U) {
         return TRIO_ERROR_TRUNCATED;
     }
     byte = wire[0];
-    frame->id = (uint8_t)(byte & 0x07u);
-    frame->address = (uint8_t)(((unsigned)byte >> 3) & 0x0Fu);
-    if ((byte & 0x80u) == 0u || frame->id == 0x00u) {
+    frame->id = (uint8_t)(byte & 0x07U);
+    frame->address = (uint8_t)(((unsigned)byte >> 3) & 0x0FU);
+    if (((byte & 0x80U) == 0U) || (frame->id == 0x00U)) {
         return TRIO_ERROR_FRAME;
     }
-    for (size_t index = 1u; index + 1u < size; ++index) {
-        if ((wire[index] & 0x80u) != 0u) {
+    for (size_t index = 1U; index < (size - 1U); ++index) {
+        if ((wire[index] & 0x80U) != 0U) {
             return TRIO_ERROR_FRAME;
         }
     }
-    byte = wire[size - 1u];
-    if ((byte & 0x80u) == 0u) {
+    byte = wire[size - 1U];
+    if ((byte & 0x80U) == 0U) {
         return TRIO_ERROR_TRUNCATED;
     }
-    if ((uint8_t)(byte & 0x07u) != 0x00u || (uint8_t)(((unsigned)byte >> 3) & 0x0Fu) != frame->address) {
+    if (((uint8_t)(byte & 0x07U) != 0x00U) || ((uint8_t)(((unsigned)byte >> 3) & 0x0FU) != frame->address)) {
         return TRIO_ERROR_FRAME;
     }
-    if (frame->address == 0u) {
+    if (frame->address == 0U) {
         return TRIO_ERROR_FRAME;
     }
     if (!trio_shape_(frame->id, &least, &most, &checked)) {
         return TRIO_ERROR_UNKNOWN;
     }
-    count = size - 2u;
+    count = size - 2U;
     if (checked) {
-        if (count < 2u) {
+        if (count < 2U) {
             return TRIO_ERROR_LENGTH;
         }
-        count -= 2u;
+        count -= 2U;
     }
-    if (count < least || count > most) {
+    if ((count < least) || (count > most)) {
         return TRIO_ERROR_LENGTH;
     }
     if (checked) {
-        const uint8_t *const end = payload + count;
+        const uint8_t *const end = &payload[count];
         uint16_t value = trio_check_start();
-        for (size_t index = 0u; index < count; ++index) {
+        for (size_t index = 0U; index < count; ++index) {
             value = trio_check_update(value, payload[index]);
         }
         value = trio_check_finish(value);
-        if ((end[0] != (uint8_t)((value) & 0x7Fu)) || (end[1] != (uint8_t)((value >> 8) & 0x7Fu))) {
+        if ((end[0] != (uint8_t)((value) & 0x7FU)) || (end[1] != (uint8_t)((value >> 8) & 0x7FU))) {
             return TRIO_ERROR_CRC;
         }
     }
@@ -590,42 +623,48 @@ static inline int trio_frame_decode(trio_frame_t *frame, const uint8_t *wire, si
     return TRIO_OK;
 }
 
+/* The same for a message that the address 1..15 may have. */
+static inline int trio_seal_1_to_15_(
+    uint8_t id, uint8_t address, uint8_t *wire, size_t capacity, int payload_size, bool checked)
+{
+    return ((address >= 1U) && (address <= 15U)) ? trio_seal_(id, address, wire, capacity, payload_size, checked) :
+        TRIO_ERROR_RANGE;
+}
+
 /* ---- character_transfer, id 0x01 (section Message types): Characters for a node: printed text, or a key
  * press of a keypad.
  * Payload, 1..256 bytes:
  *      0  text[1..256]  characters
  */
-#define TRIO_CHARACTER_TRANSFER_MIN_SIZE 1u
-#define TRIO_CHARACTER_TRANSFER_MAX_SIZE 256u
-#define TRIO_CHARACTER_TRANSFER_MAX_FRAME_SIZE 258u
-#define TRIO_CHARACTER_TRANSFER_MAX_WIRE_SIZE 258u
+#define TRIO_CHARACTER_TRANSFER_MIN_SIZE 1U
+#define TRIO_CHARACTER_TRANSFER_MAX_SIZE 256U
+#define TRIO_CHARACTER_TRANSFER_MAX_FRAME_SIZE 258U
+#define TRIO_CHARACTER_TRANSFER_MAX_WIRE_SIZE 258U
 
 typedef struct trio_character_transfer {
     uint16_t characters_size; /* bytes in characters */
     uint8_t characters[256]; /* Seven-bit characters, control characters included; 7-bit characters */
 } trio_character_transfer_t;
 
-#define TRIO_CHARACTER_TRANSFER_INIT { 1u, {0x20u} }
+#define TRIO_CHARACTER_TRANSFER_INIT { 1U, {0x20U} }
 
 static inline int trio_character_transfer_encode(
     const trio_character_transfer_t *message, uint8_t *payload, size_t capacity)
 {
-    const size_t size = (size_t)message->characters_size;
-    uint8_t *at;
+    const uint16_t characters_size = message->characters_size;
+    const size_t size = (size_t)characters_size;
 
-    if ((message->characters_size < 1u) || (message->characters_size > 256u)) {
+    if ((characters_size < 1U) || (characters_size > 256U)) {
         return TRIO_ERROR_LENGTH;
     }
-    if (!trio_is_text_(message->characters, message->characters_size)) {
+    if (!trio_is_text_(message->characters, characters_size)) {
         return TRIO_ERROR_RANGE;
     }
     if (capacity < size) {
         return TRIO_ERROR_CAPACITY;
     }
-    at = payload;
-    for (size_t index = 0; index < message->characters_size; ++index) {
-        at[0] = message->characters[index];
-        at += 1;
+    for (uint16_t index = 0U; index < characters_size; ++index) {
+        payload[index] = message->characters[index];
     }
     return (int)size;
 }
@@ -634,18 +673,13 @@ static inline int trio_character_transfer_decode(
     trio_character_transfer_t *message, const uint8_t *payload, size_t size)
 {
     size_t characters_count;
-    const uint8_t *at;
 
-    if ((size < 1u) || (size > 256u)) {
+    if ((size < 1U) || (size > 256U)) {
         return TRIO_ERROR_LENGTH;
     }
     characters_count = size;
     message->characters_size = (uint16_t)characters_count;
-    at = payload;
-    for (size_t index = 0; index < characters_count; ++index) {
-        message->characters[index] = at[0];
-        at += 1;
-    }
+    trio_copy_(message->characters, payload, characters_count);
     if (!trio_is_text_(message->characters, characters_count)) {
         return TRIO_ERROR_RANGE;
     }
@@ -656,13 +690,12 @@ static inline int trio_character_transfer_to_frame(
     const trio_character_transfer_t *message, uint8_t address, uint8_t *wire, size_t capacity)
 {
     const size_t payload_size = (size_t)message->characters_size;
-    int size;
+    int size = (payload_size > TRIO_CHARACTER_TRANSFER_MAX_SIZE) ? (int)TRIO_ERROR_LENGTH : (int)payload_size;
 
-    if (!(address >= 1u && address <= 15u)) {
-        return TRIO_ERROR_RANGE;
+    if (trio_fits_(capacity, payload_size)) {
+        size = trio_character_transfer_encode(message, trio_place_(wire, capacity, payload_size), payload_size);
     }
-    size = trio_character_transfer_encode(message, trio_place_(wire, capacity, payload_size), trio_room_(capacity));
-    return (size < 0) ? size : trio_seal_(TRIO_CHARACTER_TRANSFER_ID, address, (size_t)size, wire, capacity, false);
+    return trio_seal_1_to_15_(TRIO_CHARACTER_TRANSFER_ID, address, wire, capacity, size, false);
 }
 
 /* ---- direct_variable_transfer, id 0x02 (section Message types): Set a variable of a Motion Coordinator;
@@ -671,84 +704,80 @@ static inline int trio_character_transfer_to_frame(
  *      0  u14 in 2 groups   number
  *      2  i64 in 10 groups  value
  */
-#define TRIO_DIRECT_VARIABLE_TRANSFER_MIN_SIZE 12u
-#define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE 12u
-#define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_FRAME_SIZE 16u
-#define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_WIRE_SIZE 16u
+#define TRIO_DIRECT_VARIABLE_TRANSFER_MIN_SIZE 12U
+#define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE 12U
+#define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_FRAME_SIZE 16U
+#define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_WIRE_SIZE 16U
 /* value = (raw * FACTOR + BIAS) / DIVISOR */
 #define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR 1
 #define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS 0
-#define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR 4294967296ll
+#define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR 4294967296LL
 
 typedef struct trio_direct_variable_transfer {
     uint16_t number; /* Number of the variable */
     int64_t value; /* Value of the variable, integer part first; in steps of 1/2^32 */
 } trio_direct_variable_transfer_t;
 
-#define TRIO_DIRECT_VARIABLE_TRANSFER_INIT { 0u, 0ll }
+#define TRIO_DIRECT_VARIABLE_TRANSFER_INIT { 0U, 0LL }
 
 static inline int trio_direct_variable_transfer_encode(
     const trio_direct_variable_transfer_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->number > 16383u) {
+    if (message->number > 16383U) {
         return TRIO_ERROR_RANGE;
     }
-    if (capacity < 12u) {
+    if (capacity < 12U) {
         return TRIO_ERROR_CAPACITY;
     }
     trio_put_u14_groups_(payload, message->number);
-    trio_put_u64_groups_(payload + 2, (uint64_t)message->value);
+    trio_put_u64_groups_(&payload[2], (uint64_t)message->value);
     return (int)TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE;
 }
 
 static inline int trio_direct_variable_transfer_decode(
     trio_direct_variable_transfer_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 12u) {
+    if (size != 12U) {
         return TRIO_ERROR_LENGTH;
     }
     if (trio_misfit_u14_groups_(payload)) {
         return TRIO_ERROR_RANGE;
     }
     message->number = trio_get_u14_groups_(payload);
-    if (trio_misfit_u64_groups_(payload + 2)) {
+    if (trio_misfit_u64_groups_(&payload[2])) {
         return TRIO_ERROR_RANGE;
     }
-    message->value = (int64_t)trio_get_u64_groups_(payload + 2);
+    message->value = (int64_t)trio_get_u64_groups_(&payload[2]);
     return TRIO_OK;
 }
 
 static inline int trio_direct_variable_transfer_to_frame(
     const trio_direct_variable_transfer_t *message, uint8_t address, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE;
 
-    if (!(address >= 1u && address <= 15u)) {
-        return TRIO_ERROR_RANGE;
+    if (capacity >= TRIO_DIRECT_VARIABLE_TRANSFER_MAX_FRAME_SIZE) {
+        size = trio_direct_variable_transfer_encode(message,
+            trio_place_(wire, capacity, TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE),
+            TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE);
     }
-    if (capacity < TRIO_DIRECT_VARIABLE_TRANSFER_MAX_FRAME_SIZE) {
-        return TRIO_ERROR_CAPACITY;
-    }
-    size = trio_direct_variable_transfer_encode(message,
-        trio_place_(wire, capacity, TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE), TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE);
-    return (size < 0) ? size : trio_seal_(TRIO_DIRECT_VARIABLE_TRANSFER_ID, address, (size_t)size, wire, capacity,
-        true);
+    return trio_seal_1_to_15_(TRIO_DIRECT_VARIABLE_TRANSFER_ID, address, wire, capacity, size, true);
 }
 
 #if TRIO_ENABLE_FLOAT
 static inline double trio_direct_variable_transfer_value_physical(int64_t raw)
 {
-    const double scaled = (double)raw * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR +
+    const double scaled = ((double)raw * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR) +
         (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
     return scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR;
 }
 
 static inline int trio_direct_variable_transfer_value_raw(double physical, int64_t *raw)
 {
-    const double scaled = physical * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR -
+    const double scaled = (physical * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR) -
         (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
     const double steps = scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR;
-    return trio_nearest_int64_(steps, INT64_MIN, 9223372036854775807ll, raw);
+    return trio_nearest_int64_(steps, INT64_MIN, 9223372036854775807LL, raw);
 }
 #endif
 
@@ -757,23 +786,23 @@ static inline int trio_direct_variable_transfer_value_raw(double physical, int64
  * Payload, 1 byte:
  *      0  u7  offset
  */
-#define TRIO_KEYPAD_OFFSET_MIN_SIZE 1u
-#define TRIO_KEYPAD_OFFSET_MAX_SIZE 1u
-#define TRIO_KEYPAD_OFFSET_MAX_FRAME_SIZE 3u
-#define TRIO_KEYPAD_OFFSET_MAX_WIRE_SIZE 3u
+#define TRIO_KEYPAD_OFFSET_MIN_SIZE 1U
+#define TRIO_KEYPAD_OFFSET_MAX_SIZE 1U
+#define TRIO_KEYPAD_OFFSET_MAX_FRAME_SIZE 3U
+#define TRIO_KEYPAD_OFFSET_MAX_WIRE_SIZE 3U
 
 typedef struct trio_keypad_offset {
     uint8_t offset; /* Nodes along the ring from the keypad to the receiver of its keys; 1..15 */
 } trio_keypad_offset_t;
 
-#define TRIO_KEYPAD_OFFSET_INIT { 1u }
+#define TRIO_KEYPAD_OFFSET_INIT { 1U }
 
 static inline int trio_keypad_offset_encode(const trio_keypad_offset_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->offset < 1u) || (message->offset > 15u)) {
+    if ((message->offset < 1U) || (message->offset > 15U)) {
         return TRIO_ERROR_RANGE;
     }
-    if (capacity < 1u) {
+    if (capacity < 1U) {
         return TRIO_ERROR_CAPACITY;
     }
     payload[0] = message->offset;
@@ -782,14 +811,14 @@ static inline int trio_keypad_offset_encode(const trio_keypad_offset_t *message,
 
 static inline int trio_keypad_offset_decode(trio_keypad_offset_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 1u) {
+    if (size != 1U) {
         return TRIO_ERROR_LENGTH;
     }
-    if ((payload[0] & 0x80u) != 0u) {
+    if ((payload[0] & 0x80U) != 0U) {
         return TRIO_ERROR_RANGE;
     }
     message->offset = payload[0];
-    if ((message->offset < 1u) || (message->offset > 15u)) {
+    if ((message->offset < 1U) || (message->offset > 15U)) {
         return TRIO_ERROR_RANGE;
     }
     return TRIO_OK;
@@ -798,41 +827,37 @@ static inline int trio_keypad_offset_decode(trio_keypad_offset_t *message, const
 static inline int trio_keypad_offset_to_frame(
     const trio_keypad_offset_t *message, uint8_t address, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)TRIO_KEYPAD_OFFSET_MAX_SIZE;
 
-    if (!(address >= 1u && address <= 15u)) {
-        return TRIO_ERROR_RANGE;
+    if (capacity >= TRIO_KEYPAD_OFFSET_MAX_FRAME_SIZE) {
+        size = trio_keypad_offset_encode(message, trio_place_(wire, capacity, TRIO_KEYPAD_OFFSET_MAX_SIZE),
+            TRIO_KEYPAD_OFFSET_MAX_SIZE);
     }
-    if (capacity < TRIO_KEYPAD_OFFSET_MAX_FRAME_SIZE) {
-        return TRIO_ERROR_CAPACITY;
-    }
-    size = trio_keypad_offset_encode(message, trio_place_(wire, capacity, TRIO_KEYPAD_OFFSET_MAX_SIZE),
-        TRIO_KEYPAD_OFFSET_MAX_SIZE);
-    return (size < 0) ? size : trio_seal_(TRIO_KEYPAD_OFFSET_ID, address, (size_t)size, wire, capacity, false);
+    return trio_seal_1_to_15_(TRIO_KEYPAD_OFFSET_ID, address, wire, capacity, size, false);
 }
 
 /* ---- keypad_mode, id 0x04 (section Message types): Choose what a keypad sends for a key.
  * Payload, 1 byte:
  *      0  u7  mode
  */
-#define TRIO_KEYPAD_MODE_MESSAGE_MIN_SIZE 1u
-#define TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE 1u
-#define TRIO_KEYPAD_MODE_MESSAGE_MAX_FRAME_SIZE 3u
-#define TRIO_KEYPAD_MODE_MESSAGE_MAX_WIRE_SIZE 3u
+#define TRIO_KEYPAD_MODE_MESSAGE_MIN_SIZE 1U
+#define TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE 1U
+#define TRIO_KEYPAD_MODE_MESSAGE_MAX_FRAME_SIZE 3U
+#define TRIO_KEYPAD_MODE_MESSAGE_MAX_WIRE_SIZE 3U
 
 typedef struct trio_keypad_mode_message {
     uint8_t mode; /* Key down alone or key down and up; enum keypad_mode */
 } trio_keypad_mode_message_t;
 
-#define TRIO_KEYPAD_MODE_MESSAGE_INIT { 0u }
+#define TRIO_KEYPAD_MODE_MESSAGE_INIT { 0U }
 
 static inline int trio_keypad_mode_message_encode(
     const trio_keypad_mode_message_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->mode > 127u) {
+    if (message->mode > 127U) {
         return TRIO_ERROR_RANGE;
     }
-    if (capacity < 1u) {
+    if (capacity < 1U) {
         return TRIO_ERROR_CAPACITY;
     }
     payload[0] = message->mode;
@@ -842,10 +867,10 @@ static inline int trio_keypad_mode_message_encode(
 static inline int trio_keypad_mode_message_decode(
     trio_keypad_mode_message_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 1u) {
+    if (size != 1U) {
         return TRIO_ERROR_LENGTH;
     }
-    if ((payload[0] & 0x80u) != 0u) {
+    if ((payload[0] & 0x80U) != 0U) {
         return TRIO_ERROR_RANGE;
     }
     message->mode = payload[0];
@@ -855,17 +880,13 @@ static inline int trio_keypad_mode_message_decode(
 static inline int trio_keypad_mode_message_to_frame(
     const trio_keypad_mode_message_t *message, uint8_t address, uint8_t *wire, size_t capacity)
 {
-    int size;
+    int size = (int)TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE;
 
-    if (!(address >= 1u && address <= 15u)) {
-        return TRIO_ERROR_RANGE;
+    if (capacity >= TRIO_KEYPAD_MODE_MESSAGE_MAX_FRAME_SIZE) {
+        size = trio_keypad_mode_message_encode(message, trio_place_(wire, capacity, TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE),
+            TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE);
     }
-    if (capacity < TRIO_KEYPAD_MODE_MESSAGE_MAX_FRAME_SIZE) {
-        return TRIO_ERROR_CAPACITY;
-    }
-    size = trio_keypad_mode_message_encode(message, trio_place_(wire, capacity, TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE),
-        TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE);
-    return (size < 0) ? size : trio_seal_(TRIO_KEYPAD_MODE_MESSAGE_ID, address, (size_t)size, wire, capacity, false);
+    return trio_seal_1_to_15_(TRIO_KEYPAD_MODE_MESSAGE_ID, address, wire, capacity, size, false);
 }
 
 /* What a message carries is right: id, address, size, ranges. */
@@ -878,32 +899,32 @@ static inline int trio_message_check(const trio_frame_t *frame)
     case TRIO_CHARACTER_TRANSFER_ID: {
         trio_character_transfer_t message;
         status = trio_character_transfer_decode(&message, frame->payload, frame->size);
-        allowed = frame->address >= 1u && frame->address <= 15u;
+        allowed = (frame->address >= 1U) && (frame->address <= 15U);
         break;
     }
     case TRIO_DIRECT_VARIABLE_TRANSFER_ID: {
         trio_direct_variable_transfer_t message;
         status = trio_direct_variable_transfer_decode(&message, frame->payload, frame->size);
-        allowed = frame->address >= 1u && frame->address <= 15u;
+        allowed = (frame->address >= 1U) && (frame->address <= 15U);
         break;
     }
     case TRIO_KEYPAD_OFFSET_ID: {
         trio_keypad_offset_t message;
         status = trio_keypad_offset_decode(&message, frame->payload, frame->size);
-        allowed = frame->address >= 1u && frame->address <= 15u;
+        allowed = (frame->address >= 1U) && (frame->address <= 15U);
         break;
     }
     case TRIO_KEYPAD_MODE_MESSAGE_ID: {
         trio_keypad_mode_message_t message;
         status = trio_keypad_mode_message_decode(&message, frame->payload, frame->size);
-        allowed = frame->address >= 1u && frame->address <= 15u;
+        allowed = (frame->address >= 1U) && (frame->address <= 15U);
         break;
     }
     default:
         status = TRIO_ERROR_UNKNOWN;
         break;
     }
-    return (status == TRIO_OK && !allowed) ? TRIO_ERROR_RANGE : status;
+    return ((status == TRIO_OK) && !allowed) ? TRIO_ERROR_RANGE : status;
 }
 
 /* ---- Receiver: one byte at a time, each in constant time, so that it can run in an interrupt ----
@@ -921,16 +942,16 @@ typedef struct trio_receiver {
     uint8_t buffer[258];
 } trio_receiver_t;
 
-#define TRIO_IDLE_ 0u
-#define TRIO_HUNTING_ 1u /* behind a fault: only a header is of interest */
-#define TRIO_INSIDE_ 2u
-#define TRIO_REFUSED_ 3u /* behind a header that is not valid, up to its end */
+#define TRIO_IDLE_ 0U
+#define TRIO_HUNTING_ 1U /* behind a fault: only a header is of interest */
+#define TRIO_INSIDE_ 2U
+#define TRIO_REFUSED_ 3U /* behind a header that is not valid, up to its end */
 
 static inline void trio_receiver_init(trio_receiver_t *receiver)
 {
     receiver->state = TRIO_IDLE_;
-    receiver->header = 0u;
-    receiver->count = 0u;
+    receiver->header = 0U;
+    receiver->count = 0U;
 }
 
 /* The frame that trio_receive has just announced. */
@@ -938,9 +959,9 @@ static inline trio_frame_t trio_receiver_frame(const trio_receiver_t *receiver)
 {
     trio_frame_t frame;
     const uint8_t byte = receiver->header;
-    frame.id = (uint8_t)(byte & 0x07u);
-    frame.address = (uint8_t)(((unsigned)byte >> 3) & 0x0Fu);
-    frame.size = receiver->checked ? receiver->count - 2u : receiver->count;
+    frame.id = (uint8_t)(byte & 0x07U);
+    frame.address = (uint8_t)(((unsigned)byte >> 3) & 0x0FU);
+    frame.size = receiver->checked ? (receiver->count - 2U) : receiver->count;
     frame.payload = receiver->buffer;
     return frame;
 }
@@ -950,13 +971,17 @@ static inline void trio_receiver_begin_(trio_receiver_t *receiver, uint8_t byte)
     size_t least;
     size_t most;
     bool checked;
-    const bool known = trio_shape_((uint8_t)(byte & 0x07u), &least, &most, &checked) &&
-        (uint8_t)(((unsigned)byte >> 3) & 0x0Fu) != 0u;
+    const bool known = trio_shape_((uint8_t)(byte & 0x07U), &least, &most, &checked) &&
+        ((uint8_t)(((unsigned)byte >> 3) & 0x0FU) != 0U);
     receiver->state = known ? TRIO_INSIDE_ : TRIO_REFUSED_;
     receiver->header = byte;
-    receiver->count = 0u;
-    receiver->least = (uint16_t)(checked ? least + 2u : least);
-    receiver->most = (uint16_t)(checked ? most + 2u : most);
+    receiver->count = 0U;
+    if (checked) {
+        least += 2U;
+        most += 2U;
+    }
+    receiver->least = (uint16_t)least;
+    receiver->most = (uint16_t)most;
     receiver->checked = checked;
     receiver->check = trio_check_start();
 }
@@ -964,18 +989,18 @@ static inline void trio_receiver_begin_(trio_receiver_t *receiver, uint8_t byte)
 static inline trio_event_t trio_receiver_end_(trio_receiver_t *receiver, uint8_t byte)
 {
     const uint8_t state = receiver->state;
-    receiver->state = (state == TRIO_IDLE_ || state == TRIO_HUNTING_) ? TRIO_HUNTING_ : TRIO_IDLE_;
+    receiver->state = ((state == TRIO_IDLE_) || (state == TRIO_HUNTING_)) ? TRIO_HUNTING_ : TRIO_IDLE_;
     if (state == TRIO_HUNTING_) {
         return TRIO_EVENT_NONE;
     }
-    if (state != TRIO_INSIDE_ || ((byte ^ receiver->header) & 0x78u) != 0u || receiver->count < receiver->least ||
-        receiver->count > receiver->most) {
+    if ((state != TRIO_INSIDE_) || (((byte ^ receiver->header) & 0x78U) != 0U) || (receiver->count < receiver->least) ||
+        (receiver->count > receiver->most)) {
         return TRIO_EVENT_FRAMING;
     }
     if (receiver->checked) {
-        const uint8_t *const check = receiver->buffer + (receiver->count - 2u);
+        const uint8_t *const check = &receiver->buffer[receiver->count - 2U];
         const uint16_t value = trio_check_finish(receiver->check);
-        if ((check[0] != (uint8_t)((value) & 0x7Fu)) || (check[1] != (uint8_t)((value >> 8) & 0x7Fu))) {
+        if ((check[0] != (uint8_t)((value) & 0x7FU)) || (check[1] != (uint8_t)((value >> 8) & 0x7FU))) {
             return TRIO_EVENT_CRC;
         }
     }
@@ -985,12 +1010,12 @@ static inline trio_event_t trio_receiver_end_(trio_receiver_t *receiver, uint8_t
 /* Takes the next byte; tells what it completed. */
 static inline trio_event_t trio_receive(trio_receiver_t *receiver, uint8_t byte)
 {
-    if ((byte & 0x80u) != 0u) {
+    if ((byte & 0x80U) != 0U) {
         trio_event_t event = TRIO_EVENT_NONE;
-        if ((uint8_t)(byte & 0x07u) == 0x00u) {
+        if ((uint8_t)(byte & 0x07U) == 0x00U) {
             return trio_receiver_end_(receiver, byte);
         }
-        if (receiver->state == TRIO_INSIDE_ || receiver->state == TRIO_REFUSED_) {
+        if ((receiver->state == TRIO_INSIDE_) || (receiver->state == TRIO_REFUSED_)) {
             event = TRIO_EVENT_FRAMING;
         }
         trio_receiver_begin_(receiver, byte);
@@ -999,13 +1024,13 @@ static inline trio_event_t trio_receive(trio_receiver_t *receiver, uint8_t byte)
     if (receiver->state == TRIO_HUNTING_) {
         return TRIO_EVENT_NONE;
     }
-    if (receiver->state == TRIO_IDLE_ || receiver->count == 258u) {
+    if ((receiver->state == TRIO_IDLE_) || (receiver->count == 258U)) {
         receiver->state = TRIO_HUNTING_;
         return TRIO_EVENT_FRAMING;
     }
     receiver->buffer[receiver->count] = byte;
-    if (receiver->checked && receiver->count >= 2u) {
-        receiver->check = trio_check_update(receiver->check, receiver->buffer[receiver->count - 2u]);
+    if (receiver->checked && (receiver->count >= 2U)) {
+        receiver->check = trio_check_update(receiver->check, receiver->buffer[receiver->count - 2U]);
     }
     ++receiver->count;
     return TRIO_EVENT_NONE;
@@ -1034,10 +1059,10 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
     case TRIO_CHARACTER_TRANSFER_ID: {
         trio_character_transfer_t message;
         status = trio_character_transfer_decode(&message, frame->payload, frame->size);
-        if (status == TRIO_OK && !(frame->address >= 1u && frame->address <= 15u)) {
+        if ((status == TRIO_OK) && !((frame->address >= 1U) && (frame->address <= 15U))) {
             status = TRIO_ERROR_RANGE;
         }
-        if (status == TRIO_OK && listener->character_transfer != NULL) {
+        if ((status == TRIO_OK) && (listener->character_transfer != NULL)) {
             listener->character_transfer(listener, frame->address, &message);
         }
         break;
@@ -1045,10 +1070,10 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
     case TRIO_DIRECT_VARIABLE_TRANSFER_ID: {
         trio_direct_variable_transfer_t message;
         status = trio_direct_variable_transfer_decode(&message, frame->payload, frame->size);
-        if (status == TRIO_OK && !(frame->address >= 1u && frame->address <= 15u)) {
+        if ((status == TRIO_OK) && !((frame->address >= 1U) && (frame->address <= 15U))) {
             status = TRIO_ERROR_RANGE;
         }
-        if (status == TRIO_OK && listener->direct_variable_transfer != NULL) {
+        if ((status == TRIO_OK) && (listener->direct_variable_transfer != NULL)) {
             listener->direct_variable_transfer(listener, frame->address, &message);
         }
         break;
@@ -1056,10 +1081,10 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
     case TRIO_KEYPAD_OFFSET_ID: {
         trio_keypad_offset_t message;
         status = trio_keypad_offset_decode(&message, frame->payload, frame->size);
-        if (status == TRIO_OK && !(frame->address >= 1u && frame->address <= 15u)) {
+        if ((status == TRIO_OK) && !((frame->address >= 1U) && (frame->address <= 15U))) {
             status = TRIO_ERROR_RANGE;
         }
-        if (status == TRIO_OK && listener->keypad_offset != NULL) {
+        if ((status == TRIO_OK) && (listener->keypad_offset != NULL)) {
             listener->keypad_offset(listener, frame->address, &message);
         }
         break;
@@ -1067,10 +1092,10 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
     case TRIO_KEYPAD_MODE_MESSAGE_ID: {
         trio_keypad_mode_message_t message;
         status = trio_keypad_mode_message_decode(&message, frame->payload, frame->size);
-        if (status == TRIO_OK && !(frame->address >= 1u && frame->address <= 15u)) {
+        if ((status == TRIO_OK) && !((frame->address >= 1U) && (frame->address <= 15U))) {
             status = TRIO_ERROR_RANGE;
         }
-        if (status == TRIO_OK && listener->keypad_mode_message != NULL) {
+        if ((status == TRIO_OK) && (listener->keypad_mode_message != NULL)) {
             listener->keypad_mode_message(listener, frame->address, &message);
         }
         break;

@@ -34,15 +34,15 @@ MISTAKES = {
     ),
     "a range": Mistake(
         "qlink",
-        "(message->node_number > 16u)",
-        "(message->node_number > 17u)",
+        "(message->node_number > 16U)",
+        "(message->node_number > 17U)",
         SETUP,
         {"decode", "receive", "ask", "refuse"},
     ),
     "an address": Mistake(
         "trio",
-        "if (!(address >= 1u && address <= 15u)) {",
-        "if (!(address >= 1u && address <= 16u)) {",
+        "((address >= 1U) && (address <= 15U)) ? trio_seal_(",
+        "((address >= 1U) && (address <= 16U)) ? trio_seal_(",
         {"character_transfer", "direct_variable_transfer", "keypad_offset", "keypad_mode"},
         {"refuse"},
     ),
@@ -58,15 +58,15 @@ MISTAKES = {
     ),
     "the end of another": Mistake(
         "trio",
-        "((byte ^ receiver->header) & 0x78u) != 0u",
-        "((byte ^ receiver->header) & 0x70u) != 0u",
+        "((byte ^ receiver->header) & 0x78U) != 0U",
+        "((byte ^ receiver->header) & 0x70U) != 0U",
         {"character_transfer", "direct_variable_transfer", "keypad_offset", "keypad_mode"},
         {"receive"},
     ),
     "a shift": Mistake(
         "trio",
-        "at[1] = (uint8_t)((value >> 7) & 0x7Fu);",
-        "at[1] = (uint8_t)((value >> 8) & 0x7Fu);",
+        "at[1] = (uint8_t)((value >> 7) & 0x7FU);",
+        "at[1] = (uint8_t)((value >> 8) & 0x7FU);",
         {"direct_variable_transfer"},
         {"encode"},
     ),
@@ -97,8 +97,8 @@ def test_another_polynomial_is_found_first(
     lines = kit("trio").with_name("trio.h").read_text().splitlines()
     chosen = next(line.split()[2] for line in lines if line.startswith("#define TRIO_CRC TRIO_CRC_"))
     (right,) = (line for line in lines if line.startswith(f"#define {chosen} "))
-    assert "(0x1021u" in right
-    mistake = Mistake("trio", right, right.replace("(0x1021u", "(0x1023u"), set(), set())
+    assert "(0x1021U" in right
+    mistake = Mistake("trio", right, right.replace("(0x1021U", "(0x1023U"), set(), set())
     report = run_with(mistake, kit, tmp_path, require_tool("clang", package="clang"))
     assert report.status == 1
     assert report.failed[0].startswith("check value ")

@@ -42,29 +42,29 @@ def _reserved_bits(scalar: Scalar, value: str) -> list[str]:
     if not isinstance(flags, Flags) or not flags.reserved_zero:
         return []
     reserved = ((1 << scalar.bits) - 1) & ~flags.mask
-    return [f"({value} & {unsigned(reserved, scalar.bits, hexadecimal=True)}) != 0u"] if reserved else []
+    return [f"({value} & {unsigned(reserved, scalar.bits, hexadecimal=True)}) != 0U"] if reserved else []
 
 
 def as_unsigned(scalar: Scalar, value: str) -> str:
     """The expression of a struct member for writing it: its bits in an unsigned type."""
     if scalar.meaning == "bool":
-        return f"({unsigned_type(scalar.bits)})({value} ? 1u : 0u)"
+        return f"({unsigned_type(scalar.bits)})({value} ? 1U : 0U)"
     if scalar.signed or scalar.size == 1:
         return f"({unsigned_type(scalar.bits)}){value}" if scalar.signed else value
     return value
 
 
-def from_unsigned(scalar: Scalar, raw: str) -> str:
+def from_unsigned(scalar: Scalar, raw: str, prefix: str) -> str:
     """The expression that turns bits which were read into the struct member."""
     if scalar.meaning == "bool":
-        return f"{raw} != 0u"
+        return f"{raw} != 0U"
     if not scalar.signed:
         return raw
     kind = f"int{storage(scalar.bits)}_t"
     if scalar.bits == storage(scalar.bits):
         return f"({kind}){raw}"
     sign = unsigned(1 << (scalar.bits - 1), scalar.bits, hexadecimal=True)
-    return f"({kind})(({raw} ^ {sign}) - {sign})"
+    return f"({kind}){prefix}_extend_{storage(scalar.bits)}_({raw}, {sign})"
 
 
 def constant_bits(scalar: Scalar) -> str:

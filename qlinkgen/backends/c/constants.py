@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from qlinkgen.backends.c.describe import wrapped
-from qlinkgen.backends.c.names import Names, integer_type, literal, unsigned
+from qlinkgen.backends.c.names import Names, bracketed, integer_type, literal, unsigned
 from qlinkgen.model import sizes
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
@@ -17,20 +17,20 @@ def limits(protocol: Protocol, kept: tuple[Message, ...]) -> list[tuple[str, str
     bus, frame = protocol.bus, protocol.frame
     longest = max((sizes.max_frame_size(frame, message) for message in protocol.messages), default=0)
     values = [
-        ("MAX_PAYLOAD_SIZE", f"{sizes.max_payload(protocol)}u"),
+        ("MAX_PAYLOAD_SIZE", f"{sizes.max_payload(protocol)}U"),
         (
             "MAX_FRAME_SIZE",
-            f"{max(longest, sizes.frame_size(frame, protocol.messages[0], sizes.max_payload(protocol)))}u",
+            f"{max(longest, sizes.frame_size(frame, protocol.messages[0], sizes.max_payload(protocol)))}U",
         ),
-        ("MAX_WIRE_SIZE", f"{max((sizes.max_wire_size(frame, m) for m in kept), default=0)}u"),
+        ("MAX_WIRE_SIZE", f"{max((sizes.max_wire_size(frame, m) for m in kept), default=0)}U"),
     ]
     if bus.nodes:
-        values += [("FIRST_NODE", f"{bus.nodes[0]}u"), ("LAST_NODE", f"{bus.nodes[1]}u")]
+        values += [("FIRST_NODE", f"{bus.nodes[0]}U"), ("LAST_NODE", f"{bus.nodes[1]}U")]
     if bus.broadcast is not None:
-        values.append(("BROADCAST", f"{bus.broadcast}u"))
+        values.append(("BROADCAST", f"{bus.broadcast}U"))
     if bus.baud is not None:
-        values.append(("BAUD", f"{bus.baud}ul"))
-    return [*values, ("BITS_PER_BYTE", f"{bus.bits_per_byte}u")]
+        values.append(("BAUD", f"{bus.baud}UL"))
+    return [*values, ("BITS_PER_BYTE", f"{bus.bits_per_byte}U")]
 
 
 def enum_views(protocol: Protocol, names: Names) -> list[dict[str, Any]]:
@@ -68,4 +68,4 @@ def _view(each: Enum | Flags, names: Names) -> dict[str, Any]:
 def _number(member: Constant, each: Enum | Flags, *, signed: bool) -> str:
     if isinstance(each, Flags):
         return unsigned(1 << member.value, each.bits, hexadecimal=True)
-    return literal(member.value, each.bits, signed=signed)
+    return bracketed(literal(member.value, each.bits, signed=signed))

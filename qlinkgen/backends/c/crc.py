@@ -30,7 +30,7 @@ def _render_sum(algorithm: Sum, checksum: Checksum) -> dict[str, Any]:
         "name": algorithm.name,
         "width": algorithm.width,
         "type": unsigned_type(algorithm.width),
-        "start": "0u",
+        "start": "0U",
         "finished": f"({unsigned_type(algorithm.width)})~sum" if algorithm.complement else "sum",
         "choices": [],
         "selectable": False,
@@ -73,7 +73,7 @@ def _byte_steps(width: int) -> dict[str, str]:
         "top_byte": "crc" if width == 8 else f"(crc >> {width - 8})",
         "placed_byte": "byte" if width == 8 else f"({kind})(({kind})byte << {width - 8})",
         "mask_open": "(" if width == 24 else "",
-        "mask_close": ") & 0x00FFFFFFul" if width == 24 else "",
+        "mask_close": ") & 0x00FFFFFFUL" if width == 24 else "",
         "flash_read": {8: "pgm_read_byte", 16: "pgm_read_word"}.get(width, "pgm_read_dword"),
     }
 

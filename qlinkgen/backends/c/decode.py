@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from qlinkgen.backends.c import checks
-from qlinkgen.backends.c.encode import count_member
+from qlinkgen.backends.c.encode import Cursor, count_member, loop
 from qlinkgen.backends.c.layout import Layouts, pointer
-from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
+from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Array, Bits, Blob, Scalar
@@ -26,10 +26,8 @@ class Decoder:
     prefix: str
     layouts: Layouts
     lines: list[str] = field(default_factory=list)
-    _place: str = "payload"
-    _offset: int = 0
+    _cursor: Cursor = field(default_factory=Cursor)
     _counted: set[str] = field(default_factory=set)
-    _moved: bool = False
 
     def statements(self) -> list[str]:
         """Lines of the function's body, behind the declarations."""
@@ -37,13 +35,13 @@ class Decoder:
         for each in self.message.fields:
             self._read(each)
         if len(self.message.variable) > 1:
-            self._refuse(["rest != 0u"], "LENGTH")
+            self._refuse(["rest != 0U"], "LENGTH")
         return self.lines
 
     @property
-    def uses_pointer(self) -> bool:
-        """A running pointer is needed."""
-        return self._moved
+    def uses_place(self) -> bool:
+        """A field stands behind one of variable size."""
+        return self._cursor.moved
 
     @property
     def uses_rest(self) -> bool:
@@ -64,10 +62,11 @@ class Decoder:
     def _check_size(self) -> None:
         message = self.message
         if not message.variable:
-            self._refuse([f"size != {message.max_size}u"], "LENGTH")
+            self._refuse([f"size != {message.max_size}U"], "LENGTH")
             return
-        terms = [f"size < {message.min_size}u"] if message.min_size else []
-        self._refuse([*terms, f"size > {message.max_size}u"], "LENGTH")
+        known = 1 if message.empty_is_default else 0  # no bytes at all have been dealt with before
+        terms = [f"size < {message.min_size}U"] if message.min_size > known else []
+        self._refuse([*terms, f"size > {message.max_size}U"], "LENGTH")
         if self.uses_rest:
             self.lines.append(f"rest = {_less('size', message.min_size)};")
 
@@ -83,28 +82,28 @@ class Decoder:
     # Integers
 
     def _get(self, scalar: Scalar) -> str:
-        if misfit := self.layouts.misfit(scalar, self._place, self._offset):
+        if misfit := self.layouts.misfit(scalar, "payload", self._cursor.index()):
             self._refuse([misfit], "RANGE")
-        value = self.layouts.get(scalar, self._place, self._offset)
-        self._offset += scalar.size
+        value = self.layouts.get(scalar, "payload", self._cursor.index())
+        self._cursor.offset += scalar.size
         return value
 
     def _read_scalar(self, each: Field, scalar: Scalar) -> None:
         if scalar.reserved:
-            self._offset += scalar.size
+            self._cursor.offset += scalar.size
         elif scalar.counts:
             self._read_count(scalar)
         elif scalar.constant:
             self._refuse([f"{self._get(scalar)} != {checks.constant_bits(scalar)}"], "RANGE")
         elif scalar.meaning == "bool":
             value = self._get(scalar)
-            self._refuse([f"{value} > 1u"], "RANGE")
-            self.lines.append(f"message->{each.name} = {value} != 0u;")
+            self._refuse([f"{value} > 1U"], "RANGE")
+            self.lines.append(f"message->{each.name} = {value} != 0U;")
         else:
             self._assign(f"message->{each.name}", scalar, self._get(scalar))
 
     def _assign(self, target: str, scalar: Scalar, raw: str, indent: str = "") -> None:
-        self.lines.append(f"{indent}{target} = {checks.from_unsigned(scalar, raw)};")
+        self.lines.append(f"{indent}{target} = {checks.from_unsigned(scalar, raw, self.prefix)};")
         self._refuse(checks.refused_when_received(scalar, target), "RANGE", indent)
 
     def _read_count(self, scalar: Scalar) -> None:
@@ -115,7 +114,7 @@ class Decoder:
         if length.fixed:
             self._refuse([f"{value} != {unsigned(length.maximum * scale, scalar.bits)}"], "LENGTH")
         elif name in self._counted:
-            expected = f"{scale}u * {name}_count" if scale > 1 else f"{name}_count"
+            expected = f"({scale}U * {name}_count)" if scale > 1 else f"{name}_count"
             self._refuse([f"{value} != {expected}"], "LENGTH")
         else:
             self._bound_count(name, value, scalar, counted.type, scale)
@@ -123,14 +122,14 @@ class Decoder:
     def _bound_count(self, name: str, value: str, scalar: Scalar, kind: Array | Blob, scale: int) -> None:
         self._counted.add(name)
         if scale > 1:
-            self._refuse([f"{value} % {scale}u != 0u"], "LENGTH")
-        count, most = f"{value} / {scale}u" if scale > 1 else value, kind.length.maximum
-        terms = [f"{name}_count < {kind.length.minimum}u"] if kind.length.minimum else []
+            self._refuse([f"({value} % {scale}U) != 0U"], "LENGTH")
+        count, most = f"{value} / {scale}U" if scale > 1 else value, kind.length.maximum
+        terms = [f"{name}_count < {kind.length.minimum}U"] if kind.length.minimum else []
         if scalar.bits > 16:  # more than a size_t may hold
             self._refuse([f"{value} > {unsigned(most * scale, scalar.bits)}"], "LENGTH")
             count = f"(size_t)({count})"
         elif most * scale < scalar.natural_maximum:
-            terms.append(f"{name}_count > {most}u")
+            terms.append(f"{name}_count > {most}U")
         self.lines.append(f"{name}_count = {count};")
         self._refuse(terms, "LENGTH")
 
@@ -155,72 +154,75 @@ class Decoder:
 
     def _read_run(self, each: Field, kind: Array | Blob) -> None:
         if kind.length.fixed:
-            count = f"{kind.length.maximum}u"
+            count = f"{kind.length.maximum}U"
         else:
             self._take_share(each, kind)
             count = f"{each.name}_count"
             member = count_type(kind.length.maximum)
             self.lines.append(f"message->{count_member(each)} = ({member}){count};")
-        if kind.length.fixed and kind.item_size == 1 and isinstance(kind, Blob):
-            index = f"{self._offset}u + index" if self._offset else "index"
-            source = f"{self._place}[{index}]"
-            self.lines += _loop(count, [f"message->{each.name}[index] = {source};"])
-            self._offset += kind.length.maximum
+        if isinstance(kind, Blob):
+            self._read_blob(each, kind, count)
         else:
-            self._move_to_end()
             self._read_items(each, kind, count)
-        if isinstance(kind, Blob) and kind.text:
+        if kind.length.fixed:
+            self._cursor.offset += kind.length.maximum * kind.item_size
+        elif each is not self.message.fields[-1]:
+            step = kind.item_size
+            self.lines.append(self._cursor.pass_over(f"({step}U * {count})" if step > 1 else count))
+
+    def _read_blob(self, each: Field, kind: Blob, count: str) -> None:
+        place = pointer("payload", self._cursor.index())
+        self.lines.append(f"{self.prefix}_copy_(message->{each.name}, {place}, {count});")
+        if kind.text:
             self._refuse([f"!{self.prefix}_is_text_(message->{each.name}, {count})"], "RANGE")
 
-    def _read_items(self, each: Field, kind: Array | Blob, count: str) -> None:
+    def _read_items(self, each: Field, kind: Array, count: str) -> None:
         outer, self.lines = self.lines, []
-        if isinstance(kind, Blob):
-            self.lines.append(f"message->{each.name}[index] = at[0];")
-        else:
-            if misfit := self.layouts.misfit(kind.item, "at", 0):
-                self._refuse([misfit], "RANGE")
-            self._assign(f"message->{each.name}[index]", kind.item, self.layouts.get(kind.item, "at", 0))
-        self.lines.append(f"at += {kind.item_size};")
-        self.lines = outer + _loop(count, self.lines)
+        index = self._cursor.index("index" if kind.item_size == 1 else f"({kind.item_size}U * index)")
+        if misfit := self.layouts.misfit(kind.item, "payload", index):
+            self._refuse([misfit], "RANGE")
+        raw = self.layouts.get(kind.item, "payload", index)
+        self._assign(f"message->{each.name}[index]", kind.item, raw)
+        self.lines = outer + loop(count, self.lines)
 
     def _take_share(self, each: Field, kind: Array | Blob) -> None:
         """Find how many items there are, and take their bytes from the rest."""
         least, step = kind.length.minimum * kind.item_size, kind.item_size
         counted, alone = each.name in self._counted, len(self.message.variable) == 1
-        share = f"{step}u * {each.name}_count" if step > 1 else f"{each.name}_count"
+        share = f"({step}U * {each.name}_count)" if step > 1 else f"{each.name}_count"
         if alone:
             left = _less("size", self.message.min_size - least)
             if counted:
-                self._refuse([f"{share} != {left}"], "LENGTH")
+                self._refuse([f"{share} != {grouped(left)}"], "LENGTH")
             else:  # bounded by the size of the message
                 self._count_items(each, left, step)
             return
         if not counted:
             self._measure(each, kind)
         share = _less(share, least)
-        self._refuse([f"{share} > rest"], "LENGTH")
+        self._refuse([f"{grouped(share)} > rest"], "LENGTH")
         self.lines.append(f"rest -= {share};")
 
     def _count_items(self, each: Field, left: str, step: int) -> None:
         if step > 1:
-            left = f"({left})" if " " in left else left
-            self._refuse([f"{left} % {step}u != 0u"], "LENGTH")
-            left = f"{left} / {step}u"
+            left = grouped(left)
+            self._refuse([f"({left} % {step}U) != 0U"], "LENGTH")
+            left = f"{left} / {step}U"
         self.lines.append(f"{each.name}_count = {left};")
 
     def _measure(self, each: Field, kind: Array | Blob) -> None:
         later = self._later_shares(each)
         if later:
-            self._refuse([f"{' + '.join(later)} > rest"], "LENGTH")
-        left = f"(rest - ({' + '.join(later)}))" if later else "rest"
+            self._refuse([f"{grouped(' + '.join(later))} > rest"], "LENGTH")
+        left = f"(rest - {grouped(' + '.join(later))})" if later else "rest"
         if kind.item_size > 1:
-            self._refuse([f"{left} % {kind.item_size}u != 0u"], "LENGTH")
-            left = f"{left} / {kind.item_size}u"
+            self._refuse([f"({left} % {kind.item_size}U) != 0U"], "LENGTH")
+            left = f"({left} / {kind.item_size}U)"
         least = kind.length.minimum
         self.lines.append(
-            f"{each.name}_count = {left} + {least}u;" if least else f"{each.name}_count = {left};"
+            f"{each.name}_count = {left} + {least}U;" if least else f"{each.name}_count = {left};"
         )
-        self._refuse([f"{each.name}_count > {kind.length.maximum}u"], "LENGTH")
+        self._refuse([f"{each.name}_count > {kind.length.maximum}U"], "LENGTH")
 
     def _later_shares(self, each: Field) -> list[str]:
         behind = self.message.variable[self.message.variable.index(each) + 1 :]
@@ -231,30 +233,18 @@ class Decoder:
                 what = f"{self.message.name}: the count of {other.name} stands behind the open {each.name}"
                 raise GenerationError(f"{what}, so no decoder can find it; move it in front")
             least = other.type.length.minimum * other.type.item_size
-            share = f"{other.type.item_size}u * {other.name}_count"
-            shares.append(f"({share} - {least}u)" if least else share)
+            step = other.type.item_size
+            share = f"({step}U * {other.name}_count)" if step > 1 else f"{other.name}_count"
+            shares.append(f"({share} - {least}U)" if least else share)
         return shares
-
-    def _move_to_end(self) -> None:
-        if self._place == "payload":
-            self.lines.append(f"at = {pointer('payload', self._offset)};")
-            self._place = "at"
-        elif self._offset:
-            self.lines.append(f"at += {self._offset};")
-        self._offset = 0
-        self._moved = True
 
 
 def _less(value: str, number: int) -> str:
-    return f"{value} - {number}u" if number else value
-
-
-def _loop(count: str, body: list[str]) -> list[str]:
-    return [f"for (size_t index = 0; index < {count}; ++index) {{", *(f"    {line}" for line in body), "}"]
+    return f"{value} - {number}U" if number else value
 
 
 def _taken(shift: int, scalar: Scalar, bits: int) -> str:
     mask = unsigned((1 << scalar.bits) - 1, bits, hexadecimal=True)
     moved = f"(bits >> {shift})" if shift else "bits"
     taken = f"({moved} & {mask})"
-    return taken if scalar.meaning == "bool" or scalar.signed else f"({unsigned_type(scalar.bits)}){taken}"
+    return taken if scalar.meaning == "bool" else f"({unsigned_type(scalar.bits)}){taken}"

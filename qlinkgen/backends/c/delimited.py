@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.backends.c.layout import Layouts, pointer
+from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.frame import Checksum, DelimitedFrame, Part
@@ -141,9 +141,9 @@ class DelimitedWriter:
         offset = 0
         for part in self._head_parts():
             if part.role == role and part.scalar is not None:
-                return self._layouts.get(part.scalar, place, offset)
+                return self._layouts.get(part.scalar, place, str(offset))
             offset += part.size
-        return "0u"
+        return "0U"
 
     def runs(self, start: str, payload_end: str) -> list[Run]:
         """Covered bytes of the body as loops over an index; ``start`` is the index of the body."""
@@ -222,7 +222,7 @@ class DelimitedWriter:
         value = {"length": f"({width})({length})", "message": self.id_name, "address": self.address_name}[
             part.role
         ]
-        return [self._layouts.put(part.scalar, place, offset, value)]
+        return [self._layouts.put(part.scalar, place, str(offset), value)]
 
 
 def frame_names(protocol: Protocol) -> tuple[str, str]:
@@ -253,4 +253,4 @@ def _hex(byte: int) -> str:
 
 
 def _at(base: str, offset: int) -> str:
-    return f"{offset}u" if base == "0" else pointer(base, offset) + ("u" if offset else "")
+    return f"{offset}U" if base == "0" else f"{base} + {offset}U" if offset else base

@@ -61,6 +61,7 @@ def _public(view: dict[str, Any], writer: DelimitedWriter, protocol: Protocol) -
     return {
         "tailed": writer.stuffed_whole or view["stuffed_payload"],
         "encode_trailer": "",
+        "seal_checked": False,
         "decode_direction": f"{protocol.name}_direction_t direction, " if directed else "",
         "pass_decode_direction": "direction, " if directed else "",
         "check_name": "message_check"
@@ -122,7 +123,7 @@ def _length(frame: DelimitedFrame, writer: DelimitedWriter) -> dict[str, Any]:
     return {
         "length_bounds": bounds(value),
         "length_byte_bounds": bounds("byte") or "false",
-        "length_value": f"{value} - {bias}u" if bias else value,
+        "length_value": f"{value} - {bias}U" if bias else value,
     }
 
 
@@ -148,10 +149,10 @@ def _stuffing(frame: DelimitedFrame) -> dict[str, Any]:
         "insert": unsigned(frame.stuffing.insert, 8, hexadecimal=True),
         "mark": after[0],
         "pattern": len(after) > 1,
-        "due_when_sent": _due(after, "to[{}]"),
+        "due_when_sent": _due(after, "wire[to - {}U]"),
         "due_when_received": _due_body(after, "body", "at"),
-        "due_in_payload": _due_body(after, "payload", "index + 1u"),
-        "due_at_end": _due(after, "end[{}]", single="end[-1]"),
+        "due_in_payload": _due_body(after, "payload", "index + 1U"),
+        "due_at_end": _due(after, "wire[at - {}U]", single="wire[at - 1U]"),
         "due_in_sent": _due_body(after, "payload", "index").replace("payload[", "sent["),
     }
 
@@ -160,19 +161,19 @@ def _due(after: list[str], place: str, single: str = "byte") -> str:
     """A byte has to be inserted behind what was written last."""
     if len(after) == 1:
         return f"{single} == {after[0]}"
-    terms = [f"({place.format(index - len(after))} == {byte})" for index, byte in enumerate(after)]
-    return " && ".join([f"(since >= {len(after)}u)", *reversed(terms)])
+    terms = [f"({place.format(len(after) - index)} == {byte})" for index, byte in enumerate(after)]
+    return " && ".join([f"(since >= {len(after)}U)", *reversed(terms)])
 
 
 def _due_body(after: list[str], array: str, end: str) -> str:
     if len(after) == 1:
-        return f"{array}[{'index' if array == 'payload' else f'{end} - 1u'}] == {after[0]}"
+        return f"{array}[{'index' if array == 'payload' else f'{end} - 1U'}] == {after[0]}"
     terms = []
     for index, byte in enumerate(after):
         back = len(after) - index - (1 if array == "payload" else 0)
         name = "index" if array == "payload" else end
-        terms.append(f"({array}[{name}{f' - {back}u' if back else ''}] == {byte})")
-    return " && ".join([f"(since >= {len(after)}u)", *reversed(terms)])
+        terms.append(f"({array}[{name}{f' - {back}U' if back else ''}] == {byte})")
+    return " && ".join([f"(since >= {len(after)}U)", *reversed(terms)])
 
 
 def _directions(view: dict[str, Any], prefix: str) -> dict[str, Any]:
@@ -188,24 +189,25 @@ def _directions(view: dict[str, Any], prefix: str) -> dict[str, Any]:
 
 def _stuffed(writer: DelimitedWriter) -> dict[str, Any]:
     """Seal and scan where the finished frame is stuffed."""
-    behind = f"body + total - {writer.tail}"
+    trailer, check = writer.put_trailer("trailer"), writer.put_check("trailer", "value")
+    wrong, differs = writer.wrong_constants("end", header=False), writer.check_differs("end", "value")
+    start = f"(capacity - {writer.head + writer.tail}U - size)"
+    sent = writer.runs(start, f"(capacity - {writer.tail}U)")
     return {
         "covers_body": writer.covers_body,
         "check_from_end": writer.tail - writer.check_from_payload,
-        "put_header": writer.put_header("from", f"size + {writer.bias}u"),
-        "put_trailer": writer.put_trailer(f"(end - {writer.tail})"),
-        "put_check": writer.put_check(f"(end - {writer.tail})", "value"),
+        "put_header": writer.put_header("head", f"size + {writer.bias}U"),
+        "put_trailer": trailer,
+        "put_check": check,
+        "seal_trailer": bool(trailer or check),
         "update_before": writer.update_lead
-        + (
-            []
-            if writer.covers_body
-            else loops(writer.runs("from", f"end - {writer.tail}"), writer.prefix, pointer=True)
-        ),
-        "wrong_tail": writer.wrong_constants(f"({behind})", header=False),
-        "check_differs": writer.check_differs(f"({behind})", "value"),
+        + ([] if writer.covers_body else loops(sent, writer.prefix, array="wire")),
+        "wrong_tail": wrong,
+        "check_differs": differs,
+        "reads_tail": bool(wrong or differs),
         "update_received": []
         if writer.covers_body
-        else loops(writer.runs("0", f"payload + {writer.head}u"), writer.prefix, array="body"),
+        else loops(writer.runs("0", f"payload + {writer.head}U"), writer.prefix, array="body"),
     }
 
 
@@ -232,35 +234,30 @@ def _streamed(frame: DelimitedFrame, writer: DelimitedWriter) -> dict[str, Any]:
 def _sum(value: str, constant: int) -> str:
     if constant == 0:
         return value
-    return f"{value} + {constant}u" if constant > 0 else f"{value} - {-constant}u"
+    return f"({value} + {constant}U)" if constant > 0 else f"({value} - {-constant}U)"
 
 
 def _plain(writer: DelimitedWriter) -> dict[str, Any]:
     """Seal and scan where the frame lies on the wire as it is."""
     body = writer.lead
-    place = f"(wire + {body})" if body else "wire"
     return {
-        "put_header": writer.put_header(place, f"sent + {writer.bias}u"),
+        "put_header": writer.put_header("body" if body else "wire", f"sent + {writer.bias}U"),
         "put_trailer": writer.put_trailer("end"),
         "put_check": writer.put_check("end", "value"),
         "update_sent": writer.update_lead
-        + loops(writer.runs(str(body), f"{writer.lead + writer.head}u + sent"), writer.prefix, array="wire"),
+        + loops(writer.runs(str(body), f"{writer.lead + writer.head}U + sent"), writer.prefix, array="wire"),
         "update_received": writer.update_lead
-        + loops(writer.runs("0", f"payload + {writer.head}u"), writer.prefix, array="body"),
+        + loops(writer.runs("0", f"payload + {writer.head}U"), writer.prefix, array="body"),
         "wrong_tail": writer.wrong_constants("end", header=False),
         "check_differs": writer.check_differs("end", "value"),
     }
 
 
-def loops(runs: list[Run], prefix: str, *, array: str = "", pointer: bool = False) -> list[str]:
+def loops(runs: list[Run], prefix: str, *, array: str) -> list[str]:
     """Loops that take the covered bytes into the check value."""
     lines: list[str] = []
     for run in runs:
-        if pointer:
-            lines.append(f"for (const uint8_t *covered = {run.first}; covered != {run.end}; ++covered) {{")
-            lines.append(f"    value = {prefix}_check_update(value, *covered);")
-        else:
-            lines.append(f"for (size_t covered = {run.first}; covered < {run.end}; ++covered) {{")
-            lines.append(f"    value = {prefix}_check_update(value, {array}[covered]);")
+        lines.append(f"for (size_t covered = {run.first}; covered < ({run.end}); ++covered) {{")
+        lines.append(f"    value = {prefix}_check_update(value, {array}[covered]);")
         lines.append("}")
     return lines

@@ -89,7 +89,7 @@ def _slave(names: Names, section: FrameSection, command: Command) -> list[str]:
         "void board_start(void)",
         "{",
         f"    {p}_receiver_init(&receiver{_direction(names, section, 'REQUEST')});",
-        *([f"    slave.{address} = 1u;"] if address else []),
+        *([f"    slave.{address} = 1U;"] if address else []),
         f"    slave.{member_name(name)} = on_{name};",
         "}",
     ]

@@ -10,8 +10,8 @@ from qlinkgen.backends.c.names import Names, unsigned
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Array, Blob, Scalar
 
-#: The expression for an integer at an offset of an array.
-Get = Callable[[Scalar, str, int], str]
+#: The expression for an integer at an index of an array.
+Get = Callable[[Scalar, str, str], str]
 
 
 def extents(names: Names, messages: tuple[Message, ...], get: Get) -> list[dict[str, Any]]:
@@ -33,17 +33,21 @@ class _Extent:
     _counts: int = 0
 
     def statements(self) -> list[str]:
-        self.lines = [f"*size = {self.message.min_size}u;"]
+        self.lines = [f"*size = {self.message.min_size}U;"]
         fields = {each.name: each for each in self.message.fields}
+        counts = [each for each in self.message.fields if self._counted(each, fields)]
         offset = 0
         for each in self.message.fields:
             counted = self._counted(each, fields)
             if counted is not None and isinstance(each.type, Scalar):
-                self._count(each.type, counted, offset)
+                self._count(each.type, counted, offset, last=each is counts[-1])
             offset += each.min_size
         if not self._counts:
             return [*self.lines, f"return {self.upper}_OK;"]
-        return [*self.lines, f"return available < *size ? {self.upper}_ERROR_TRUNCATED : {self.upper}_OK;"]
+        enough = f"return (available < *size) ? {self.upper}_ERROR_TRUNCATED : {self.upper}_OK;"
+        if len(counts) == 1:
+            return [*self.lines, enough]
+        return ["{", "    size_t moved = 0U;", *(f"    {line}" for line in [*self.lines, enough]), "}"]
 
     @staticmethod
     def _counted(each: Field, fields: dict[str, Field]) -> Array | Blob | None:
@@ -53,14 +57,14 @@ class _Extent:
             return None
         return counted.type if counted.type.length.counted_by == each.name else None
 
-    def _count(self, scalar: Scalar, kind: Array | Blob, offset: int) -> None:
+    def _count(self, scalar: Scalar, kind: Array | Blob, offset: int, *, last: bool) -> None:
         moved, self._counts = bool(self._counts), self._counts + 1
-        end = f"moved + {offset + scalar.size}u" if moved else f"{offset + scalar.size}u"
+        end = f"(moved + {offset + scalar.size}U)" if moved else f"{offset + scalar.size}U"
         self._refuse(f"available < {end}", "TRUNCATED")
-        value = self.get(scalar, "(payload + moved)" if moved else "payload", offset)
+        value = self.get(scalar, "payload", f"moved + {offset}U" if moved else str(offset))
         self._bound(scalar, kind, value)
         extra = self._extra(scalar, kind, value)
-        self.lines += [f"moved += {extra};", f"*size += {extra};"]
+        self.lines += [f"*size += {extra};"] if last else [f"moved += {extra};", f"*size += {extra};"]
 
     def _bound(self, scalar: Scalar, kind: Array | Blob, value: str) -> None:
         scale = kind.item_size if scalar.counts_unit == "bytes" else 1
@@ -68,7 +72,7 @@ class _Extent:
         terms = (
             [f"({value} > {unsigned(most, max(scalar.bits, 16))})"] if most < scalar.natural_maximum else []
         )
-        terms += [f"({value} < {least}u)"] if least else []
+        terms += [f"({value} < {least}U)"] if least else []
         if terms:
             self._refuse(" || ".join(terms), "LENGTH")
 
@@ -77,8 +81,8 @@ class _Extent:
         """Bytes of the field beyond the fewest."""
         step = 1 if scalar.counts_unit == "bytes" else kind.item_size
         least = kind.length.minimum * kind.item_size
-        times = f"{step}u * (size_t){value}" if step > 1 else f"(size_t){value}"
-        return f"({times} - {least}u)" if least else f"({times})"
+        times = f"({step}U * (size_t){value})" if step > 1 else f"(size_t){value}"
+        return f"({times} - {least}U)" if least else times
 
     def _refuse(self, condition: str, status: str) -> None:
         self.lines += [f"if ({condition}) {{", f"    return {self.upper}_ERROR_{status};", "}"]

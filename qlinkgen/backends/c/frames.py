@@ -78,7 +78,7 @@ class FrameSection:
             if protocol.bus.broadcast is not None
             else "false",
             "slave_arguments": f"slave->{name}, " if name else self.view.get("slave_arguments", ""),
-            "unknown_answer": self.view.get("unknown_answer", "0u"),
+            "unknown_answer": self.view.get("unknown_answer", "0"),
             "listener": "listener" if ring else "master",
             "listener_title": "Listener" if ring else "Master",
             "listener_address": f", {self.view['address_type']} {name}" if name else "",
@@ -88,21 +88,31 @@ class FrameSection:
     def slave_entry(self, entry: dict[str, Any], upper: str) -> dict[str, Any]:
         """Conditions of one command of a slave."""
         has_address = bool(self.view["address"])
-        condition = ""
-        if has_address and entry["refuses_broadcast"]:
-            condition = "slave->broadcast ? 0u : "
-        elif has_address and entry["broadcast_only"]:
-            condition = "!slave->broadcast ? 0u : "
         target = "&request, " if entry["has_struct"] else ""
         call = f"{entry['function']}_decode({target}frame->payload, frame->size)"
-        wrong = f"{call} != {upper}_OK" if entry["has_bytes"] else "frame->size != 0u"
-        silent = " || slave->broadcast" if has_address and entry["silent_broadcast"] else ""
-        reject = (
-            f"{self.view['reject']}({entry['answer_constant']}_MIN_SIZE, wire, capacity)"
-            if self.view.get("reject")
-            else "0u"
-        )
-        return {"unsupported": reject, "condition": condition, "refused": wrong, "silent": silent}
+        reject = self.view.get("reject")
+        size = f"{entry['answer_constant']}_MIN_SIZE"
+        return {
+            "unsupported": f"{reject}({size}, wire, capacity)" if reject else "0",
+            "writes": bool(entry["answered"] or reject),
+            "own": has_address and entry["refuses_broadcast"],
+            "broadcast_only": has_address and entry["broadcast_only"],
+            "right": f"{call} == {upper}_OK" if entry["has_bytes"] else "frame->size == 0U",
+            "unless_silent": " && !slave->broadcast" if has_address and entry["silent_broadcast"] else "",
+        }
+
+    def slave_groups(self, entries: list[dict[str, Any]], prefix: str) -> list[dict[str, Any]]:
+        """Commands by whom they may go to; the last group passes on what it does not have."""
+        own = [entry for entry in entries if entry["own"]]
+        others = [entry for entry in entries if not entry["own"]]
+        unknown = self.view.get("unknown_answer", "0")
+        if not own:
+            return [{"name": "any", "text": "All requests.", "entries": entries, "otherwise": unknown}]
+        call = f"{prefix}_handle_own_(slave, frame, wire, capacity)"
+        first = {"name": "own", "text": "Requests that go to one node.", "entries": own, "otherwise": unknown}
+        rest = "Requests that all nodes may get; the others must not be broadcast."
+        second = {"name": "any", "text": rest, "entries": others}
+        return [first, {**second, "otherwise": f"slave->broadcast ? {unknown} : {call}"}]
 
 
 def frame_section(protocol: Protocol, layouts: Layouts) -> FrameSection:
@@ -113,7 +123,7 @@ def frame_section(protocol: Protocol, layouts: Layouts) -> FrameSection:
     check = crc.render(frame.checksum)
     if isinstance(frame, MarkedFrame):
         view = marked_view(protocol, frame)
-        return FrameSection(protocol, view, check, ("marked",), ("receiver_marked",))
+        return FrameSection(protocol, view, check, ("place", "marked", "seal"), ("receiver_marked",))
     view = packet_view(protocol, frame)
     return FrameSection(protocol, view, None, ("packet",), ("receiver_packet",), slave_only=True)
 
@@ -125,4 +135,4 @@ def _delimited(protocol: Protocol, frame: DelimitedFrame, layouts: Layouts) -> F
     check = crc.render(part.checksum if part else None)
     own = "frame_stuffed" if writer.stuffed_whole else "frame_plain"
     receiver = "receiver_streamed" if writer.streamed else "receiver_rescan"
-    return FrameSection(protocol, view, check, (own, "frame_public"), (receiver,))
+    return FrameSection(protocol, view, check, ("place", own, "seal", "frame_public"), (receiver,))

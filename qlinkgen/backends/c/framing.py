@@ -10,6 +10,7 @@ from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
 from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Array, Blob
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,17 +31,26 @@ class Address:
         return f"{self.name}, " if self.name else ""
 
 
+@dataclass(frozen=True, slots=True)
+class AddressGroup:
+    """Addresses that several messages have in common, as part of a name, as text and as a condition."""
+
+    name: str
+    text: str
+    condition: str
+
+
 def allowed(message: Message, value: str, bits: int) -> str:
     """A condition that holds where the message may carry the address, "" where it may carry any."""
     top, terms = (1 << bits) - 1, []
     for first, last in message.addresses:
-        low = [f"{value} >= {unsigned(first, bits)}"] if first else []
-        high = [f"{value} <= {unsigned(last, bits)}"] if last < top else []
+        bounds = [f"{value} >= {unsigned(first, bits)}"] if first else []
+        bounds += [f"{value} <= {unsigned(last, bits)}"] if last < top else []
         if first == last:
-            low, high = [f"{value} == {unsigned(first, bits)}"], []
-        if not low and not high:
+            bounds = [f"{value} == {unsigned(first, bits)}"]
+        if not bounds:
             return ""
-        terms.append(" && ".join(low + high))
+        terms.append(" && ".join(f"({bound})" for bound in bounds) if len(bounds) > 1 else bounds[0])
     return terms[0] if len(terms) == 1 else " || ".join(f"({term})" for term in terms)
 
 
@@ -51,61 +61,83 @@ def struct_parameter(names: Names, message: Message, *, const: bool) -> str:
     return f"{'const ' if const else ''}{names.function(message)}_t *message, "
 
 
+def address_group(message: Message, address: Address) -> AddressGroup | None:
+    """The set of addresses that a message may have, None where it may have any."""
+    condition = allowed(message, address.name, address.bits) if address.name and message.addresses else ""
+    if not condition:
+        return None
+    ranges = [(str(first), str(last)) for first, last in message.addresses]
+    name = "_".join(first if first == last else f"{first}_to_{last}" for first, last in ranges)
+    text = ", ".join(first if first == last else f"{first}..{last}" for first, last in ranges)
+    return AddressGroup(name, f"the {address.name} {text}", condition)
+
+
 def to_frame(protocol: Protocol, names: Names, address: Address, message: Message) -> dict[str, Any]:
     """The function that makes the whole frame of a message."""
     struct = struct_parameter(names, message, const=True)
-    lines: list[str] = []
-    condition = allowed(message, address.name, address.bits) if address.name and message.addresses else ""
-    if condition:
-        refused = f"!({condition})"
-        lines += [f"if ({refused}) {{", f"    return {names.upper}_ERROR_RANGE;", "}"]
     if isinstance(protocol.frame, PacketFrame):
         return _packet_to_frame(protocol.frame, names, message, struct)
-    id_constant = f"{names.constant(message)}_ID"
-    arguments = f"{id_constant}, {address.argument}"
-    trailer = (
-        ", true"
-        if isinstance(protocol.frame, MarkedFrame) and message.checksum and protocol.frame.checksum
-        else ""
-    )
-    if isinstance(protocol.frame, MarkedFrame) and protocol.frame.checksum and not trailer:
-        trailer = ", false"
-    if not message.fields:
-        lines.append(f"return {names.prefix}_seal_({arguments}0u, wire, capacity{trailer});")
-    else:
-        lines = _declared(names, message, bool(struct), lines)
-        seal = f"{names.prefix}_seal_({arguments}(size_t)size, wire, capacity{trailer})"
-        lines.append(f"return (size < 0) ? size : {seal};")
+    lines, size = _payload_lines(names, message, bool(struct)) if message.fields else ([], "0")
+    group = address_group(message, address)
+    seal = f"{names.prefix}_seal_{group.name}_" if group else f"{names.prefix}_seal_"
+    arguments = f"{names.constant(message)}_ID, {address.argument}wire, capacity, {size}"
+    lines.append(f"return {seal}({arguments}{_checked(protocol, message)});")
     return {"parameters": struct + address.parameter, "lines": lines}
 
 
-def _declared(names: Names, message: Message, has_struct: bool, lines: list[str]) -> list[str]:
-    p, call = names.prefix, "message, " if has_struct else ""
-    encode = f"{names.function(message)}_encode({call}{p}_place_(wire, capacity, payload_size), "
+def _checked(protocol: Protocol, message: Message) -> str:
+    """Whether a check value follows, where some messages have none."""
+    if not isinstance(protocol.frame, MarkedFrame) or not protocol.frame.checksum:
+        return ""
+    return ", true" if message.checksum else ", false"
+
+
+def _payload_lines(names: Names, message: Message, has_struct: bool) -> tuple[list[str], str]:
+    """Write the payload where there is room; what does not fit is refused when the frame is completed."""
+    p, call, constant = names.prefix, "message, " if has_struct else "", names.constant(message)
+    size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
+    lines = []
     if message.variable:
-        size = [f"const size_t payload_size = {size_terms(message)};"]
-        return [*size, "int size;", "", *lines, f"size = {encode}{p}_room_(capacity));"]
-    constant = names.constant(message)
-    encode = encode.replace("payload_size", f"{constant}_MAX_SIZE")
-    room = [f"if (capacity < {constant}_MAX_FRAME_SIZE) {{", f"    return {names.upper}_ERROR_CAPACITY;", "}"]
-    return ["int size;", "", *lines, *room, f"size = {encode}{constant}_MAX_SIZE);"]
+        lines.append(f"const size_t payload_size = {size_terms(message, 'message->')};")
+        size, fits = "payload_size", f"{p}_fits_(capacity, payload_size)"
+    start = f"(int){size}"
+    if message.variable and is_wide(message):
+        start = f"(payload_size > {constant}_MAX_SIZE) ? (int){names.upper}_ERROR_LENGTH : {start}"
+    encode = f"{names.function(message)}_encode({call}{p}_place_(wire, capacity, {size}), {size})"
+    lines += [f"int size = {start};", "", f"if ({fits}) {{", f"    size = {encode};", "}"]
+    return lines, "size"
+
+
+def is_wide(message: Message) -> bool:
+    """A count that is wrong can make a size which no int holds."""
+    return any(
+        isinstance(each.type, Array | Blob) and each.type.length.maximum > 0xFF for each in message.variable
+    )
 
 
 def _packet_to_frame(frame: PacketFrame, names: Names, message: Message, struct: str) -> dict[str, Any]:
-    p, has_sum = names.prefix, frame.checksum is not None
     call = "message, " if struct else ""
     if message.direction == "response":
-        encode = f"{names.function(message)}_encode({call}wire, capacity)" if message.fields else "0"
-        tail = f"{p}_close_(request_sum, (size_t)size, wire, capacity)" if has_sum else "size"
-        parameters = struct + ("uint16_t request_sum, " if has_sum else "")
-        lines = [f"const int size = {encode};", f"return (size < 0) ? size : {tail};"]
-        return {"parameters": parameters.replace("uint16_t", "{sum_type}"), "lines": lines}
-    lines = ["int size = 0;", "if (capacity == 0u) {", f"    return {names.upper}_ERROR_CAPACITY;", "}"]
+        return _packet_answer(frame, names, message, struct)
+    lines = ["int size;", ""] if message.fields else []
+    lines += ["if (capacity == 0U) {", f"    return {names.upper}_ERROR_CAPACITY;", "}"]
     lines.append(f"wire[0] = {names.constant(message)}_ID;")
     if message.fields:
-        lines.append(f"size = {names.function(message)}_encode({call}wire + 1, capacity - 1u);")
-    lines.append("return (size < 0) ? size : size + 1;")
+        lines.append(f"size = {names.function(message)}_encode({call}&wire[1], capacity - 1U);")
+    lines.append("return (size < 0) ? size : (size + 1);" if message.fields else "return 1;")
     return {"parameters": struct, "lines": lines}
+
+
+def _packet_answer(frame: PacketFrame, names: Names, message: Message, struct: str) -> dict[str, Any]:
+    """An answer is its payload, and a check value where there is one."""
+    has_sum, size = frame.checksum is not None, "(size_t)size" if message.fields else "0U"
+    whole = f"{names.prefix}_close_(request_sum, {size}, wire, capacity)" if has_sum else "size"
+    if message.fields:
+        encode = f"{names.function(message)}_encode({'message, ' if struct else ''}wire, capacity)"
+        lines = [f"const int size = {encode};", f"return (size < 0) ? size : {whole};"]
+    else:
+        lines = [f"return {whole};"] if has_sum else ["(void)wire;", "(void)capacity;", "return 0;"]
+    return {"parameters": struct + ("{sum_type} request_sum, " if has_sum else ""), "lines": lines}
 
 
 def checks(names: Names, address: Address, messages: tuple[Message, ...]) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from qlinkgen.backends.c.example import example_lines, option_lines
 from qlinkgen.backends.c.extents import extents
 from qlinkgen.backends.c.frames import FrameSection, frame_section
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.messages import MessageWriter, nearest_helpers
+from qlinkgen.backends.c.messages import MessageWriter, extended_widths, nearest_helpers
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.model import sizes
@@ -90,8 +90,18 @@ class Header:
         )
 
     def _frame_part(self, template: str) -> str:
-        groups = self._section.groups(self._names, self._received())
-        return self._place(template, f=self._section.view, crc=self._section.check, shapes=groups)
+        shapes = self._section.groups(self._names, self._received())
+        view = {
+            **self._section.view,
+            "address_groups": self._address_groups(),
+            "wide": any(map(framing.is_wide, self._kept)),
+        }
+        return self._place(template, f=view, crc=self._section.check, shapes=shapes)
+
+    def _address_groups(self) -> list[framing.AddressGroup]:
+        """Sets of addresses that the messages which are encoded may have."""
+        groups = (framing.address_group(m, self._address) for m in self._kept if self._encoded(m))
+        return list(dict.fromkeys(group for group in groups if group))
 
     def _check_value(self) -> str:
         check = self._section.check
@@ -159,7 +169,10 @@ class Header:
         view["example_command"] = snake(answered.name).upper() if answered else ""
         if self._section.slave_only:
             master = []
-        return self._place("dispatch", f=view, slave=slave, master=master, transactions=transactions)
+        groups = self._section.slave_groups(slave, self._names.prefix)
+        return self._place(
+            "dispatch", f=view, slave=slave, slave_groups=groups, master=master, transactions=transactions
+        )
 
     def _slave(self) -> list[dict[str, Any]]:
         entries = dispatch.slave_entries(self._names, self._kept)
@@ -177,6 +190,9 @@ class Header:
             "enums": enum_views(protocol, self._names),
             "helpers": self._layouts.helpers(),
             "has_text": any(isinstance(f.type, Blob) and f.type.text for m in self._kept for f in m.fields),
+            "has_bytes": any(isinstance(f.type, Blob) for m in self._kept for f in m.fields),
+            "has_table": bool(self._section.check and self._section.check["is_crc"]),
+            "extended": extended_widths(self._kept),
             "nearest": nearest_helpers(self._kept),
         }
 

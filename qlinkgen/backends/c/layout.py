@@ -27,28 +27,26 @@ class Layouts:
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
 
-    def put(self, scalar: Scalar, place: str, offset: int, value: str) -> str:
+    def put(self, scalar: Scalar, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
         if scalar.size == 1:
-            return f"{place}[{offset}] = {value};"
-        return f"{self._call('put', scalar)}({pointer(place, offset)}, {value});"
+            return f"{place}[{index}] = {value};"
+        return f"{self._call('put', scalar)}({pointer(place, index)}, {value});"
 
-    def get(self, scalar: Scalar, place: str, offset: int) -> str:
+    def get(self, scalar: Scalar, place: str, index: str) -> str:
         """An expression for the unsigned value that is there."""
         if scalar.size == 1:
-            return f"{place}[{offset}]"
-        return f"{self._call('get', scalar)}({pointer(place, offset)})"
+            return f"{place}[{index}]"
+        return f"{self._call('get', scalar)}({pointer(place, index)})"
 
-    def misfit(self, scalar: Scalar, place: str, offset: int) -> str | None:
+    def misfit(self, scalar: Scalar, place: str, index: str) -> str | None:
         """A condition that holds where bits of no chunk are set, None where there are no such bits."""
         if all(chunk.bits == 8 for chunk in scalar.chunks):
             return None
         if scalar.size == 1:
-            return (
-                f"({place}[{offset}] & {unsigned(scalar.chunks[0].mask ^ 0xFF, 8, hexadecimal=True)}) != 0u"
-            )
+            return f"({place}[{index}] & {unsigned(scalar.chunks[0].mask ^ 0xFF, 8, hexadecimal=True)}) != 0U"
         self._partial.add((scalar.bits, scalar.chunks))
-        return f"{self._call('misfit', scalar)}({pointer(place, offset)})"
+        return f"{self._call('misfit', scalar)}({pointer(place, index)})"
 
     def helpers(self) -> list[Helper]:
         """The functions of every layout in use."""
@@ -96,14 +94,14 @@ class Layouts:
         return [
             f"static inline bool {self.prefix}_misfit_{name}_(const uint8_t *at)",
             "{",
-            f"    return ({terms}) != 0u;",
+            f"    return ({terms}) != 0U;",
             "}",
         ]
 
 
-def pointer(place: str, offset: int) -> str:
+def pointer(place: str, index: str) -> str:
     """The address of a byte."""
-    return f"{place} + {offset}" if offset else place
+    return place if index == "0" else f"&{place}[{index}]"
 
 
 def _taken(chunk: Chunk) -> str:

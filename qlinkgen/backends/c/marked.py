@@ -23,6 +23,12 @@ def marked_view(protocol: Protocol, frame: MarkedFrame) -> dict[str, Any]:
         "address_type": "uint8_t",
         "id": "id",
         "id_type": "uint8_t",
+        "parameters": f"uint8_t id, uint8_t {frame.address_name}",
+        "arguments": f"id, {frame.address_name}",
+        "tailed": False,
+        "header": 1,
+        "overhead": 2,
+        "seal_checked": bool(check),
         "needs_direction": directed,
         "reports_runs": False,
         "needs_extent": False,
@@ -56,7 +62,13 @@ def _head(frame: MarkedFrame, message: str) -> str:
 
 
 def _placed(value: str, bits: Chunk) -> str:
-    return f"((unsigned){value} << {bits.shift})" if bits.shift else f"(unsigned){value}"
+    return (
+        ""
+        if value == "0x00U"
+        else f"((unsigned){value} << {bits.shift})"
+        if bits.shift
+        else f"(unsigned){value}"
+    )
 
 
 def _taken(value: str, bits: Chunk) -> str:
@@ -70,7 +82,7 @@ def _put_check(frame: MarkedFrame) -> list[str]:
     values = [f"(value >> {chunk.shift})" if chunk.shift else "value" for chunk in frame.checksum.chunks]
     masks = [_byte(chunk.mask) for chunk in frame.checksum.chunks]
     return [
-        f"wire[at + {index}u] = (uint8_t)({value} & {mask});"
+        f"wire[at + {index}U] = (uint8_t)({value} & {mask});"
         for index, (value, mask) in enumerate(zip(values, masks, strict=True))
     ]
 
@@ -80,8 +92,8 @@ def shapes(names: Names, messages: tuple[Message, ...], frame: MarkedFrame) -> l
     return [
         {
             "constant": names.constant(message),
-            "least": f"{0 if message.empty_is_default else message.min_size}u",
-            "most": f"{message.max_size}u",
+            "least": f"{0 if message.empty_is_default else message.min_size}U",
+            "most": f"{message.max_size}U",
             "checked": "true" if message.checksum and frame.checksum else "false",
         }
         for message in messages

@@ -10,11 +10,20 @@ from qlinkgen.backends.c.describe import field_rows, member_note, message_head
 from qlinkgen.backends.c.encode import Encoder, count_member, size_terms
 from qlinkgen.backends.c.framing import struct_parameter
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.names import Names, count_type, integer_type, scalar_literal, scalar_type, unsigned
+from qlinkgen.backends.c.names import (
+    Names,
+    bracketed,
+    count_type,
+    integer_type,
+    scalar_literal,
+    scalar_type,
+    storage,
+    unsigned,
+)
 from qlinkgen.model import sizes
-from qlinkgen.model.message import Message, Value
+from qlinkgen.model.message import Field, Message, Value
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.model.types import Array, Bits, Blob, Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,19 +81,39 @@ class MessageWriter:
     def _encode(self, message: Message) -> dict[str, Any]:
         encoder = Encoder(message, self._names.prefix, self._layouts)
         statements = encoder.statements()
-        return {"lines": statements, "pointer": encoder.uses_pointer, "variable": bool(message.variable)}
+        return {
+            "lines": statements,
+            "counts": encoder.counts,
+            "place": encoder.uses_place,
+            "variable": bool(message.variable),
+        }
 
     def _decode(self, message: Message) -> dict[str, Any]:
         decoder = Decoder(message, self._names.prefix, self._layouts)
         statements = decoder.statements()
         return {
             "lines": statements,
-            "pointer": decoder.uses_pointer,
+            "place": decoder.uses_place,
             "counters": decoder.counters,
             "rest": decoder.uses_rest,
             "empty_is_default": message.empty_is_default and message.min_size > 0,
+            "defaults": self._defaults(message),
             "reads": message.max_size > 0,
         }
+
+    def _defaults(self, message: Message) -> list[str]:
+        """Statements that set a message to its defaults; only a list of items is copied as a whole."""
+        lines = []
+        for value in message.values:
+            kind = value.type
+            if isinstance(kind, Scalar):
+                lines.append(f"message->{value.name} = {scalar_literal(kind, kind.default)};")
+            elif kind.length.fixed or kind.default:
+                kind_of_all, defaults = self._names.function(message), self._names.constant(message)
+                return [f"const {kind_of_all}_t defaults = {defaults}_INIT;", "*message = defaults;"]
+            else:
+                lines.append(f"message->{count_member(value.field)} = 0U;")
+        return lines
 
     def _scale(self, message: Message, value: Value) -> dict[str, Any] | None:
         scalar = value.type
@@ -108,7 +137,8 @@ class MessageWriter:
 def _whole(value: int) -> str:
     """An integer constant of the least type that holds it everywhere."""
     size = abs(value).bit_length()
-    return f"{value}{'' if size < 16 else 'l' if size < 32 else 'll' if size < 64 else 'ull'}"
+    suffix = "" if size < 16 else "L" if size < 32 else "LL" if size < 64 else "ULL"
+    return bracketed(f"{value}{suffix}")
 
 
 def _members(value: Value) -> list[Member]:
@@ -134,8 +164,9 @@ def _initialiser(value: Value) -> str:
         if isinstance(kind, Array)
         else _bytes(kind)
     )
-    content = f"{{{', '.join(items) or '0'}}}"
-    return content if kind.length.fixed else f"{len(items)}u, {content}"
+    zero = not any(kind.default)
+    content = "{0}" if zero else f"{{{', '.join(items)}}}"
+    return content if kind.length.fixed else f"{len(items)}U, {content}"
 
 
 def _bytes(kind: Blob) -> list[str]:
@@ -147,6 +178,25 @@ def _size_text(message: Message) -> str:
     return f"{most} byte{'s' if most > 1 else ''}" if least == most else f"{least}..{most} bytes"
 
 
+def extended_widths(messages: tuple[Message, ...]) -> list[int]:
+    """Widths of the C types of signed integers that the wire has fewer bits for."""
+    found = {
+        storage(scalar.bits)
+        for message in messages
+        for each in message.fields
+        for scalar in _scalars(each)
+        if scalar.signed and scalar.bits != storage(scalar.bits)
+    }
+    return sorted(found)
+
+
+def _scalars(each: Field) -> list[Scalar]:
+    kind = each.type
+    if isinstance(kind, Bits):
+        return [member.type for member in kind.members]
+    return [kind] if isinstance(kind, Scalar) else [kind.item] if isinstance(kind, Array) else []
+
+
 def nearest_helpers(messages: tuple[Message, ...]) -> list[dict[str, str]]:
     """The C types that physical values are rounded to."""
     types = {
@@ -155,4 +205,12 @@ def nearest_helpers(messages: tuple[Message, ...]) -> list[dict[str, str]]:
         for value in message.values
         if isinstance(value.type, Scalar) and value.type.scaling
     }
-    return [{"name": kind.removesuffix("_t"), "type": kind} for kind in types]
+    return [
+        {
+            "name": kind.removesuffix("_t"),
+            "type": kind,
+            "zero": "0U" if kind.startswith("u") else "0",
+            "one": "1U" if kind.startswith("u") else "1",
+        }
+        for kind in types
+    ]

@@ -38,7 +38,7 @@ def count_type(most: int) -> str:
 
 def unsigned(value: int, bits: int, *, hexadecimal: bool = False) -> str:
     """A constant of an unsigned type; int may have 16 bits, so the suffix follows the width."""
-    suffix = {8: "u", 16: "u", 32: "ul", 64: "ull"}[storage(bits)]
+    suffix = {8: "U", 16: "U", 32: "UL", 64: "ULL"}[storage(bits)]
     return (f"0x{value:0{storage(bits) // 4}X}" if hexadecimal else str(value)) + suffix
 
 
@@ -49,7 +49,7 @@ def literal(value: int, bits: int, *, signed: bool) -> str:
     width = storage(bits)
     if value == -(1 << (width - 1)):
         return f"INT{width}_MIN"
-    return str(value) + {8: "", 16: "", 32: "l", 64: "ll"}[width]
+    return str(value) + {8: "", 16: "", 32: "L", 64: "LL"}[width]
 
 
 def scalar_literal(scalar: Scalar, value: int) -> str:
@@ -57,6 +57,16 @@ def scalar_literal(scalar: Scalar, value: int) -> str:
     if scalar.meaning == "bool":
         return "true" if value else "false"
     return literal(value, scalar.bits, signed=scalar.signed)
+
+
+def bracketed(number: str) -> str:
+    """A number as the text of a macro: in parentheses where it has a sign."""
+    return f"({number})" if number.startswith("-") else number
+
+
+def grouped(expression: str) -> str:
+    """An expression as an operand: in parentheses unless it is one word or a call."""
+    return f"({expression})" if " " in expression else expression
 
 
 class Names:

@@ -6,7 +6,7 @@ from typing import Any
 
 from qlinkgen.backends.c.delimited import differs
 from qlinkgen.backends.c.framing import struct_parameter
-from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
+from qlinkgen.backends.c.names import Names, grouped, unsigned, unsigned_type
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Sum
 from qlinkgen.model.frame import Checksum, PacketFrame
@@ -74,14 +74,16 @@ def packet_from_frame(names: Names, message: Message, view: dict[str, Any]) -> d
             "    return status;",
             "}",
         ]
-        payload_size = f"size - {view['check_size']}u"
+        payload_size = f"size - {view['check_size']}U"
     else:
         payload_size = "size"
     if message.fields:
         call = "message, " if struct else ""
         lines.append(f"return {names.function(message)}_decode({call}wire, {payload_size});")
     else:
-        lines.append(f"return ({payload_size} == 0u) ? {names.upper}_OK : {names.upper}_ERROR_LENGTH;")
+        lines.append(
+            f"return ({grouped(payload_size)} == 0U) ? {names.upper}_OK : {names.upper}_ERROR_LENGTH;"
+        )
     return {"parameters": parameters, "lines": lines}
 
 
