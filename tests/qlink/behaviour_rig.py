@@ -1,28 +1,30 @@
 """A bus to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over a pty, with faults.
 
 A behaviour is written once, for a `Rig`. It uses the bus as a user would, and says by `rig.sure` what a user
-would try again after a LinkError.
+would try again after a LinkError. It asks for its nodes by `Slave`; the first of them may be a firmware on an
+emulated chip.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import inspect
 import random
-import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar, cast
 
-from qlinkgen.errors import LinkError, PortLost
+from qlinkgen.errors import LinkError
 from qlinkgen.link import EchoMode, Event, SlaveEngine
-from qlinkgen.protocols.qlink import AsyncBus, AsyncNode, Bus, VirtualNode
+from qlinkgen.protocols.qlink import AsyncBus, Bus, VirtualNode
 from qlinkgen.sim import Echo, FaultPlan, VirtualPort, Wire
 from qlinkgen.sim.fault_kinds import RateLike
 from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen.transport import MemoryPort, Port, memory_pair, open_port
+from qlinkgen.transport import Port, memory_pair, open_port
 from qlinkgen_codecs import qlink
+from tests.firmware.firmware import TARGETS
+from tests.firmware.node import FirmwareNode, RealPauses
+from tests.qlink.behaviour_drivers import AsyncFace, Pump
 
 T = TypeVar("T")
 #: Seconds of host slack: more than the longest answer takes; in real time what a busy machine needs.
@@ -30,13 +32,14 @@ SLACK = {"virtual": 0.012, "memory": 0.1, "pty": 0.1}
 #: An answer so late misses its deadline, and still comes while the line has to be quiet.
 LATE = (0.018, 0.024)
 HIGH = 0.15
+MIXED = dict.fromkeys(("drop", "flip", "stray", "noise"), 0.05)
 #: Rounds after which a call that fails again and again has failed.
 PATIENCE = 100
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Where a behaviour is tried."""
+    """Where a behaviour is tried; `firmware` names the port that the first node is."""
 
     name: str
     face: Literal["blocking", "asyncio"] = "blocking"
@@ -45,6 +48,7 @@ class Setting:
     echo: EchoMode = "none"
     partial: float = 0.0
     changed: float = 0.0
+    firmware: str = ""
 
     @property
     def faulty(self) -> bool:
@@ -64,7 +68,7 @@ FAULTS = [
     Setting("faults-stray", rates={"stray": 2 * HIGH}),
     Setting("faults-noise", rates={"noise": 2 * HIGH}),
     Setting("faults-silent", rates={"silent": (HIGH, 0.02, 0.1)}),
-    Setting("faults-mixed-asyncio", "asyncio", rates=dict.fromkeys(("drop", "flip", "stray", "noise"), 0.05)),
+    Setting("faults-mixed-asyncio", "asyncio", rates=MIXED),
 ]
 ECHOES = [
     Setting("echo-expect", echo="expect"),
@@ -74,6 +78,22 @@ ECHOES = [
     Setting("echo-noise", echo="expect", rates={"noise": HIGH}),
     Setting("echo-drop", echo="expect", rates={"drop": HIGH}),
 ]
+FIRMWARES = [Setting(f"firmware-{target}", firmware=target) for target in TARGETS]
+FIRMWARES += [Setting("firmware-posix-asyncio", "asyncio", firmware="posix")]
+FIRMWARE_FAULTS = [
+    Setting(
+        f"firmware-{target}-faults", rates={**MIXED, "truncate": 0.05, "duplicate": 0.05}, firmware=target
+    )
+    for target in TARGETS
+]
+
+
+class Slave:
+    """A node as a test wants it; the settings are those of `VirtualNode`."""
+
+    def __init__(self, number: int = 1, **settings: Any) -> None:
+        self.number = number
+        self.settings = settings
 
 
 class Probe(VirtualNode):
@@ -86,11 +106,11 @@ class Probe(VirtualNode):
         old_number: it answers a node_setup with the number that it had.
     """
 
-    def __init__(self, number: int = 1, **settings: Any) -> None:
+    def __init__(self, number: int = 1, *, old_number: bool = False, **settings: Any) -> None:
         super().__init__(number, record=True, **settings)
         self.heard: list[qlink.Message] = []
         self.mute = self.deaf = 0
-        self.old_number = False
+        self.old_number = old_number
 
     def handle(self, request: qlink.Message, now: float) -> qlink.Message | None:
         if self.deaf:
@@ -112,41 +132,67 @@ class Probe(VirtualNode):
         assert self.record is not None
         return self.record.words.tolist()
 
+    @property
+    def loaded(self) -> bytes | None:
+        """Text of the loaded program, from its end record on."""
+        return self.program.text if self.program is not None else None
 
-class AsyncFace:
-    """Makes an AsyncBus look like a Bus."""
+    @property
+    def stored(self) -> int:
+        """Bytes that the program has put into memory."""
+        return self.program.size if self.program is not None else 0
 
-    def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
-        self._target = target
-        self._loop = loop
+    def memory(self, size: int) -> bytes:
+        """Bytes of the program from address 0 on."""
+        assert self.program is not None
+        return bytes(map(self.program.memory().__getitem__, range(size)))
 
-    def __getattr__(self, name: str) -> Any:
-        value = getattr(self._target, name)
-        return self._wrapped(value) if inspect.ismethod(value) else value
+    @property
+    def capacity(self) -> int:
+        """Words that its FIFO holds."""
+        return self.path.capacity
 
-    def _wrapped(self, method: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*args: Any, **kwargs: Any) -> Any:
-            result = method(*args, **kwargs)
-            if inspect.iscoroutine(result):
-                return self._loop.run_until_complete(result)
-            if inspect.isasyncgen(result):
-                return self._iterate(result)
-            return AsyncFace(result, self._loop) if isinstance(result, AsyncNode) else result
+    @property
+    def waiting(self) -> int:
+        """Words in the FIFO."""
+        return self.path.waiting
 
-        return call
+    @property
+    def started(self) -> bool:
+        """Whether the motor consumes words."""
+        return self.path.started
 
-    def _iterate(self, steps: Any) -> Iterator[Any]:
-        try:
-            while True:
-                yield self._loop.run_until_complete(anext(steps))
-        except StopAsyncIteration:
-            return
-        finally:
-            self._loop.run_until_complete(steps.aclose())
+    @property
+    def position(self) -> int:
+        """Where the motor is."""
+        return self.path.position
+
+    @position.setter
+    def position(self, value: int) -> None:
+        self.path.position = value
+
+    def switch_input_1(self, level: int) -> float:
+        """Put a level on input 1 and none on the others. Returns when."""
+        now = self.clock()
+        self.set_inputs(level, now)
+        return now
+
+    def clock(self) -> float:
+        """Seconds of the node's own time, that of what it heard last."""
+        assert self.now is not None, "it has heard nothing yet"
+        return self.now
+
+
+Node = Probe | FirmwareNode
 
 
 class Rig:
-    """A bus, its nodes, and the clock that they share."""
+    """A bus, its nodes, and the line between them.
+
+    Attributes:
+        paced: bytes take their time, on a virtual clock.
+        exact: the nodes live by that clock as well.
+    """
 
     def __init__(self, setting: Setting, nodes: tuple[Probe, ...], bus: Bus, wire: Wire) -> None:
         self.setting = setting
@@ -154,7 +200,8 @@ class Rig:
         self.bus = bus
         self.wire = wire
         self.faulty = setting.faulty
-        self.virtual = setting.transport == "virtual"
+        self.paced = setting.transport == "virtual"
+        self.exact = self.paced and not setting.firmware
         self.events: list[Event] = []
 
     @property
@@ -199,14 +246,17 @@ class Rig:
 
 
 @contextlib.contextmanager
-def make_rig(setting: Setting, *nodes: Probe, turnaround: float = 0.0, **options: Any) -> Iterator[Rig]:
+def make_rig(setting: Setting, *nodes: Node, turnaround: float = 0.0, **options: Any) -> Iterator[Rig]:
     """Put nodes on a line, and a bus at its outside."""
     echo = Echo(partial=setting.partial, changed=setting.changed, seed=1) if setting.echo != "none" else False
     plan = FaultPlan(**setting.rates, seed=7, strays=_stray) if setting.rates else None  # type: ignore[arg-type]
     paced = setting.transport == "virtual"
     wire = Wire(baud=115200 if paced else None, faults=plan, echo=echo, chunks="random" if paced else "frame")
     for node in nodes:
-        wire.attach(SlaveEngine(qlink, node, turnaround=turnaround))
+        if isinstance(node, FirmwareNode):
+            wire.attach(node.engine)
+        else:
+            wire.attach(SlaveEngine(qlink, node, turnaround=turnaround))
     given = {"echo": setting.echo, "health": None, "slack": SLACK[setting.transport], **options}
     with contextlib.ExitStack() as stack:
         port = stack.enter_context(_port(setting, wire))
@@ -219,13 +269,15 @@ def make_rig(setting: Setting, *nodes: Probe, turnaround: float = 0.0, **options
             face = AsyncBus(port, **given)
             stack.callback(face.close)
             bus = cast(Bus, AsyncFace(face, loop))
-        yield Rig(setting, nodes, bus, wire)
+        # A firmware tells under the same names what the behaviours ask of a node.
+        yield Rig(setting, cast(tuple[Probe, ...], nodes), bus, wire)
 
 
 @contextlib.contextmanager
 def _port(setting: Setting, wire: Wire) -> Iterator[Port]:
     if setting.transport == "virtual":
-        yield VirtualPort(wire, reaction=(0.0, 0.0003))
+        clock = RealPauses if setting.firmware else VirtualPort
+        yield clock(wire, reaction=(0.0, 0.0003))
     elif setting.transport == "pty":
         with PtyBus(wire) as line, open_port(line.path) as port:
             yield port
@@ -238,41 +290,6 @@ def _port(setting: Setting, wire: Wire) -> Iterator[Port]:
         finally:
             pump.stop()
             near.close()
-
-
-class Pump(threading.Thread):
-    """Runs a line at the other end of a memory pair, in real time."""
-
-    def __init__(self, wire: Wire, port: MemoryPort) -> None:
-        super().__init__(daemon=True)
-        self._wire = wire
-        self._port = port
-        self._stopping = False
-        self._failure: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            while not self._stopping:
-                self._once()
-        except PortLost:  # the near end was closed first
-            return
-        except BaseException as failure:  # noqa: BLE001  # raised again where the pump is stopped
-            self._failure = failure
-
-    def _once(self) -> None:
-        wire, port = self._wire, self._port
-        due = wire.next_timer()
-        wait = 0.01 if due is None else min(max(0.0, due - port.now()), 0.01)
-        if data := port.read(wait):
-            wire.transmit(data, port.now())
-        if heard := wire.take(port.now()):
-            port.write(heard)
-
-    def stop(self) -> None:
-        self._stopping = True
-        self.join()
-        if self._failure is not None:
-            raise self._failure
 
 
 def _stray(chance: random.Random) -> bytes:

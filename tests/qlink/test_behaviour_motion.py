@@ -10,7 +10,7 @@ import pytest
 from qlinkgen.errors import LinkError, NoReply
 from qlinkgen_codecs import qlink
 from qlinkgen_codecs.qlink import MotorStatus, PositionType
-from tests.qlink.behaviour_rig import Probe, Rig
+from tests.qlink.behaviour_rig import Probe, Rig, Slave
 from tests.qlink.conftest import MakeRig
 
 
@@ -21,7 +21,7 @@ def counters(node: Probe) -> list[int]:
 
 
 def test_the_counter_starts_at_0_advances_by_one_and_wraps(make: MakeRig) -> None:
-    rig = make(Probe(capacity=255, rate=1e6, started=True))
+    rig = make(Slave(capacity=255, rate=1e6, started=True))
     for word in range(300):
         rig.move(1, [word])
     assert rig.node.words == list(range(300))
@@ -32,7 +32,7 @@ def test_the_counter_starts_at_0_advances_by_one_and_wraps(make: MakeRig) -> Non
 
 
 def test_a_motion_whose_answer_is_lost_is_repeated_under_its_counter(make: MakeRig) -> None:
-    rig = make(Probe())
+    rig = make(Slave())
     rig.move(1, [1])
     rig.node.mute = 2
     answer = rig.move(1, [2, 3], outputs=5)
@@ -50,7 +50,7 @@ def test_a_motion_whose_answer_is_lost_is_repeated_under_its_counter(make: MakeR
 
 
 def test_a_motion_that_fails_stays_pending_and_is_taken_once(make_clean: MakeRig) -> None:
-    rig = make_clean(Probe())
+    rig = make_clean(Slave())
     rig.bus.motion(1, segments=[1])
     for heard in (True, False):  # the answers are lost, or the requests
         rig.node.mute, rig.node.deaf = (3, 0) if heard else (0, 3)
@@ -64,7 +64,7 @@ def test_a_motion_that_fails_stays_pending_and_is_taken_once(make_clean: MakeRig
 
 
 def test_a_repeat_is_answered_with_what_is_now_and_not_taken(make: MakeRig) -> None:
-    rig = make(Probe(position_type=PositionType.METRONIX, capacity=10))
+    rig = make(Slave(position_type=PositionType.METRONIX, capacity=10))
     rig.sure(lambda: rig.bus.motion(1, counter=5, outputs=1, segments=[7, 8]))
     rig.sure(lambda: rig.bus.write(1, data=b"\0"))
     rig.sure(lambda: rig.bus.preset_motor_position(1, position=-5))
@@ -80,17 +80,17 @@ def test_a_repeat_is_answered_with_what_is_now_and_not_taken(make: MakeRig) -> N
 def test_the_first_motion_after_a_clear_or_a_reset_is_taken_whatever_its_counter(
     make: MakeRig, command: str
 ) -> None:
-    rig = make(Probe())
+    rig = make(Slave())
     rig.sure(lambda: rig.bus.motion(1, counter=9, segments=[1]))
     rig.sure(lambda: getattr(rig.bus, command)(1))
-    assert rig.node.path.waiting == 0
+    assert rig.node.waiting == 0
     rig.sure(lambda: rig.bus.motion(1, counter=9, segments=[2]))
     assert rig.node.words == [1, 2]
 
 
 @pytest.mark.parametrize("command", ["clear_fifo", "node_reset"])
 def test_a_clear_drops_what_is_pending(make_clean: MakeRig, command: str) -> None:
-    rig = make_clean(Probe())
+    rig = make_clean(Slave())
     rig.move(1, [1])
     rig.node.mute = 3
     with pytest.raises(NoReply):
@@ -98,14 +98,14 @@ def test_a_clear_drops_what_is_pending(make_clean: MakeRig, command: str) -> Non
     getattr(rig.bus, command)(1)
     rig.move(1, [3])
     assert rig.node.words == [1, 2, 3]
-    assert rig.node.path.waiting == 1
+    assert rig.node.waiting == 1
 
 
 @pytest.mark.parametrize("command", ["clear_fifo", "node_reset"])
 def test_a_clear_that_is_not_answered_does_not_bring_back_what_was_pending(
     make_clean: MakeRig, command: str
 ) -> None:
-    rig = make_clean(Probe(started=True, rate=1e6))
+    rig = make_clean(Slave(started=True, rate=1e6))
     rig.move(1, [1])
     rig.node.mute = 6
     with pytest.raises(NoReply):
@@ -117,7 +117,7 @@ def test_a_clear_that_is_not_answered_does_not_bring_back_what_was_pending(
 
 
 def test_a_new_master_is_not_mistaken_for_a_repeat(make_clean: MakeRig) -> None:
-    rig = make_clean(Probe())
+    rig = make_clean(Slave())
     for outputs in (1, 2, 3):
         rig.bus.memory.motions.clear()  # as if the program had been started again
         rig.bus.motion(1, outputs=outputs)
@@ -128,7 +128,7 @@ def test_a_new_master_is_not_mistaken_for_a_repeat(make_clean: MakeRig) -> None:
 
 
 def test_a_node_that_takes_over_a_number_is_not_mistaken_for_the_other(make_clean: MakeRig) -> None:
-    rig = make_clean(Probe(1), Probe(2))
+    rig = make_clean(Slave(1), Slave(2))
     rig.move(1, [1])
     rig.move(2, [1])
     rig.bus.node_setup(2, node_number=3)
@@ -144,27 +144,26 @@ def stream(rig: Rig, words: dict[int, list[int]]) -> dict[int, int]:
     queued = dict.fromkeys(words, 0)
     for progress in rig.bus.stream_motion(words, patience=60.0):
         assert progress.queued >= queued[progress.node]
-        assert 0 <= progress.fifo_space <= nodes[progress.node].path.capacity
+        assert 0 <= progress.fifo_space <= nodes[progress.node].capacity
         queued[progress.node] = progress.queued
     return queued
 
 
 def test_a_stream_fills_many_fifos_and_never_too_full(make: MakeRig) -> None:
-    nodes = (
-        Probe(1, capacity=48, rate=2000.0, started=True),
-        Probe(2, capacity=5, rate=300.0, started=True),
-        Probe(3, capacity=255, rate=50000.0, started=True),
+    rig = make(
+        Slave(1, capacity=48, rate=2000.0, started=True),
+        Slave(2, capacity=5, rate=300.0, started=True),
+        Slave(3, capacity=255, rate=50000.0, started=True),
     )
-    rig = make(*nodes)
-    words = {node.number: [(node.number << 12) + index for index in range(150)] for node in nodes}
+    words = {node.number: [(node.number << 12) + index for index in range(150)] for node in rig.nodes}
     assert stream(rig, words) == {1: 150, 2: 150, 3: 150}
-    for node in nodes:
+    for node in rig.nodes:
         assert node.words == words[node.number]
         assert node.statistics.overruns == 0
 
 
 def test_a_stream_takes_no_word_before_it_fits(make: MakeRig) -> None:
-    rig = make(Probe(capacity=20))  # it is stopped, so nothing drains
+    rig = make(Slave(capacity=20))  # it is stopped, so nothing drains
     taken = count()
     source: Iterator[int] = iter(lambda: next(taken) + 1, 0)
     steps = rig.bus.stream_motion({1: source}, patience=60.0)
@@ -181,7 +180,7 @@ def test_a_stream_takes_no_word_before_it_fits(make: MakeRig) -> None:
 
 
 def test_nobody_moves_a_node_that_is_streamed_to(make_clean: MakeRig) -> None:
-    rig = make_clean(Probe())
+    rig = make_clean(Slave())
     steps = rig.bus.stream_motion({1: range(100)})
     next(steps)
     with pytest.raises(RuntimeError, match="streamed"):
@@ -191,7 +190,7 @@ def test_nobody_moves_a_node_that_is_streamed_to(make_clean: MakeRig) -> None:
 
 
 def test_a_preset_is_refused_while_the_motor_runs(make: MakeRig) -> None:
-    rig = make(Probe(started=True, rate=0.0, position_type=PositionType.JVL_MACTALK))
+    rig = make(Slave(started=True, rate=0.0, position_type=PositionType.JVL_MACTALK))
     rig.sure(lambda: rig.bus.preset_motor_position(1, position=-(2**31)))
     assert rig.sure(lambda: rig.bus.motor_position(1)).position == -(2**31)
     answer = rig.move(1, [1])
@@ -204,8 +203,8 @@ def test_a_preset_is_refused_while_the_motor_runs(make: MakeRig) -> None:
 
 @pytest.mark.parametrize("kind", list(range(4)))
 def test_a_position_counts_only_with_a_position_type(make: MakeRig, kind: int) -> None:
-    rig = make(Probe(position_type=kind))
-    rig.node.path.position = 1234
+    rig = make(Slave(position_type=kind))
+    rig.node.position = 1234
     known = kind in {1, 2}
     assert rig.sure(lambda: rig.bus.motor_position(1)).position == (1234 if known else 0)
     answer = rig.sure(lambda: rig.bus.motion(1, counter=0))

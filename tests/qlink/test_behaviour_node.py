@@ -13,7 +13,8 @@ from qlinkgen.link import HealthPolicy
 from qlinkgen.protocols.qlink import Found, LoadProgress
 from qlinkgen_codecs import qlink
 from qlinkgen_codecs.qlink import PositionType
-from tests.qlink.behaviour_rig import Probe
+from tests.firmware.node import backwards
+from tests.qlink.behaviour_rig import Rig, Slave
 from tests.qlink.conftest import MakeRig
 
 
@@ -35,10 +36,9 @@ class TestLoad:
         told: list[LoadProgress] = []
         report = rig.bus.load(1, text, piece=5, patience=60.0, progress=told.append)
         assert report.pieces == -(-len(text) // 5) > 256
-        image = rig.node.program
-        assert image is not None
-        assert image.text == text
-        assert image.segments == ((0, bytes(((at >> 4) * 7 + (at & 15)) & 0xFF for at in range(480))),)
+        assert rig.node.loaded == text
+        assert rig.node.stored == 480
+        assert rig.node.memory(480) == bytes(((at >> 4) * 7 + (at & 15)) & 0xFF for at in range(480))
         assert rig.node.statistics.program_pieces == report.pieces
         assert [each.acknowledged for each in told] == [*range(0, len(text), 5), len(text)]
         heard = [each for each in rig.node.heard if isinstance(each, qlink.NodeProgramLoadRequest)]
@@ -52,9 +52,7 @@ class TestLoad:
         file = tmp_path / "program.hex"
         file.write_bytes(hex_text(3))
         rig.bus.node(1).load(file)
-        image = rig.node.program
-        assert image is not None
-        assert image.size == 48
+        assert rig.node.loaded == hex_text(3)
 
     def test_it_goes_on_after_lost_answers_and_stores_nothing_twice(self, make: MakeRig) -> None:
         rig = make()
@@ -65,9 +63,7 @@ class TestLoad:
             rig.node.mute = next(lose, 0) if progress.acknowledged else 0
 
         report = rig.bus.load(1, text, patience=60.0, progress=lose_some)
-        image = rig.node.program
-        assert image is not None
-        assert image.text == text
+        assert rig.node.loaded == text
         assert rig.node.statistics.repeated_pieces >= (1 if rig.faulty else 8)
         assert report.repeats >= (1 if rig.faulty else 8)
 
@@ -82,7 +78,7 @@ class TestLoad:
         assert (caught.value.acknowledged, caught.value.total) == (50, len(hex_text(4)))
         rig.node.deaf = 0
         rig.bus.load(1, hex_text(4))
-        assert rig.node.program is not None
+        assert rig.node.loaded == hex_text(4)
 
     def test_an_opening_without_any_data_is_one_too(self, make_clean: MakeRig) -> None:
         rig = make_clean()
@@ -111,7 +107,7 @@ class TestSync:
             assert counts.missed_syncs == 248 + 7
 
     def test_syncs_at_an_interval_reach_every_node(self, make_clean: MakeRig) -> None:
-        rig = make_clean(Probe(1), Probe(2))
+        rig = make_clean(Slave(1), Slave(2))
         report = rig.bus.sync(0.01, count=20)
         rig.bus.node_info(1)
         assert report.sent == 20
@@ -120,14 +116,14 @@ class TestSync:
                 range(20)
             )
             assert node.statistics.missed_syncs == 0
-        if rig.virtual:
+        if rig.paced:
             assert report.missed == 0
             assert report.jitter < 0.001
 
 
 class TestMotor:
     def test_a_request_is_polled_until_it_is_completed(self, make: MakeRig) -> None:
-        rig = make(Probe(motor=lambda data: data[::-1][:25], motor_seconds=0.05))
+        rig = make(Slave(motor=backwards, motor_seconds=0.05))
         answer = rig.sure(lambda: rig.bus.complete_motor_request(1, b"\xa5\xa5\x00ask"))
         assert (answer.last_completion, bytes(answer.motor_data)) == (0x16, b"ksa\x00\xa5\xa5")
         polls = [each for each in rig.node.heard if isinstance(each, qlink.MotorResponsePollRequest)]
@@ -145,25 +141,23 @@ class TestMotor:
         assert rig.node.statistics.motor_requests == 1
 
     def test_one_that_is_never_completed_is_a_clean_error(self, make_clean: MakeRig) -> None:
-        rig = make_clean(Probe(motor_seconds=1e6))
+        rig = make_clean(Slave(motor_seconds=60.0))
         with pytest.raises(NoReply, match="not completed"):
             rig.bus.complete_motor_request(1, b"ask", timeout=0.05)
 
 
 class TestInputsAndOutputs:
     def test_output_1_follows_input_1_after_t1_and_t2(self, make: MakeRig) -> None:
-        rig = make(Probe(t1_delay=9.9, t2_delay=9.9))
+        rig = make(Slave(t1_delay=9.9, t2_delay=9.9))
         rig.sure(lambda: rig.bus.node_setup(1, t1_delay=0.3, t2_delay=0.2))
         for level, delay in ((1, 0.3), (0, 0.2)):
             rig.sure(lambda: rig.bus.node_info(1))
-            assert rig.node.now is not None
-            edge = rig.node.now
-            rig.node.set_inputs(level, edge)
+            edge = rig.node.switch_input_1(level)
             assert rig.node.outputs == 1 - level
             rig.until(lambda level=level: rig.node.outputs == level)  # type: ignore[misc]
-            assert rig.node.now - edge >= delay
-            if rig.virtual and not rig.faulty:
-                assert rig.node.now - edge < delay + 0.05
+            assert rig.node.clock() - edge >= delay
+            if rig.exact and not rig.faulty:
+                assert rig.node.clock() - edge < delay + 0.05
 
     def test_reads_past_the_inputs_give_0_and_writes_past_the_outputs_nothing(self, make: MakeRig) -> None:
         rig = make()
@@ -215,20 +209,20 @@ class TestReset:
         rig.sure(lambda: rig.bus.write(1, offset=1, data=b"\xff\xff"))
         assert rig.node.outputs == 0xFFFFFF
         rig.sure(lambda: rig.bus.node_reset(1))
-        assert (rig.node.path.waiting, rig.node.outputs) == (0, 0)
-        assert rig.move(1, [4]).fifo_space == rig.node.path.capacity - 1
+        assert (rig.node.waiting, rig.node.outputs) == (0, 0)
+        assert rig.move(1, [4]).fifo_space == rig.node.capacity - 1
 
 
 class TestStart:
     def test_a_broadcast_starts_and_stops_all_nodes(self, make_clean: MakeRig) -> None:
-        rig = make_clean(*(Probe(number) for number in (1, 7, 16)))
+        rig = make_clean(*(Slave(number) for number in (1, 7, 16)))
         for method, started in ((rig.bus.node_start, True), (rig.bus.node_stop, False)):
             method(0)
             rig.bus.node_info(16)
-            assert [node.path.started for node in rig.nodes] == [started] * 3
+            assert [node.started for node in rig.nodes] == [started] * 3
         rig.bus.node_start(7)
         rig.bus.node_info(16)
-        assert [node.path.started for node in rig.nodes] == [False, True, False]
+        assert [node.started for node in rig.nodes] == [False, True, False]
 
     def test_a_stop_is_sent_also_to_a_node_that_is_offline(self, make_clean: MakeRig) -> None:
         rig = make_clean(health=HealthPolicy(offline_after=1, first_pause=1e3, longest_pause=1e3), attempts=1)
@@ -241,12 +235,12 @@ class TestStart:
         rig.node.deaf = 0
         rig.bus.node_stop(1)
         rig.sleep(0.5)
-        assert not rig.node.path.started
+        assert not rig.node.started
 
 
 class TestUnsupported:
     def test_a_command_that_a_node_has_not_is_not_answered(self, make: MakeRig) -> None:
-        rig = make(Probe(unsupported=("loop_back",)))
+        rig = make(Slave(unsupported=("loop_back",)))
         with pytest.raises(LinkError) as caught:
             rig.bus.loop_back(1, data=b"x")
         if not rig.faulty:
@@ -267,35 +261,41 @@ class TestUnsupported:
                 call()
 
 
+def set_up_as_9(rig: Rig) -> int:
+    """Give node 3 another number and other settings. Returns under which number it has answered that."""
+    answer = rig.bus.node_setup(3, node_number=9, t1_delay=0.26, t2_delay=25.54, position_type=2)
+    info = rig.bus.node(9).node_info()
+    assert (info.t1_delay, info.t2_delay, info.position_type) == (0.3, 25.5, PositionType.METRONIX)
+    with pytest.raises(NoReply):
+        rig.bus.node_info(3)
+    return answer.node
+
+
 class TestSetup:
-    @pytest.mark.parametrize("old", [False, True])
-    def test_a_new_number_is_answered_under_either(self, make_clean: MakeRig, old: bool) -> None:
-        rig = make_clean(Probe(3))
-        rig.node.old_number = old
-        answer = rig.bus.node_setup(3, node_number=9, t1_delay=0.26, t2_delay=25.54, position_type=2)
-        assert answer.node == (3 if old else 9)
-        info = rig.bus.node(9).node_info()
-        assert (info.t1_delay, info.t2_delay, info.position_type) == (0.3, 25.5, PositionType.METRONIX)
-        with pytest.raises(NoReply):
-            rig.bus.node_info(3)
+    def test_a_new_number_is_answered_under_it(self, make_clean: MakeRig) -> None:
+        assert set_up_as_9(make_clean(Slave(3))) == 9
+
+    def test_a_new_number_is_answered_under_the_old_one(self, make_simulated: MakeRig) -> None:
+        # The firmware goes the other way of the two.
+        assert set_up_as_9(make_simulated(Slave(3, old_number=True))) == 3
 
     def test_settings_arrive_on_a_bad_line(self, make: MakeRig) -> None:
-        rig = make(Probe(3, serial_number=0xA5A5A5A5))
+        rig = make(Slave(3, serial_number=0xA5A5A5A5))
         rig.sure(lambda: rig.bus.node_setup(3, node_number=3, t1_delay=16.5, t2_delay=0.0, position_type=1))
         info = rig.sure(lambda: rig.bus.node_info(3))
         assert (info.t1_delay, info.t2_delay, info.position_type) == (16.5, 0.0, PositionType.JVL_MACTALK)
         assert info.serial_number == 0xA5A5A5A5
 
     def test_a_broadcast_finds_the_only_node(self, make: MakeRig) -> None:
-        rig = make(Probe(11, serial_number=77))
+        rig = make(Slave(11, serial_number=77))
         info = rig.sure(lambda: rig.bus.node_info(0))
         assert (info.node, info.serial_number) == (11, 77)
         assert rig.sure(lambda: rig.bus.node_setup(0, node_number=4)).node == 4
         assert rig.node.number == 4
 
     def test_a_broadcast_to_two_nodes_collides(self, make_clean: MakeRig) -> None:
-        rig = make_clean(Probe(2, serial_number=2), Probe(5, serial_number=5))
-        if rig.virtual:
+        rig = make_clean(Slave(2, serial_number=2), Slave(5, serial_number=5))
+        if rig.paced:
             with pytest.raises(LinkError):
                 rig.bus.node_info(0)
             assert rig.wire.collisions == 3
@@ -307,7 +307,7 @@ class TestSetup:
             assert rig.bus.engine.total.strays == 1
 
     def test_scan_finds_who_is_there(self, make: MakeRig) -> None:
-        rig = make(Probe(2, unsupported=("node_info",)), Probe(5, serial_number=5))
+        rig = make(Slave(2, unsupported=("node_info",)), Slave(5, serial_number=5))
         found: list[Found] = []
         for _ in range(100 if rig.faulty else 1):
             found = rig.bus.scan((1, 2, 5))
@@ -320,8 +320,8 @@ class TestSetup:
         assert found[1].info.serial_number == 5
 
     def test_status_tells_what_each_node_says(self, make: MakeRig) -> None:
-        rig = make(Probe(1, position_type=1), Probe(2))
-        rig.nodes[0].path.position = -99
+        rig = make(Slave(1, position_type=1), Slave(2))
+        rig.nodes[0].position = -99
         rig.nodes[1].inputs = 0xA5A5A4
         first = second = None
         for _ in range(100 if rig.faulty else 1):

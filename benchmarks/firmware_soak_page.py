@@ -1,0 +1,94 @@
+"""What the soak of the firmware has found, as text for the terminal and as a section of docs/soak.md."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from benchmarks.firmware_soak_run import COMPARED, PHASE, Result
+from benchmarks.report import as_markdown
+
+TITLE = "## Firmware on emulated chips"
+_SECTION = re.compile(rf"\n*{re.escape(TITLE)}\n.*?(?=\n\n## |\Z)", re.DOTALL)
+_BORN = {
+    "posix": "a process",
+    "lm3s6965evb": "QEMU, Cortex-M3",
+    "microbit": "QEMU, Cortex-M0",
+    "atmega328p": "simavr, AVR",
+}
+
+
+def as_text(result: Result) -> str:
+    """A few lines for the terminal."""
+    verdict = "WRONG" if result.complaint else "all well"
+    head = f"{result.target}, seed {result.seed}: {verdict}; {result.seconds:.0f} s"
+    return "\n".join([head, *(f"  {name}: {value}" for name, value in _figures(result))])
+
+
+def _figures(result: Result) -> list[tuple[str, str]]:
+    sent = result.sent
+    return [
+        ("runs as", _BORN[result.target]),
+        ("transactions", _n(result.transactions)),
+        ("... answered", _n(result.answered)),
+        ("requests damaged on purpose", _n(sent["corrupted"])),
+        ("frames with a right checksum and anything in them", _n(sent["malformed"])),
+        ("requests to other nodes, and answers of them", _n(sent["stray"])),
+        ("noise, 1 to 20 bytes", _n(sent["noise"])),
+        ("of these four: broadcasts, or requests after all", _n(result.effective)),
+        ("comparisons of the whole state", _n(result.comparisons)),
+        ("wrong answers, answers that nobody asked for, wrong states", "1" if result.complaint else "0"),
+        ("transactions a second", _n(round(result.rate))),
+    ]
+
+
+def _n(number: int) -> str:
+    return f"{number:,}".replace(",", " ")
+
+
+def put_into(page: str, results: Sequence[Result]) -> str:
+    """Return a page with this section, in the place of the one that it had or at its end."""
+    section = "\n\n" + as_section(results).rstrip("\n")
+    if _SECTION.search(page):
+        return _SECTION.sub(lambda _: section, page).rstrip("\n") + "\n"
+    return page.rstrip("\n") + section + "\n"
+
+
+def as_section(results: Sequence[Result]) -> str:
+    """Return the section."""
+    rows = [
+        [cells[0][0], *(cell[1] for cell in cells)]
+        for cells in zip(*(_figures(result) for result in results), strict=True)
+    ]
+    return _PAGE.format(
+        title=TITLE,
+        count=results[0].wanted,
+        seed=results[0].seed,
+        phase=PHASE,
+        compared=COMPARED,
+        figures=as_markdown(["", *(result.target for result in results)], rows),
+    )
+
+
+_PAGE = """\
+{title}
+
+The slave of examples/firmware on each of its ports, over the serial line of its process or emulator. Each
+gets a random mix of all commands, with many bytes of A5 and 00, repeated and wrong counters, full FIFOs, and
+programs right and broken; between them come damaged requests, frames that are not for it, and noise. A
+virtual node is told the same bytes: each answer of the firmware has to be that of the virtual node, byte for
+byte, and where that one is silent so has to be the firmware. Every {compared} transactions the two are
+compared from inside: all counters, outputs, inputs, FIFO, position, path words, program. Every {phase} the
+node is configured anew. The last time it was
+
+```
+python benchmarks/firmware_soak.py --transactions {count} --seed {seed} --output docs/soak.md
+```
+
+{figures}
+
+Time stands still for both: a motor that moves is waited for, and delays from input 1 to output 1 are 0 where
+input 1 changes. What takes time is tested by the behaviours that firmware and simulated nodes share. The
+emulators hold bytes back while a receive buffer is full, so nothing is said here about overruns, and the
+speed is that of the emulator.
+"""

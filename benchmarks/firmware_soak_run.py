@@ -1,0 +1,231 @@
+"""Sends a random mix to a firmware, and holds every answer and its state against a model."""
+
+from __future__ import annotations
+
+import random
+import time
+from collections import Counter, deque
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+from zlib import crc32
+
+from benchmarks.firmware_soak_model import Model, look_into
+from benchmarks.firmware_soak_traffic import ALWAYS, REQUESTS, Traffic, Unit
+from tests.firmware.firmware import FIFO, HANGS, PROGRAM_SIZE
+from tests.firmware.line import FirmwareLine, Garbage
+from tests.firmware.node import MOTORS, FirmwareNode
+
+#: Transactions until the node is configured anew, and until its state is compared.
+PHASE = 500
+COMPARED = 50
+#: Chance that the levels at the inputs change behind a transaction.
+INPUTS = 0.04
+#: Path words a second of a motor that moves.
+FAST = 50_000
+#: Bytes that may be sent behind the last answer. The smallest receive buffer holds twice as many, so that a
+#: request to which an answer is certain still fits.
+UNREAD = 64
+#: Seconds until a motor answers that is not to answer.
+NEVER = 65.0
+#: Commands that every node supports: those that carry diagnostics, and the one that is always answered.
+KEPT = {"motor_request", "motor_response_poll", ALWAYS}
+PROGRAM_LOAD = REQUESTS["node_program_load"].NAME
+#: Units that a failure shows.
+SHOWN = 8
+
+
+class WrongAnswer(AssertionError):
+    """The firmware did something else than the model; the text shows the last bytes sent."""
+
+
+@dataclass
+class Result:
+    """What a soak has found.
+
+    Attributes:
+        target: port of the firmware.
+        seed: of all random numbers.
+        wanted: transactions that were to be done at least.
+        asked: transactions by command.
+        sent: units by kind.
+        answered: transactions with an answer.
+        effective: disturbances that were requests after all, and answered like them.
+        comparisons: how often the whole state was compared.
+        seconds: how long it took.
+        digest: CRC-32 of all bytes sent.
+        complaint: what was wrong, empty where nothing was.
+    """
+
+    target: str
+    seed: int
+    wanted: int = 0
+    asked: Counter[str] = field(default_factory=Counter)
+    sent: Counter[str] = field(default_factory=Counter)
+    answered: int = 0
+    effective: int = 0
+    comparisons: int = 0
+    seconds: float = 0.0
+    digest: int = 0
+    complaint: str = ""
+
+    @property
+    def transactions(self) -> int:
+        """Intact requests to the node."""
+        return self.asked.total()
+
+    @property
+    def rate(self) -> float:
+        """Transactions a second."""
+        return self.transactions / self.seconds if self.seconds else 0.0
+
+
+class Soak:
+    """One firmware under test.
+
+    Attributes:
+        result: what was found so far.
+    """
+
+    # What belongs to the settings of a phase.
+    _model: Model
+    _traffic: Traffic
+    _moves: bool
+
+    def __init__(self, target: str, line: FirmwareLine, seed: int) -> None:
+        self.result = Result(target, seed)
+        self._line = line
+        self._random = random.Random(f"firmware {seed}")
+        self._shown: deque[Unit] = deque(maxlen=SHOWN)
+        self._unread = 0
+
+    def run(self, transactions: int) -> Result:
+        """Do so many.
+
+        Raises:
+            WrongAnswer: at the first thing that is wrong.
+        """
+        began, self.result.wanted = time.monotonic(), transactions
+        try:
+            while self.result.transactions < transactions:
+                self._configure()
+                self._phase(min(PHASE, transactions - self.result.transactions))
+        except Garbage as found:
+            self._fail(str(found))
+        self.result.seconds = time.monotonic() - began
+        return self.result
+
+    def _configure(self) -> None:
+        """Let firmware and model be as after power-up, with other settings than before."""
+        chance = self._random
+        delays, number, motor = chance.random() < 0.5, chance.randint(1, 16), chance.choice(MOTORS)
+        gone = chance.sample([each for each in REQUESTS if each not in KEPT], chance.choice((0, 0, 1, 3)))
+        settings = self._settings(delays=delays)
+        self._moves = settings["rate"] > 0
+        self._traffic = Traffic(chance, PROGRAM_SIZE, delays=delays)
+        FirmwareNode(self._line, number, motor=motor, unsupported=gone, **settings)
+        # What never happens while the soak lasts must not happen in the model when its time jumps either.
+        settings["motor_seconds"] *= 1e9
+        self._model = Model(PROGRAM_SIZE, number=number, motor=motor, unsupported=gone, **settings)
+
+    def _settings(self, *, delays: bool) -> dict[str, Any]:
+        chance = self._random
+        return {
+            "capacity": chance.choice((1, 5, 12, 48, FIFO)),
+            "rate": chance.choice((0, 0, FAST)),
+            "started": chance.random() < 0.3,
+            "t1_delay": 25.5 * delays,
+            "t2_delay": 12.3 * delays,
+            "position_type": chance.randrange(4),
+            "serial_number": chance.choice((0, 0xA5A5A5A5, chance.getrandbits(32))),
+            "motor_seconds": chance.choice((0.0, NEVER)),
+        }
+
+    def _phase(self, transactions: int) -> None:
+        """Do so many with the same settings."""
+        end, compared = self.result.transactions + transactions, self.result.transactions
+        while self.result.transactions < end:
+            for unit in self._traffic.disturbances(self._model.node):
+                if self._unread + len(unit.data) <= UNREAD:
+                    self._send(unit)
+            answered = self._send(self._request())
+            if answered and self._random.random() < INPUTS:
+                self._set_inputs()
+            if answered and self.result.transactions >= compared + COMPARED:
+                compared = self.result.transactions
+                self._compare()
+        self._send(self._traffic.always(self._model.node))
+        self._compare()
+
+    def _request(self) -> Unit:
+        unit = self._traffic.request(self._model.node, self._model.motion_counter)
+        if self._unread + len(unit.data) <= UNREAD:
+            return unit
+        return self._traffic.always(self._model.node)
+
+    def _send(self, unit: Unit) -> bool:
+        """Send it and check the answer. Returns whether there was one."""
+        model, result = self._model, self.result
+        before = model.requests
+        expected = model.hear(unit.data)
+        self._count(unit, model.requests - before)
+        self._line.write(unit.data)
+        self._unread += len(unit.data)
+        if expected:
+            self._check_answer(expected)
+            result.answered += unit.kind == "request"
+        self._line.number = model.node.number
+        if unit.name == PROGRAM_LOAD and unit.kind == "request":
+            self._traffic.loader.told(acknowledged=bool(expected))
+        if self._moves and model.node.running:
+            self._rest()
+        return bool(expected)
+
+    def _count(self, unit: Unit, requests: int) -> None:
+        result = self.result
+        self._shown.append(unit)
+        result.digest = crc32(unit.data, result.digest)
+        result.sent[unit.kind] += 1
+        if unit.kind == "request":
+            result.asked[unit.name.partition(".")[0]] += 1
+            if requests != 1:
+                self._fail("the codec does not recognise the intact request that was sent last")
+        else:
+            result.effective += requests
+
+    def _check_answer(self, expected: bytes) -> None:
+        answer = self._line.next_answer(HANGS)
+        if answer is None:
+            self._fail(f"no answer in {HANGS:.0f} s; {expected.hex(' ')} was due")
+        if answer != expected:
+            self._fail(f"the answer was {answer.hex(' ')}; {expected.hex(' ')} was due")
+        self._unread = 0
+
+    def _set_inputs(self) -> None:
+        node, inputs = self._model.node, self._random.getrandbits(24)
+        if node.t1_delay or node.t2_delay:
+            inputs = inputs & ~1 | node.inputs & 1  # a delay that runs is nothing that two clocks agree on
+        self._line.diagnostics.force_inputs(inputs, power_up=False)
+        self._model.set_inputs(inputs)
+
+    def _rest(self) -> None:
+        """Wait until the motor has done its words."""
+        end = time.monotonic() + HANGS
+        while self._line.diagnostics.state().running:
+            if time.monotonic() > end:
+                self._fail(f"the motor still runs after {HANGS:.0f} s")
+        self._model.rest()
+        self._unread = 0
+
+    def _compare(self) -> None:
+        self.result.comparisons += 1
+        found = look_into(self._line.diagnostics, self._model.places)
+        if differences := found.differences(self._model.look()):
+            self._fail("; ".join(differences))
+
+    def _fail(self, text: str) -> NoReturn:
+        self._line.broken = True
+        sent = "\n".join(f"  {unit}" for unit in self._shown)
+        raise WrongAnswer(
+            f"{self.result.target}, seed {self.result.seed}, after {self.result.transactions} transactions: "
+            f"{text}\nThe last that was sent, with the newest at the end:\n{sent}"
+        )

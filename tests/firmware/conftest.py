@@ -1,0 +1,7 @@
+"""Firmware for every test in here: see `fixtures`."""
+
+from __future__ import annotations
+
+from tests.firmware.fixtures import build_firmware, firmware_line
+
+__all__ = ["build_firmware", "firmware_line"]

@@ -1,0 +1,265 @@
+"""The firmware builds where it was copied to, by make and by CMake, without Python; or says what is wrong."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.protocols.qlink import Bus
+from tests.firmware.firmware import ROOT, SOURCES, Firmware
+
+Tool = Callable[..., str]
+GENERATED = ROOT / "generated" / "c"
+QLINKGEN = (sys.executable, "-m", "qlinkgen")
+#: Compiler and Debian package of each port, and the applications that it carries.
+PORTS = {
+    "posix": ("cc", "gcc", {"qlink_node", "trio_keypad"}),
+    "lm3s6965evb": ("arm-none-eabi-gcc", "gcc-arm-none-eabi", {"qlink_node", "trio_keypad"}),
+    "microbit": ("arm-none-eabi-gcc", "gcc-arm-none-eabi", {"qlink_node"}),
+    "atmega328p": ("avr-gcc", "gcc-avr", {"qlink_node"}),
+}
+# A make that has started the tests must not tell the one in here how to work, nor a user's flags.
+_OUTSIDE = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS", "CFLAGS", "CPPFLAGS", "LDFLAGS", "PYTHONPATH"}
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in _OUTSIDE}
+
+
+def run(*command: str | Path, **changes: str) -> subprocess.CompletedProcess[str]:
+    """Run a command; both outputs come together."""
+    return subprocess.run(
+        [str(part) for part in command],
+        env={**ENVIRONMENT, "LC_ALL": "C", **changes},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+
+
+def sure(*command: str | Path, **changes: str) -> str:
+    """Run a command that has to work without a warning; what it said."""
+    done = run(*command, **changes)
+    assert done.returncode == 0, done.stdout
+    assert "warning" not in done.stdout.lower(), done.stdout
+    return done.stdout
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    """The folder as a user copies it, with the headers beside the Makefile."""
+    folder = tmp_path / "firmware"
+    shutil.copytree(SOURCES, folder, ignore=shutil.ignore_patterns("build"))
+    for header in ("qlink.h", "trio.h"):
+        shutil.copy(GENERATED / header, folder)
+    return folder
+
+
+@pytest.fixture
+def without_python(tmp_path: Path) -> str:
+    """A PATH on which there is all that there was, but for Python and qlinkgen."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    for place in ENVIRONMENT["PATH"].split(os.pathsep):
+        for program in Path(place).glob("*"):
+            if not program.name.startswith(("python", "pip", "qlinkgen", "pypy")):
+                link = folder / program.name
+                if not link.is_symlink():
+                    link.symlink_to(program)
+    assert shutil.which("make", path=str(folder))
+    assert not shutil.which("python3", path=str(folder))
+    return str(folder)
+
+
+def programs(folder: Path) -> set[str]:
+    """Names of the programs in a folder, as applications of a port."""
+    names = (path.name.removesuffix(".elf") for path in folder.glob("*-*") if path.is_file())
+    return {name.partition("-")[2] for name in names if name.partition("-")[0] in PORTS}
+
+
+@pytest.mark.parametrize("port", PORTS)
+def test_make_needs_no_python(port: str, copied: Path, without_python: str, require_tool: Tool) -> None:
+    compiler, package, apps = PORTS[port]
+    require_tool(compiler, package=package)
+    said = sure("make", "-C", copied, f"PORT={port}", "apps", PATH=without_python)
+    assert programs(copied / "build") == apps
+    assert "-Wconversion" in said
+    assert "-Werror" in said
+    assert compiler not in sure("make", "-C", copied, f"PORT={port}", "apps", PATH=without_python)
+
+
+@pytest.mark.parametrize("port", PORTS)
+def test_cmake_needs_no_python(port: str, copied: Path, without_python: str, require_tool: Tool) -> None:
+    compiler, package, apps = PORTS[port]
+    require_tool(compiler, package=package)
+    require_tool("cmake", package="cmake")
+    build = copied / "build"
+    sure("cmake", "-S", copied, "-B", build, f"-DPORT={port}", PATH=without_python)
+    said = sure("cmake", "--build", build, "--verbose", PATH=without_python)
+    assert programs(build) == apps
+    assert "-Wconversion" in said
+    assert "-Werror" in said
+    assert " -c " not in sure("cmake", "--build", build, "--verbose", PATH=without_python)
+
+
+def test_clang_builds_it_too(copied: Path, require_tool: Tool) -> None:
+    clang = require_tool("clang", package="clang")
+    sure("make", "-C", copied, f"CC={clang}", "PORT=posix", "apps")
+
+
+def test_all_are_all_ports(copied: Path) -> None:
+    planned = sure("make", "-n", "-C", copied, "all")
+    for port, (_, _, apps) in PORTS.items():
+        for app in apps:
+            assert f"-o build/{port}-{app}" in planned
+
+
+def test_all_without_a_header_leaves_out_its_application(copied: Path, require_tool: Tool) -> None:
+    require_tool("cc", package="gcc")
+    require_tool("cmake", package="cmake")
+    (copied / "trio.h").unlink()
+    planned = sure("make", "-n", "-C", copied, "all")
+    assert "build/posix-qlink_node" in planned
+    assert "build/posix-trio_keypad" not in planned
+    sure("cmake", "-S", copied, "-B", copied / "build")
+    planned = sure("cmake", "--build", copied / "build", "--target", "help")
+    assert "posix-qlink_node" in planned
+    assert "posix-trio_keypad" not in planned
+
+
+def test_in_the_repository_the_committed_headers_serve(tmp_path: Path) -> None:
+    assert "-I../../generated/c" in sure("make", "-n", "-C", SOURCES, f"BUILD={tmp_path}", "CC=true")
+
+
+def test_a_change_builds_anew_what_it_concerns(copied: Path, require_tool: Tool) -> None:
+    require_tool("cc", package="gcc")
+    make = ("make", "-C", copied)
+    files = len([*(copied / "qlink_node").glob("*.c")]) + 1
+    assert sure(*make, "CFLAGS=-O0").count(" -c ") == files
+    assert " -c " not in sure(*make, "CFLAGS=-O0")
+    assert sure(*make, "CFLAGS=-O0", "CPPFLAGS=-DNODE_FIFO=7").count(" -c ") == files
+    (copied / "qlink_node" / "motor.c").touch()
+    assert sure(*make, "CFLAGS=-O0", "CPPFLAGS=-DNODE_FIFO=7").count(" -c ") == 1
+    (copied / "qlink.h").touch()
+    assert sure(*make, "CFLAGS=-O0", "CPPFLAGS=-DNODE_FIFO=7").count(" -c ") > 1
+
+
+OPTIONS = {
+    "NUMBER": 7,
+    "T1_TENTHS": 3,
+    "T2_TENTHS": 255,
+    "POSITION_TYPE": 2,
+    "VERSION_MAJOR": 2,
+    "VERSION_MINOR": 9,
+    "PRODUCT": 65535,
+    "SERIAL": 4294967295,
+    "FIFO": 9,
+    "STARTED": 1,
+    "RATE": 0,
+    "MOTOR_MS": 0,
+    "DIAGNOSTICS": 0,
+}
+
+
+def test_options_do_what_they_say(copied: Path, require_tool: Tool) -> None:
+    require_tool("cc", package="gcc")
+    flags = " ".join(f"-DNODE_{name}={value}" for name, value in OPTIONS.items())
+    sure("make", "-C", copied, f"CPPFLAGS={flags}")
+    with (
+        Firmware("posix", copied / "build" / "posix-qlink_node") as firmware,
+        Bus.open(firmware.path, slack=10.0, echo="none") as bus,
+    ):
+        node = bus.node(7)
+        told = node.node_info()
+        assert (told.version_major, told.version_minor, told.product_id) == (2, 9, 65535)
+        assert (told.t1_delay, told.t2_delay, told.serial_number) == (0.3, 25.5, 4294967295)
+        moving = node.motion(segments=[1, 2])
+        assert (moving.fifo_space, moving.motor_status) == (7, 3)  # started, and words wait at rate 0
+        node.motor_request(motor_data=b"\x7e\xd1\x07")  # no diagnostics: the motor's, like anything else
+        assert node.motor_response_poll().motor_data == b"\x7e\xd1\x07"
+
+
+def test_a_header_for_slaves_is_enough(copied: Path, tmp_path: Path, require_tool: Tool) -> None:
+    require_tool("cc", package="gcc")
+    folder = tmp_path / "made"
+    sure(
+        *QLINKGEN, "generate", "qlink", "--target", "c", "--role", "slave", "-o", folder, PYTHONPATH=str(ROOT)
+    )
+    (copied / "qlink.h").unlink()
+    (copied / "trio.h").unlink()
+    said = sure("make", "-C", copied, f"HEADERS={folder / 'c'}")
+    assert f"-I{folder / 'c'}" in said
+
+
+WRONG = {
+    "port": ("", "PORT=moon is no folder with a port.mk; there are: atmega328p ", ("PORT=moon",)),
+    "app": ("", "APP=radio does not run on posix; there: qlink_node trio_keypad", ("APP=radio",)),
+    "app of another port": ("", "does not run on microbit", ("PORT=microbit", "APP=trio_keypad")),
+    "header": ("", "no qlink.h: copy it beside this Makefile, or say HEADERS=folder", ("HEADERS=/nowhere",)),
+    "compiler": ("", "no compiler sdcc-of-old for posix: see posix/README.md", ("CC=sdcc-of-old",)),
+    "long FIFO": ("cc gcc", "NODE_FIFO must be 1 to 255", ("CPPFLAGS=-DNODE_FIFO=256",)),
+    "no FIFO": ("cc gcc", "NODE_FIFO must be 1 to 255", ("CPPFLAGS=-DNODE_FIFO=0",)),
+    "program": ("cc gcc", "NODE_PROGRAM_SIZE must be", ("CPPFLAGS=-DNODE_PROGRAM_SIZE=65536",)),
+    "baud": (
+        "avr-gcc gcc-avr",
+        "BOARD_BAUD cannot be made from F_CPU within 2 %",
+        ("PORT=atmega328p", "F_CPU=16000000UL"),
+    ),
+    "crystal too slow": (
+        "avr-gcc gcc-avr",
+        "BOARD_BAUD cannot be made",
+        ("PORT=atmega328p", "F_CPU=750000UL"),
+    ),
+    "crystal far too slow": (
+        "avr-gcc gcc-avr",
+        "BOARD_BAUD cannot be made",
+        ("PORT=atmega328p", "F_CPU=400000UL"),
+    ),
+    "RAM": (
+        "avr-gcc gcc-avr",
+        "not within region `data'",
+        ("PORT=atmega328p", "CPPFLAGS=-DNODE_PROGRAM_SIZE=1200"),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_make_says_what_is_wrong(case: str, copied: Path, require_tool: Tool) -> None:
+    needed, expected, arguments = WRONG[case]
+    if needed:
+        compiler, package = needed.split()
+        require_tool(compiler, package=package)
+    done = run("make", "-C", copied, *arguments)
+    assert done.returncode != 0
+    assert expected in done.stdout
+    assert not programs(copied / "build")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("-DPORT=moon",), "PORT=moon is no folder with a port.mk; there are:"),
+        (("-DHEADERS=/nowhere",), "copy qlink.h beside CMakeLists.txt, or say -DHEADERS=folder"),
+    ],
+)
+def test_cmake_says_what_is_wrong(
+    arguments: tuple[str, ...], expected: str, copied: Path, require_tool: Tool
+) -> None:
+    require_tool("cmake", package="cmake")
+    require_tool("cc", package="gcc")
+    done = run("cmake", "-S", copied, "-B", copied / "build", *arguments)
+    assert done.returncode != 0
+    assert expected in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("crystal", "baud"), [("14745600UL", 1843200), ("16000000UL", 38400), ("8000000UL", 1200)]
+)
+def test_rates_that_the_crystal_can_make(crystal: str, baud: int, copied: Path, require_tool: Tool) -> None:
+    require_tool("avr-gcc", package="gcc-avr")
+    board = "build/atmega328p-qlink_node.o/atmega328p/board.o"
+    sure("make", "-C", copied, "PORT=atmega328p", f"F_CPU={crystal}", f"CPPFLAGS=-DBOARD_BAUD={baud}", board)
