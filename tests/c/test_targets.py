@@ -1,25 +1,33 @@
-"""The same bytes on a big-endian machine, and the size on small ones."""
+"""The same bytes on a big-endian machine; size, stack and time on small ones, and the page about them."""
 
 from __future__ import annotations
 
 import random
-import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
+from benchmarks.firmware_budget import broken, complaints, core_goals, each_message, receiver_goal
+from benchmarks.firmware_build import AVR, CORTEX_M0, HEADERS, TARGETS, Target, Workshop
+from benchmarks.firmware_cycles import SIMAVR, build_simulator, frame
+from benchmarks.firmware_measure import measure
+from benchmarks.firmware_page import PAGE, renewed, tables, written
+from benchmarks.firmware_size import buffers, core, messages
+from benchmarks.firmware_stack import CallGraph, UnknownDepth
 from tests.c.conftest import PROTOCOLS, protocol_of
-from tests.c.test_compile import header, run
 from tests.c.test_receiver import wire_of
 from tests.support.cdriver import Driver, build, raw_text
 from tests.support.random_raw import damaged, random_address, random_values
 
+Tool = Callable[..., str]
+Missing = Callable[..., NoReturn]
+
 
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_big_endian_agrees(
-    name: str, tmp_path: Path, drivers: Callable[[str], Driver], require_tool: Callable[..., str]
+    name: str, tmp_path: Path, drivers: Callable[[str], Driver], require_tool: Tool
 ) -> None:
     compiler = require_tool("s390x-linux-gnu-gcc", package="gcc-s390x-linux-gnu")
     emulator = require_tool("qemu-s390x", package="qemu-user")
@@ -46,47 +54,91 @@ def test_big_endian_agrees(
             )
 
 
-CORE = Path(__file__).parent / "programs" / "core.c"
+def require(require_tool: Tool, missing_tool: Missing, *targets: Target) -> None:
+    """The compilers, and what runs the programs of an AVR."""
+    for target in targets:
+        require_tool(f"{target.prefix}-gcc", package=target.package)
+    require_tool("gcc", package="gcc")
+    require_tool("make", package="make")
+    if AVR in targets and not SIMAVR.exists():
+        missing_tool("simavr's library", package="libsimavr-dev")
 
 
-@dataclass(frozen=True)
-class Budget:
-    """Most bytes of text of receiver, decoder, encoder, bitwise CRC and one message; most bytes of stack."""
+def test_budget_and_page(require_tool: Tool, missing_tool: Missing) -> None:
+    # One test: what is measured is built once, some 150 programs.
+    require(require_tool, missing_tool, *TARGETS)
+    measured = measure()
+    assert complaints(measured) == []
+    slave, seen = measured.slaves["atmega328p"], measured.run.stack
+    assert (
+        0.7 * slave.main < seen <= slave.main + slave.interrupt
+    )  # the interrupt seldom hits the deepest place
+    standing, new = written(PAGE.read_text("utf-8")), tables(measured)
+    assert standing.keys() == {*new, "peers"}
+    if standing["tools"] != new["tools"]:
+        pytest.skip(
+            f"docs/firmware.md is of other compilers than {new['tools']} Its figures are not compared"
+        )
+    new["peers"] = renewed(standing["peers"], measured)
+    stale = [name for name, table in new.items() if table != standing[name]]
+    assert not stale, "run python -m benchmarks.firmware --write"
 
-    prefix: str
-    package: str
-    flags: tuple[str, ...]
-    text: int
-    stack: int
+
+# What is put into a header, behind what, and which figure must leave the budget by it.
+GROWTH = "static volatile uint8_t grown; " + "grown = (uint8_t)(grown + 1u); " * 20
+BLOWN = {
+    "receiver": ("qlink", "uint8_t position = receiver->position;", GROWTH, "one message"),
+    "encode": ("qlink", "from[2] = node;", GROWTH, "one message"),
+    "stack": ("qlink", "from[2] = node;", "volatile uint8_t deep[60]; deep[size] = 0u;", "stack"),
+    "message": ("trio", "message->offset = payload[0];", GROWTH, "keypad_offset"),
+    "ram": ("trio", "typedef struct trio_receiver {", "uint8_t spare[40];", "RAM to receive"),
+}
 
 
-ARM_FLAGS = ("-mcpu=cortex-m0", "-mthumb", "--specs=nano.specs", "--specs=nosys.specs")
-BUDGETS = [
-    pytest.param(Budget("arm-none-eabi", "gcc-arm-none-eabi", ARM_FLAGS, 450, 64), id="cortex-m0"),
-    pytest.param(Budget("avr", "gcc-avr", ("-mmcu=atmega328p",), 550, 32), id="avr"),
-]
-SLACK = 1.1
-RECEIVER_FITS = "sizeof(qlink_receiver_t) <= 10u + QLINK_MAX_PAYLOAD_SIZE"
+@pytest.mark.parametrize("part", BLOWN)
+def test_growth_breaks_the_budget(
+    part: str, tmp_path: Path, require_tool: Tool, missing_tool: Missing
+) -> None:
+    require(require_tool, missing_tool, AVR)
+    name, place, growth, noticed = BLOWN[part]
+    text = (HEADERS / f"{name}.h").read_text("utf-8")
+    assert text.count(place) == 1, f"the header has changed: {place}"
+    (tmp_path / f"{name}.h").write_text(text.replace(place, f"{place} {growth}"))
+    shop = Workshop(tmp_path, tmp_path)
+    if name == "qlink":
+        goals = core_goals(AVR, core(shop, AVR, "LOOP"))
+    else:
+        goals = each_message(AVR, name, messages(shop, AVR, name, framed=False))
+        goals.append(receiver_goal(AVR, name, buffers(shop, AVR, name)))
+    assert [goal for goal in goals if broken(goal) and goal.what.endswith(noticed)]
 
 
-@pytest.mark.parametrize("budget", BUDGETS)
-def test_size(budget: Budget, tmp_path: Path, require_tool: Callable[..., str]) -> None:
-    compiler = require_tool(f"{budget.prefix}-gcc", package=budget.package)
-    measure = require_tool(f"{budget.prefix}-size", package=budget.package)
-    header("qlink", tmp_path)
-    options = ("-std=c99", "-Os", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections", "-w")
-    common, sizes = (compiler, *budget.flags, *options, f"-I{tmp_path}"), []
-    for define in ("-DCORE", "-DEMPTY"):
-        run(*common, define, CORE, "-o", tmp_path / "core.elf")
-        sizes.append(int(run(measure, tmp_path / "core.elf").splitlines()[1].split()[0]))
-    run(*common, "-DCORE", "-fstack-usage", "-c", CORE, "-o", tmp_path / "core.o")
-    stack = {
-        name: int(size)
-        for name, size in re.findall(r":(\w+)(?:\.\S+)?\t(\d+)\t", (tmp_path / "core.su").read_text())
-    }
-    used = sizes[0] - sizes[1]
-    print(f"{budget.prefix}: {used} bytes of text, stack {stack}")
-    assert used <= budget.text * SLACK
-    assert sum(stack.values()) <= budget.stack * SLACK
-    (tmp_path / "ram.c").write_text(f'#include "qlink.h"\ntypedef char fits[({RECEIVER_FITS}) ? 1 : -1];\n')
-    run(*common, "-c", tmp_path / "ram.c", "-o", "/dev/null")
+@pytest.mark.parametrize("number", [1, 3])
+def test_the_stack_is_as_deep_as_computed(
+    number: int, tmp_path: Path, require_tool: Tool, missing_tool: Missing
+) -> None:
+    require(require_tool, missing_tool, AVR)
+    shop = Workshop(tmp_path)
+    seen = frame(shop, build_simulator(shop, "run_cycles"), "LOOP", number)
+    graph = CallGraph(AVR, tmp_path / f"avr-cycles-LOOP-{number}" / "program.elf")
+    assert (seen.receive_stack, seen.encode_stack) == (graph.depth("receive"), graph.depth("encode"))
+
+
+SOURCES = {
+    "recursion": "__attribute__((noinline)) int f(int n) { return n != 0 ? f(n - 1) * port + 1 : port; }",
+    "calls through a pointer": "int (*volatile to)(int); int f(int n) { return to(n) + 1; }",
+    "as much stack as it likes": "int f(int n) { volatile char a[n]; a[n / 2] = 1; return a[port] + port; }",
+}
+
+
+@pytest.mark.parametrize("target", [CORTEX_M0, AVR], ids=lambda target: target.name)
+@pytest.mark.parametrize("reason", SOURCES)
+def test_a_stack_without_bound_is_no_figure(
+    reason: str, target: Target, tmp_path: Path, require_tool: Tool
+) -> None:
+    require_tool(f"{target.prefix}-gcc", package=target.package)
+    text = f"volatile int port; {SOURCES[reason]} int main(void) {{ return f(port); }}"
+    (tmp_path / "program.c").write_text(text)
+    program = Workshop(tmp_path).link(target, "unbounded", tmp_path / "program.c", ["-w"])
+    with pytest.raises(UnknownDepth, match=reason):
+        CallGraph(target, program).depth("main")

@@ -38,6 +38,8 @@ DOCUMENTS = [
     "docs/timing.md",
     "docs/mc1231a.md",
     "docs/trio.md",
+    "docs/firmware.md",
+    "examples/firmware/README.md",
 ]
 MARK = r"(?:^<!-- (?P<mark>\w+): (?P<name>\S+) -->\n)?"
 BLOCK = re.compile(MARK + r"^```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -101,6 +103,7 @@ def shell(tmp_path: Path) -> Iterator[Shell]:
         **os.environ,
         "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
         "PYTHONPATH": os.pathsep.join([str(REPOSITORY), str(REPOSITORY / "generated" / "python")]),
+        "QLINKGEN": str(REPOSITORY),
     }
 
     shell = Shell(folder, environment)
@@ -130,8 +133,10 @@ def matches(expected: str, found: str) -> bool:
 def test_commands_and_files(
     document: str, shell: Shell, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
-    if any("gcc" in block.text for block in blocks(document) if block.kind == "console"):
-        require_tool("gcc", package="gcc")
+    commands = " ".join(block.text for block in blocks(document) if block.kind == "console")
+    for tool in ("gcc", "cmake"):
+        if f"{tool} " in commands:
+            require_tool(tool, package=tool)
     for block in blocks(document):
         if block.mark == "file":
             (tmp_path / "work" / block.name).write_text(block.text)

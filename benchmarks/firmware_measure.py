@@ -1,0 +1,50 @@
+"""Everything that docs/firmware.md says of size, stack and time; the tests take it from here too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.firmware_build import HEADERS, TARGETS, Workshop, temporary
+from benchmarks.firmware_cycles import Cycles, all_forms
+from benchmarks.firmware_size import PROTOCOLS, Core, Costs, Dispatch, buffers, cores, costs, dispatch
+from benchmarks.firmware_slave import PORTS, Run, Slave, replies, slave
+
+
+@dataclass(frozen=True)
+class Measured:
+    """By target: core, messages and buffers of each protocol; the AVR's cycles; the slave of each port."""
+
+    tools: str
+    core: dict[str, dict[str, Core]]
+    messages: dict[str, dict[str, Costs]]
+    buffers: dict[str, dict[str, dict[str, int]]]
+    dispatch: dict[str, dict[str, Dispatch]]
+    cycles: dict[str, Cycles]
+    slaves: dict[str, Slave]
+    run: Run
+
+
+def tools() -> str:
+    """The compilers, by which a page knows whether its figures can be compared."""
+    return ", ".join(target.version() for target in TARGETS)
+
+
+def measure(headers: Path = HEADERS) -> Measured:
+    """Build and run everything of this project's own; ToolMissing says what to install."""
+    with temporary() as folder:
+        shop = Workshop(Path(folder), headers)
+        return Measured(
+            tools=tools(),
+            core={target.name: cores(shop, target) for target in TARGETS},
+            messages={
+                target.name: {name: costs(shop, target, name) for name in PROTOCOLS} for target in TARGETS
+            },
+            buffers={
+                target.name: {name: buffers(shop, target, name) for name in PROTOCOLS} for target in TARGETS
+            },
+            dispatch={target.name: dispatch(shop, target) for target in TARGETS},
+            cycles=all_forms(shop),
+            slaves={port: slave(shop, port) for port in PORTS},
+            run=replies(shop),
+        )

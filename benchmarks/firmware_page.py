@@ -1,0 +1,257 @@
+"""The tables of docs/firmware.md: each stands between `<!-- table: NAME -->` and `<!-- end -->`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import yaml
+
+from benchmarks.firmware_budget import ALLOWANCES, LIMITS, broken, goals
+from benchmarks.firmware_build import AVR, ROOT, TARGETS, Target
+from benchmarks.firmware_cycles import CLOCK, Frame
+from benchmarks.firmware_measure import Measured
+from benchmarks.firmware_peers import Footprint
+from benchmarks.firmware_size import ANSWER, PAYLOAD, Core, Costs
+from benchmarks.firmware_slave import BAUD, PORTS
+from benchmarks.firmware_slave import CLOCK as SLAVE_CLOCK
+from benchmarks.report import Goal, as_markdown, number
+from qlinkgen_codecs import qlink
+
+PAGE = ROOT / "docs" / "firmware.md"
+DEVIATIONS = ROOT / "tests" / "c" / "deviations.yaml"
+_TABLE = re.compile(
+    r"(?P<head><!-- table: (?P<name>\w+) -->\n).*?(?P<end>^<!-- end -->$)", re.DOTALL | re.MULTILINE
+)
+
+# Clock cycles of three byte times on the line: what a slave may take before it answers.
+THREE_BYTES = 3 * CLOCK * qlink.BUS.bits_per_byte / BAUD
+
+OWN = "this header"
+FORMS = {"LOOP": "bitwise", "NIBBLE": "table of 16", "TABLE": "table of 256"}
+_CORES = {
+    **{form: f"one message, CRC {title}" for form, title in FORMS.items()},
+    ANSWER: "no message: an empty answer, CRC bitwise",
+    PAYLOAD: "no message: any payload, CRC bitwise",
+}
+_BUFFERS = {
+    "receiver": "`{0}_receiver_t`",
+    "wire": "`uint8_t wire[{1}_MAX_WIRE_SIZE]`",
+    "table": "dispatch table",
+}
+
+
+def tables(measured: Measured) -> dict[str, str]:
+    """The tables of what is this project's own, by name."""
+    return {
+        "tools": f"Compilers: {measured.tools}.",
+        "budget": _budget(measured),
+        "allowances": _allowances(),
+        "core": _core(measured),
+        "ram": _ram(measured),
+        "choice": _choice(measured),
+        "cycles": _cycles(measured),
+        "answers": _answers(measured),
+        "time": _time(measured),
+        "slave": _slave(measured),
+        "replies": _replies(measured),
+        "deviations": deviations(),
+        **{name: _messages(measured, name) for name in measured.messages[AVR.name]},
+    }
+
+
+def _budget(measured: Measured) -> str:
+    rows = [
+        [goal.what, f"{goal.measured:.0f} {goal.unit}", f"{goal.limit:.0f} {goal.unit}", _verdict(goal)]
+        for goal in goals(measured)
+    ]
+    return as_markdown(["", "measured", "budget", ""], rows)
+
+
+def _allowances() -> str:
+    rows = []
+    for (protocol, message), each in ALLOWANCES.items():
+        flash = " / ".join(str(each.flash[target.name]) for target in TARGETS)
+        rows.append(f"- {protocol}, {message}, {flash} bytes: {each.reason}")
+    chips = " / ".join(target.title for target in TARGETS)
+    return "\n".join(
+        [f"CI holds these messages to what they take now ({chips}), as they are above the budget:", "", *rows]
+    )
+
+
+def _verdict(goal: Goal) -> str:
+    if goal.met:
+        return "met"
+    return "NOT MET" if broken(goal) else "within 10 %"
+
+
+def _by_chip(*figures: str) -> list[str]:
+    return [f"{target.title} {figure}" for target in TARGETS for figure in figures]
+
+
+def _core(measured: Measured) -> str:
+    rows = []
+    for name, title in _CORES.items():
+        found = [measured.core[target.name][name] for target in TARGETS]
+        rows.append([title, *(str(each) for core in found for each in (core.size.flash, core.stack))])
+    return as_markdown(["", *_by_chip("flash", "stack")], rows)
+
+
+def _ram(measured: Measured) -> str:
+    rows = []
+    for protocol in measured.buffers[AVR.name]:
+        for key, title in _BUFFERS.items():
+            sizes = [str(measured.buffers[target.name][protocol][key]) for target in TARGETS]
+            rows.append([f"{protocol}: {title.format(protocol, protocol.upper())}", *sizes])
+    return as_markdown(["", *(target.title for target in TARGETS)], rows)
+
+
+def _choice(measured: Measured) -> str:
+    rows = []
+    for name, choice in measured.dispatch[AVR.name].items():
+        found = [measured.dispatch[target.name][name] for target in TARGETS]
+        figures = [str(each) for dispatch in found for each in (dispatch.flash, dispatch.stack)]
+        rows.append([name if name == "all" else f"`{name}`", str(choice.lines), *figures])
+    return as_markdown(["", "lines", *_by_chip("flash", "stack")], rows)
+
+
+def _messages(measured: Measured, protocol: str) -> str:
+    costs = {target: measured.messages[target.name][protocol] for target in TARGETS}
+    rows = [
+        [name, *(cell for target, each in costs.items() for cell in _message(target, each, name))]
+        for name in costs[AVR].framed.each
+    ]
+    together, mean = ["all together"], ["... for each of them"]
+    for each in costs.values():
+        together += [str(each.fields.together.flash), str(each.framed.together.flash), "", ""]
+        mean += [number(each.fields.mean), number(each.framed.mean), "", ""]
+    return as_markdown(
+        ["message", *_by_chip("get + put", "with frame", "stack", "struct")], [*rows, together, mean]
+    )
+
+
+def _message(target: Target, costs: Costs, name: str) -> list[str]:
+    framed = costs.framed.each[name]
+    behind = [str(framed.size.flash), str(framed.stack), str(costs.structs.get(name, 0))]
+    if name not in costs.fields.each:
+        return ["0", *behind]
+    flash = costs.fields.each[name].size.flash
+    return [f"**{flash}**" if flash > LIMITS[target.name].message else str(flash), *behind]
+
+
+def _cycles(measured: Measured) -> str:
+    rows = []
+    for form, title in FORMS.items():
+        cycles = measured.cycles[form]
+        rows += [[f"{title}: {name}", *map(str, _frame(frame))] for name, frame in cycles.frames.items()]
+    return as_markdown(["CRC: frame", "bytes", "encode", "receive", "for a byte", "longest call"], rows)
+
+
+def _frame(frame: Frame) -> tuple[int, ...]:
+    calls = frame.receive
+    return len(calls), frame.encode, sum(calls), round(sum(calls) / len(calls)), max(calls)
+
+
+def _time(measured: Measured) -> str:
+    """What the cycles mean on the line, in words."""
+    calls = {form: measured.cycles[form].worst_call for form in FORMS}
+    byte = THREE_BYTES / 3
+    most = 100 * max(calls.values()) / byte
+    shares = ", ".join(f"{calls[form]} cycles ({title})" for form, title in FORMS.items())
+    late = [name for name, reply in measured.run.replies.items() if reply.us > reply.allowed_us]
+    verdict = f"The slave is too late with {', '.join(late)}." if late else "The slave is never late."
+    return (
+        f"A byte takes {byte:.0f} cycles on the line at {BAUD} baud and {CLOCK / 1e6:g} MHz. The longest "
+        f"call of `qlink_receive` takes {shares}: at most {most:.0f} % of that. {verdict}"
+    )
+
+
+def _answers(measured: Measured) -> str:
+    rows = []
+    for form, title in FORMS.items():
+        for name, answer in measured.cycles[form].answers.items():
+            total, share = answer.total, answer.total / THREE_BYTES
+            cells = [
+                str(answer.last_byte),
+                str(answer.dispatch),
+                f"{1e6 * total / CLOCK:.0f} us",
+                f"{100 * share:.0f} %",
+            ]
+            rows.append([f"{title}: {name}", *cells])
+    return as_markdown(
+        ["CRC: data", "last byte", "dispatch", f"both at {CLOCK / 1e6:g} MHz", "of three byte times"], rows
+    )
+
+
+def _slave(measured: Measured) -> str:
+    rows = []
+    for port, slave in measured.slaves.items():
+        size = slave.size
+        figures = (size.text, size.data, size.bss, slave.main, slave.interrupt)
+        rows.append([f"{port} ({PORTS[port].title})", *map(str, figures)])
+    return as_markdown(["", "text", "data", "bss", "stack", "stack of interrupts"], rows)
+
+
+def _replies(measured: Measured) -> str:
+    rows = [
+        [name, str(reply.cycles), f"{reply.us:.0f} us", f"{reply.allowed_us} us"]
+        for name, reply in measured.run.replies.items()
+    ]
+    return as_markdown(["", "cycles", f"at {SLAVE_CLOCK / 1e6:g} MHz", "allowed"], rows)
+
+
+def peers(measured: Measured, found: Mapping[str, Mapping[str, Footprint]], missing: Sequence[str]) -> str:
+    """This project's core beside the peers' for the same message; those that are absent are named."""
+    rows = own_rows(measured) + [_peer(name, footprints) for name, footprints in found.items()]
+    table = as_markdown(["", *_by_chip("flash", "RAM", "stack")], rows)
+    return "\n\n".join([table, *(f"Not measured: {reason}." for reason in missing)])
+
+
+def own_rows(measured: Measured) -> list[list[str]]:
+    """The first rows of the peers' table."""
+    return [
+        _peer(f"{OWN}, CRC {FORMS[form]}", {each.name: measured.core[each.name][form] for each in TARGETS})
+        for form in ("LOOP", "TABLE")
+    ]
+
+
+def renewed(standing: str, measured: Measured) -> str:
+    """A peers' table with new rows of this project, where the peers cannot be measured."""
+    kept = [line for line in standing.splitlines()[2:] if not line.startswith(f"| {OWN}")]
+    head, mark, *own = as_markdown(["", *_by_chip("flash", "RAM", "stack")], own_rows(measured)).splitlines()
+    return "\n".join([head, mark, *own, *kept])
+
+
+def _peer(name: str, found: Mapping[str, Footprint | Core]) -> list[str]:
+    cells = [name]
+    for target in TARGETS:
+        each = found[target.name]
+        cells += [
+            str(each.size.flash),
+            str(each.size.ram),
+            "unbounded" if each.stack is None else str(each.stack),
+        ]
+    return cells
+
+
+def deviations() -> str:
+    """Findings of the static checkers that stay, with their reasons."""
+    if not DEVIATIONS.exists():
+        return "None."
+    listed = yaml.safe_load(DEVIATIONS.read_text("utf-8"))
+    rows = [[each["tool"], each["rule"], " ".join(each["reason"].split())] for each in listed]
+    head = ["| tool | rule | why it stays |", "| --- | --- | --- |"]
+    return "\n".join([*head, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def written(page: str) -> dict[str, str]:
+    """The tables that stand in a page, by name."""
+    return {
+        match["name"]: match[0].removeprefix(match["head"]).removesuffix(match["end"]).strip()
+        for match in _TABLE.finditer(page)
+    }
+
+
+def rewritten(page: str, new: Mapping[str, str]) -> str:
+    """A page with these tables; KeyError where it has none of that name, or one that nobody makes."""
+    return _TABLE.sub(lambda match: f"{match['head']}\n{new[match['name']]}\n\n{match['end']}", page)
