@@ -35,7 +35,10 @@
  *     uint8_t answer[MC1231A_MAX_WIRE_SIZE];
  *     if (mc1231a_receive(&receiver, byte) == MC1231A_EVENT_FRAME) {
  *         const mc1231a_frame_t frame = mc1231a_receiver_frame(&receiver);
- *         board_send(answer, mc1231a_slave_dispatch(&slave, &frame, answer, sizeof answer));
+ *         const size_t size = mc1231a_slave_dispatch(&slave, &frame, answer, sizeof answer);
+ *         if (size > 0U) {
+ *             board_send(answer, size);
+ *         }
  *     }
  * }
  *

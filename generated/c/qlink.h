@@ -37,7 +37,10 @@
  *     uint8_t answer[QLINK_MAX_WIRE_SIZE];
  *     if (qlink_receive(&receiver, byte) == QLINK_EVENT_FRAME) {
  *         const qlink_frame_t frame = qlink_receiver_frame(&receiver);
- *         board_send(answer, qlink_slave_dispatch(&slave, &frame, answer, sizeof answer));
+ *         const size_t size = qlink_slave_dispatch(&slave, &frame, answer, sizeof answer);
+ *         if (size > 0U) {
+ *             board_send(answer, size);
+ *         }
  *     }
  * }
  *

@@ -83,7 +83,10 @@ def _slave(names: Names, section: FrameSection, command: Command) -> list[str]:
             p,
             section,
             ["uint8_t answer[{P}_MAX_WIRE_SIZE];"],
-            "board_send(answer, {p}_slave_dispatch(&slave, &frame, answer, sizeof answer));",
+            "const size_t size = {p}_slave_dispatch(&slave, &frame, answer, sizeof answer);",
+            "if (size > 0U) {{",
+            "    board_send(answer, size);",
+            "}}",
         ),
         "",
         "void board_start(void)",
@@ -142,7 +145,7 @@ def _echo(request: Message, response: Message) -> list[str]:
     return [f"    response->{first} = 1;"] if first else ["    (void)response;"] if response.values else []
 
 
-def _receive(prefix: str, section: FrameSection, declared: list[str], handled: str) -> list[str]:
+def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: str) -> list[str]:
     """Each byte, as an interrupt or a loop brings it."""
     upper, rescans = prefix.upper(), section.rescans
     test = (
@@ -150,7 +153,7 @@ def _receive(prefix: str, section: FrameSection, declared: list[str], handled: s
         if rescans
         else "if ({p}_receive(&receiver, byte) == {P}_EVENT_FRAME) {{"
     )
-    body = ["const {p}_frame_t frame = {p}_receiver_frame(&receiver);", handled]
+    body = ["const {p}_frame_t frame = {p}_receiver_frame(&receiver);", *handled]
     if rescans:
         body = [
             "if (event == {P}_EVENT_FRAME) {{",
