@@ -93,6 +93,15 @@ def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObj
         assert described(decoder.feed(bytes((byte,)))) == expected, f"byte {at} of {wire.hex(' ')}"
 
 
+def test_skipped_bytes_are_told_of_by_the_longest_frame_that_there_can_be() -> None:
+    """Its payload may be longer than that of any message: C, and the model, count by the frame as well."""
+    machine = receiver(protocol("modbus_rtu"), "request")
+    decoder = module("modbus_rtu").StreamDecoder("request")
+    noise = bytes((0xA5,)) * 600
+    expected = [("fault", each.kind, each.offset) for byte in noise for each in machine.feed(byte)]
+    assert described(decoder.feed(noise)) == expected == [("fault", "frame", 0), ("fault", "frame", 256)]
+
+
 def test_a_frame_behind_what_may_be_a_longer_one_comes_out_at_its_last_byte() -> None:
     """00 10 in front begins a candidate whose count is wrong; the frame in it must not wait."""
     codec = module("modbus_rtu")

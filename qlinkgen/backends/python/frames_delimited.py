@@ -10,7 +10,6 @@ from qlinkgen.backends.python.place import in_hex, literal
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.frame import Checksum, DelimitedFrame, Part, Role
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.sizes import protocol_max_wire_size
 
 
 def is_unique(protocol: Protocol) -> bool:
@@ -157,7 +156,7 @@ def delimited_model(protocol: Protocol) -> dict[str, Any]:
         "header": frame.header_size,
         "trailer": trailer,
         "overhead": frame.overhead,
-        "max_frame": protocol_max_wire_size(protocol),
+        "max_frame": frame.overhead + _longest_payload(frame),
         "max_payload": frame.payload.max_size,
         "constants": _constants(frame),
         "blank_header": _blank_header(frame),
