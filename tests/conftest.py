@@ -2,6 +2,8 @@
 
 A test asks for a program by `require_tool("clang", package="clang")`. Without it the test is skipped, and the
 summary names the Debian package. With QLINKGEN_NO_SKIPS=1 nothing may be skipped: any skip is a failure.
+The one exception is a test that is marked `optional_tool("cbmc")` and has asked for that program by
+`optional_tool("cbmc", how="...")`; the summary tells of it all the same.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ import os
 import re
 import shutil
 import signal
+from collections import Counter
 from collections.abc import Callable, Generator
 from typing import NoReturn
 
@@ -21,6 +24,9 @@ NO_SKIPS = os.environ.get("QLINKGEN_NO_SKIPS", "") not in {"", "0"}
 # The notice travels as text: under xdist a report is all that reaches the process that prints the summary.
 NOTICE = "needs {what} (Debian package {package})"
 NOTICE_PATTERN = re.compile(r"needs (?P<what>.+) \(Debian package (?P<package>[^\s)]+)\)")
+
+OPTIONAL_NOTICE = "needs {tool}, which is optional: {how}"
+OPTIONAL_PATTERN = re.compile(r"needs (?P<tool>\S+), which is optional: (?P<how>.+)")
 
 # Generated code is compiled and imported inside examples, so no deadline is meaningful on a shared machine.
 settings.register_profile("dev", deadline=None)
@@ -35,8 +41,14 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) + 1
 
 
-def pytest_configure() -> None:
-    """Heed Ctrl-C and hang-ups: background jobs may not, and neither would the programs that tests start."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Heed Ctrl-C and hang-ups: background jobs may not, and neither would the programs that tests start.
+
+    Also say which marker allows a skip.
+    """
+    config.addinivalue_line(
+        "markers", "optional_tool(name): may be skipped where this program is not to be had"
+    )
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
@@ -64,23 +76,37 @@ def missing_tool() -> Callable[..., NoReturn]:
     return _missing
 
 
+@pytest.fixture(scope="session")
+def optional_tool() -> Callable[..., str]:
+    """Return a function that gives the path of a program, or skips and says how to get it."""
+
+    def find(tool: str, *, how: str) -> str:
+        return shutil.which(tool) or pytest.skip(OPTIONAL_NOTICE.format(tool=tool, how=how))
+
+    return find
+
+
 def _reason(report: pytest.TestReport | pytest.CollectReport) -> str:
     # A skip is reported as (file, line, reason).
     return report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
 
 
-def _forbid_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
+def _forbid_skip(report: pytest.TestReport | pytest.CollectReport, optional: str = "") -> None:
     # An expected failure is also reported as "skipped"; that one says something and may stay.
-    if NO_SKIPS and report.skipped and not hasattr(report, "wasxfail"):
+    if not NO_SKIPS or not report.skipped or hasattr(report, "wasxfail"):
+        return
+    found = OPTIONAL_PATTERN.search(_reason(report))
+    if not found or found["tool"] != optional:
         report.outcome = "failed"
         report.longrepr = f"QLINKGEN_NO_SKIPS allows no skip: {_reason(report)}"
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """Turn a skipped test into a failed one where nothing may be skipped."""
     report = yield
-    _forbid_skip(report)
+    marker = item.get_closest_marker("optional_tool")
+    _forbid_skip(report, marker.args[0] if marker else "")
     return report
 
 
@@ -101,12 +127,23 @@ def _skips_by_package(terminalreporter: pytest.TerminalReporter) -> dict[str, tu
     return skips
 
 
+def _optional_skips(terminalreporter: pytest.TerminalReporter) -> Counter[tuple[str, str]]:
+    reasons = [_reason(report) for report in terminalreporter.stats.get("skipped", [])]
+    found = [OPTIONAL_PATTERN.search(reason) for reason in reasons]
+    return Counter((each["tool"], each["how"]) for each in found if each)
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """List the tools that were missing, what that cost, and the one command that brings them."""
-    skips = _skips_by_package(terminalreporter)
-    if not skips:
+    skips, optional = _skips_by_package(terminalreporter), _optional_skips(terminalreporter)
+    if not skips and not optional:
         return
     terminalreporter.section("skipped for missing tools")
+    for (tool, how), count in sorted(optional.items()):
+        terminalreporter.line(
+            f"{count:5} test{'s' if count > 1 else ' '} without {tool}, which is optional: {how}"
+        )
     for package, (what, count) in sorted(skips.items()):
         terminalreporter.line(f"{count:5} test{'s' if count > 1 else ' '} without {what}: package {package}")
-    terminalreporter.line(f"To run them: apt-get install {' '.join(sorted(skips))}")
+    if skips:
+        terminalreporter.line(f"To run them: apt-get install {' '.join(sorted(skips))}")

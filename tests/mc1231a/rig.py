@@ -25,7 +25,7 @@ from qlinkgen_codecs.mc1231a import AxisStatus
 
 BAUD = 115200
 #: Seconds of host slack; in real time what a busy machine needs.
-SLACK = {"virtual": 0.002, "memory": 0.1, "pty": 0.1}
+SLACK = {"virtual": 0.002, "memory": 0.3, "pty": 0.3}
 #: Seconds after which something that must happen has not happened.
 PATIENCE = 20.0
 

@@ -28,7 +28,7 @@ from tests.qlink.behaviour_drivers import AsyncFace, Pump
 
 T = TypeVar("T")
 #: Seconds of host slack: more than the longest answer takes; in real time what a busy machine needs.
-SLACK = {"virtual": 0.012, "memory": 0.1, "pty": 0.1}
+SLACK = {"virtual": 0.012, "memory": 0.3, "pty": 0.3}
 #: An answer so late misses its deadline, and still comes while the line has to be quiet.
 LATE = (0.018, 0.024)
 HIGH = 0.15
