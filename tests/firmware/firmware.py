@@ -31,7 +31,7 @@ _OUTER_MAKE = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}
 FIFO = 255
 #: Bytes of a program that it can hold, which every port has room for.
 PROGRAM_SIZE = 512
-_NODE = f"-DNODE_FIFO={FIFO} -DNODE_PROGRAM_SIZE={PROGRAM_SIZE}"
+_NODE = f"-DNODE_DIAGNOSTICS=1 -DNODE_FIFO={FIFO} -DNODE_PROGRAM_SIZE={PROGRAM_SIZE}"
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ TARGETS = {
             (("avr/io.h", "avr-gcc", "avr-libc"), ("simavr/sim_avr.h", "cc", "libsimavr-dev")),
             goals=("program", "simulator"),
             command=("{build}/run_simavr", "{program}"),
-            # Of the baud rates that a crystal of 14.7456 MHz has: simulated bytes take their time.
-            options=f"{_NODE} -DBOARD_BAUD=921600",
+            # Of the baud rates that a crystal of 18.432 MHz has: simulated bytes take their time.
+            options=f"{_NODE} -DBOARD_BAUD=1152000",
         ),
     )
 }

@@ -24,6 +24,8 @@ PORTS = {
     "microbit": ("arm-none-eabi-gcc", "gcc-arm-none-eabi", {"qlink_node"}),
     "atmega328p": ("avr-gcc", "gcc-avr", {"qlink_node"}),
 }
+#: What every port chooses of the header: the fast form of the CRC, once.
+TABLE = "-DQLINK_CRC_FORM=QLINK_CRC_FORM_TABLE -DQLINK_CRC_SHARED_TABLE"
 # A make that has started the tests must not tell the one in here how to work, nor a user's flags.
 _OUTSIDE = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS", "CFLAGS", "CPPFLAGS", "LDFLAGS", "PYTHONPATH"}
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in _OUTSIDE}
@@ -59,20 +61,31 @@ def copied(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.fixture
-def without_python(tmp_path: Path) -> str:
-    """A PATH on which there is all that there was, but for Python and qlinkgen."""
-    folder = tmp_path / "bin"
+def path_without(folder: Path, *beginnings: str) -> str:
+    """A PATH on which there is all that there was, but for programs whose names begin so."""
     folder.mkdir()
     for place in ENVIRONMENT["PATH"].split(os.pathsep):
         for program in Path(place).glob("*"):
-            if not program.name.startswith(("python", "pip", "qlinkgen", "pypy")):
+            if not program.name.startswith(beginnings):
                 link = folder / program.name
                 if not link.is_symlink():
                     link.symlink_to(program)
     assert shutil.which("make", path=str(folder))
-    assert not shutil.which("python3", path=str(folder))
     return str(folder)
+
+
+@pytest.fixture
+def without_python(tmp_path: Path) -> str:
+    """A PATH on which there is all that there was, but for Python and qlinkgen."""
+    path = path_without(tmp_path / "bin", "python", "pip", "qlinkgen", "pypy")
+    assert not shutil.which("python3", path=path)
+    return path
+
+
+@pytest.fixture
+def only_the_host(tmp_path: Path) -> str:
+    """A PATH without compilers for other processors."""
+    return path_without(tmp_path / "host", "avr-", "arm-none-eabi-")
 
 
 def programs(folder: Path) -> set[str]:
@@ -89,6 +102,7 @@ def test_make_needs_no_python(port: str, copied: Path, without_python: str, requ
     assert programs(copied / "build") == apps
     assert "-Wconversion" in said
     assert "-Werror" in said
+    assert TABLE in said
     assert compiler not in sure("make", "-C", copied, f"PORT={port}", "apps", PATH=without_python)
 
 
@@ -103,6 +117,7 @@ def test_cmake_needs_no_python(port: str, copied: Path, without_python: str, req
     assert programs(build) == apps
     assert "-Wconversion" in said
     assert "-Werror" in said
+    assert TABLE in said
     assert " -c " not in sure("cmake", "--build", build, "--verbose", PATH=without_python)
 
 
@@ -111,11 +126,35 @@ def test_clang_builds_it_too(copied: Path, require_tool: Tool) -> None:
     sure("make", "-C", copied, f"CC={clang}", "PORT=posix", "apps")
 
 
-def test_all_are_all_ports(copied: Path) -> None:
+def test_all_are_all_ports(copied: Path, require_tool: Tool) -> None:
+    for compiler, package, _ in PORTS.values():
+        require_tool(compiler, package=package)
     planned = sure("make", "-n", "-C", copied, "all")
     for port, (_, _, apps) in PORTS.items():
         for app in apps:
             assert f"-o build/{port}-{app}" in planned
+
+
+def test_all_leaves_out_ports_without_a_compiler_and_tells(
+    copied: Path, only_the_host: str, require_tool: Tool
+) -> None:
+    require_tool("cc", package="gcc")
+    said = sure("make", "-C", copied, "all", PATH=only_the_host)
+    assert programs(copied / "build") == {"qlink_node", "trio_keypad"}
+    assert "make: atmega328p left out, no compiler avr-gcc: see atmega328p/README.md" in said
+    for port in ("lm3s6965evb", "microbit"):
+        assert f"make: {port} left out, no compiler arm-none-eabi-gcc: see {port}/README.md" in said
+
+
+def test_all_fails_where_something_does_not_compile(
+    copied: Path, only_the_host: str, require_tool: Tool
+) -> None:
+    require_tool("cc", package="gcc")
+    with (copied / "posix" / "board.c").open("a") as file:
+        file.write("#error broken\n")
+    done = run("make", "-C", copied, "all", PATH=only_the_host)
+    assert done.returncode != 0
+    assert "#error broken" in done.stdout
 
 
 def test_all_without_a_header_leaves_out_its_application(copied: Path, require_tool: Tool) -> None:
@@ -125,6 +164,7 @@ def test_all_without_a_header_leaves_out_its_application(copied: Path, require_t
     planned = sure("make", "-n", "-C", copied, "all")
     assert "build/posix-qlink_node" in planned
     assert "build/posix-trio_keypad" not in planned
+    assert "make: trio_keypad on posix left out, no trio.h" in planned
     sure("cmake", "-S", copied, "-B", copied / "build")
     planned = sure("cmake", "--build", copied / "build", "--target", "help")
     assert "posix-qlink_node" in planned
@@ -161,7 +201,6 @@ OPTIONS = {
     "STARTED": 1,
     "RATE": 0,
     "MOTOR_MS": 0,
-    "DIAGNOSTICS": 0,
 }
 
 
@@ -200,6 +239,7 @@ WRONG = {
     "app": ("", "APP=radio does not run on posix; there: qlink_node trio_keypad", ("APP=radio",)),
     "app of another port": ("", "does not run on microbit", ("PORT=microbit", "APP=trio_keypad")),
     "header": ("", "no qlink.h: copy it beside this Makefile, or say HEADERS=folder", ("HEADERS=/nowhere",)),
+    "no header at all": ("", "no qlink.h and no trio.h", ("all", "HEADERS=/nowhere")),
     "compiler": ("", "no compiler sdcc-of-old for posix: see posix/README.md", ("CC=sdcc-of-old",)),
     "long FIFO": ("cc gcc", "NODE_FIFO must be 1 to 255", ("CPPFLAGS=-DNODE_FIFO=256",)),
     "no FIFO": ("cc gcc", "NODE_FIFO must be 1 to 255", ("CPPFLAGS=-DNODE_FIFO=0",)),
@@ -256,8 +296,34 @@ def test_cmake_says_what_is_wrong(
     assert expected in " ".join(done.stdout.split())
 
 
+def test_cmake_keeps_a_folder_to_one_port(copied: Path, require_tool: Tool) -> None:
+    require_tool("cmake", package="cmake")
+    require_tool("cc", package="gcc")
+    configure = ("cmake", "-S", copied, "-B", copied / "build")
+    sure(*configure)
+    done = run(*configure, "-DPORT=microbit")
+    assert done.returncode != 0
+    said = " ".join(done.stdout.split())
+    assert "PORT=microbit, but" in said
+    assert "was begun for PORT=posix" in said
+    assert "take another folder (-B), or delete this one" in said
+    sure(*configure, "-DPORT=posix")
+
+
+@pytest.mark.parametrize("baud", [9600, 19200])
+@pytest.mark.parametrize("port", PORTS)
+def test_slow_lines(port: str, baud: int, copied: Path, require_tool: Tool) -> None:
+    compiler, package, apps = PORTS[port]
+    require_tool(compiler, package=package)
+    for app in apps:
+        objects = f"build/{port}-{app}.o"
+        goals = (f"{objects}/{port}/board.o", f"{objects}/{app}/main.o")
+        sure("make", "-C", copied, f"PORT={port}", f"APP={app}", f"CPPFLAGS=-DBOARD_BAUD={baud}", *goals)
+
+
 @pytest.mark.parametrize(
-    ("crystal", "baud"), [("14745600UL", 1843200), ("16000000UL", 38400), ("8000000UL", 1200)]
+    ("crystal", "baud"),
+    [("18432000UL", 2304000), ("14745600UL", 1843200), ("16000000UL", 38400), ("8000000UL", 1200)],
 )
 def test_rates_that_the_crystal_can_make(crystal: str, baud: int, copied: Path, require_tool: Tool) -> None:
     require_tool("avr-gcc", package="gcc-avr")

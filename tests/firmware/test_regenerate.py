@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -123,6 +125,19 @@ def test_follows_the_schema_and_only_the_schema(project: Project) -> None:
     project.schema.touch()  # newer, and the same: what is made stays, and is not compiled again
     assert "Building" not in project.build()
     assert project.stamp.stat().st_mtime_ns != changed
+
+
+def test_the_project_of_the_readme(project: Project) -> None:
+    found = re.search(r"```cmake\n(.*?)```", (SOURCES / "README.md").read_text("utf-8"), re.DOTALL)
+    assert found
+    project.write()
+    (project.folder / "CMakeLists.txt").write_text(found[1], "utf-8")
+    (project.folder / "cmake").mkdir()
+    shutil.copy(SOURCES / "cmake" / "Qlinkgen.cmake", project.folder / "cmake")
+    program = f"-DQLINKGEN_EXECUTABLE={';'.join(project.executable)}"
+    sure("cmake", "-S", project.folder, "-B", project.build_folder, program, PYTHONPATH=str(ROOT))
+    project.build()
+    assert sure(project.build_folder / "firmware").split() == ["115200", "1"]
 
 
 def test_follows_its_options(project: Project) -> None:

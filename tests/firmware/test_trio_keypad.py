@@ -28,8 +28,10 @@ from tests.firmware.firmware import HANGS, Firmware
 from tests.firmware.fixtures import BuildFirmware
 
 TARGETS = ("posix", "lm3s6965evb")
+#: Lets a keypad tell what is inside.
+DIAGNOSTIC = "-DKEYPAD_DIAGNOSTICS=1"
 #: The program that tests talk to waits for longer than a busy machine ever stops it for.
-PATIENT = "-DKEYPAD_PATIENCE=20000"
+PATIENT = f"{DIAGNOSTIC} -DKEYPAD_PATIENCE=20000"
 MESSAGES = 300
 KEYPAD = 10  # the next node along the ring
 #: Ends a message that was found broken after its head had gone.
@@ -362,7 +364,7 @@ def test_silence_ends_a_message(build_firmware: BuildFirmware) -> None:
     text = trio.CharacterTransfer(address=3, characters="never ends").to_frame()
     passed = trio.CharacterTransfer(address=2, characters="never ends").to_frame()
     with (
-        Firmware("posix", build_firmware("posix", "trio_keypad")) as firmware,
+        Firmware("posix", build_firmware("posix", "trio_keypad", DIAGNOSTIC)) as firmware,
         open_port(firmware.path) as port,
     ):
         port.write(trio.KeypadOffset(address=1, offset=1).to_frame())
@@ -378,7 +380,7 @@ def test_silence_ends_a_message(build_firmware: BuildFirmware) -> None:
 
 
 def test_without_diagnostics_it_is_an_ordinary_keypad(build_firmware: BuildFirmware) -> None:
-    program = build_firmware("posix", "trio_keypad", "-DKEYPAD_DIAGNOSTICS=0")
+    program = build_firmware("posix", "trio_keypad")
     text = trio.CharacterTransfer(address=2, characters="through").to_frame()
     with Firmware("posix", program) as firmware, open_port(firmware.path) as port:
         port.write(trio.KeypadOffset(address=1, offset=1).to_frame())

@@ -1,5 +1,6 @@
 /*
- * ATmega328P. USART0 on PD0 and PD1, direction of the RS485 driver on PD2 (1: transmit).
+ * ATmega328P. USART0 on PD0 and PD1, direction of the RS485 driver on PD2 (1: transmit). PD0 has its pull-up: RO floats
+ * while the node sends.
  * Inputs 1 to 6 are PC0 to PC5, with pull-ups: a contact to ground is a 1. Outputs 1 to 6 are PB0 to PB5.
  */
 #include "board.h"
@@ -8,23 +9,25 @@
 #include <avr/io.h>
 #include <avr/sleep.h>
 #include <util/atomic.h>
+#include <util/delay.h>
 
 #include "line.h"
 
-/* Double speed: eight clocks a bit. */
-#define BAUD_SETTING ((F_CPU + 4 * BOARD_BAUD) / (8 * BOARD_BAUD) - 1)
-#define BAUD_CLOCKS (8 * (BAUD_SETTING + 1) * BOARD_BAUD) /* F_CPU, if the rate were exact */
+/* Double speed: eight clocks a bit. An int has 16 bits here, so the numbers say that they are long. */
+#define BAUD_SETTING ((F_CPU + 4UL * BOARD_BAUD) / (8UL * BOARD_BAUD) - 1UL)
+#define BAUD_CLOCKS (8UL * (BAUD_SETTING + 1UL) * BOARD_BAUD) /* F_CPU, if the rate were exact */
 #if BAUD_SETTING > 4095 || 50 * BAUD_CLOCKS > 51 * F_CPU || 50 * BAUD_CLOCKS < 49 * F_CPU
-#error "BOARD_BAUD cannot be made from F_CPU within 2 %: take a crystal for baud rates, such as 14.7456 MHz"
+#error "BOARD_BAUD cannot be made from F_CPU within 2 %: take a crystal for baud rates, such as 18.432 MHz"
 #endif
 
 #define TICK_CLOCKS ((F_CPU + 500) / 1000) /* one millisecond */
 
 #define RING_SIZE 128u /* a power of two; the longest request has to fit */
 #define DRIVER _BV(PD2)
+#define RECEIVER _BV(PD0)
 #define PINS 0x3Fu /* of port B, and of port C */
 
-static uint8_t ring[RING_SIZE];
+static volatile uint8_t ring[RING_SIZE]; /* volatile too: a place is read before it counts as taken */
 static volatile uint8_t written; /* both count on and wrap; their difference is what waits */
 static volatile uint8_t taken;
 static volatile uint16_t overruns;
@@ -61,10 +64,10 @@ ISR(USART_RX_vect)
 
 void board_start(void)
 {
+    PORTD = RECEIVER; /* its pull-up; the direction pin first of all, and low */
+    DDRD = DRIVER;
     PORTC = PINS;
     DDRB = PINS;
-    DDRD = DRIVER;
-    board_driver(false);
 
     OCR1A = (uint16_t)(TICK_CLOCKS - 1); /* before the timer runs, or it would begin with a period of one clock */
     TIMSK1 = _BV(OCIE1A);
@@ -93,6 +96,10 @@ bool board_receive(uint8_t *byte)
 void board_send(const uint8_t *bytes, size_t size)
 {
     size_t index;
+    if (size == 0u) {
+        return; /* no stop bit would ever come */
+    }
+    _delay_us(BOARD_TURNAROUND_US);
     board_driver(true);
     for (index = 0u; index < size; ++index) {
         while ((UCSR0A & _BV(UDRE0)) == 0u) {

@@ -2,9 +2,8 @@
  * Board: Stellaris LM3S6965 (Cortex-M3, 50 MHz), for example its evaluation board, which QEMU calls lm3s6965evb.
  * Register and bit names are those of the data sheet.
  *
- * The FIFO of the UART asks for an interrupt with the second byte, or 32 bit times after the last one. Those would be
- * more than the three byte times in which a Q.link slave answers, so a timer looks after each byte time as well, as
- * long as bytes come.
+ * The UART works without its FIFO. That would tell of a single byte only 32 bit times after it, and a Q.link slave has
+ * to answer within 30. Without it every byte interrupts at once, and has to be taken before the next one is complete.
  */
 #include "board.h"
 
@@ -27,7 +26,6 @@
 #define RCC_SYSDIV (15u << 23)
 #define RCC_SYSDIV_4 (3u << 23)
 #define RCGC1_UART0 (1u << 0)
-#define RCGC1_TIMER0 (1u << 16)
 #define RCGC2_PORTS 0x33u /* A, B, E, F */
 
 #define UART_DR REGISTER(0x4000C000u)
@@ -36,29 +34,18 @@
 #define UART_FBRD REGISTER(0x4000C028u)
 #define UART_LCRH REGISTER(0x4000C02Cu)
 #define UART_CTL REGISTER(0x4000C030u)
-#define UART_IFLS REGISTER(0x4000C034u)
 #define UART_IM REGISTER(0x4000C038u)
-#define UART_ICR REGISTER(0x4000C044u)
+#define DR_FE (1u << 8)
+#define DR_BE (1u << 10)
 #define DR_OE (1u << 11)
 #define FR_BUSY (1u << 3)
 #define FR_RXFE (1u << 4)
 #define FR_TXFF (1u << 5)
-#define LCRH_FEN (1u << 4)
 #define LCRH_WLEN_8 (3u << 5)
 #define CTL_UARTEN (1u << 0)
 #define CTL_TXE (1u << 8)
 #define CTL_RXE (1u << 9)
 #define IM_RX (1u << 4)
-#define IM_RT (1u << 6)
-
-#define TIMER_TAMR REGISTER(0x40030004u)
-#define TIMER_CTL REGISTER(0x4003000Cu)
-#define TIMER_IMR REGISTER(0x40030018u)
-#define TIMER_ICR REGISTER(0x40030024u)
-#define TIMER_TAILR REGISTER(0x40030028u)
-#define TAMR_ONE_SHOT 1u
-#define CTL_TAEN 1u
-#define IMR_TATO 1u
 
 #define PORT_A 0x40004000u
 #define PORT_B 0x40005000u
@@ -76,26 +63,31 @@
 #define SYST_CVR REGISTER(0xE000E018u)
 #define NVIC_ISER0 REGISTER(0xE000E100u)
 #define IRQ_UART0 (1u << 5)
-#define IRQ_TIMER0A (1u << 19)
 
 /* Wiring. */
-#define PIN_RX_TX 0x03u     /* PA0, PA1 */
-#define PIN_DIRECTION 0x01u /* PB0: high while sending */
+#define PIN_RX 0x01u        /* PA0 */
+#define PIN_TX 0x02u        /* PA1 */
+#define PIN_DIRECTION 0x01u /* PB0: high while sending; 10 kOhm to ground at DE hold it low until here */
 #define PIN_BUTTONS 0x0Fu   /* PE0 to PE3: inputs 1 to 4, low when pressed */
 #define PIN_SELECT 0x02u    /* PF1: input 5, low when pressed */
 #define PIN_LEDS 0x0Du      /* PF0, PF2, PF3: outputs 1 to 3 */
 
 #define CLOCK 50000000ul
 #define DIVISOR ((8u * CLOCK / BOARD_BAUD + 1u) / 2u) /* of 16 times the baud, in steps of 1/64 */
-#define BYTE_TIME (10u * CLOCK / BOARD_BAUD)          /* in clocks */
-#define LOOKS 4u                                      /* byte times without a byte until the timer rests */
+#define CLOCKS_64 (4u * CLOCK) /* 64 steps of the divisor, 16 times the baud: DIVISOR * baud, if the rate were exact */
+#if DIVISOR < 64u || DIVISOR > 4194303u
+#error "BOARD_BAUD does not fit the divider of the UART: 48 to 3125000 baud"
+#elif 50u * DIVISOR * BOARD_BAUD > 51u * CLOCKS_64 || 50u * DIVISOR * BOARD_BAUD < 49u * CLOCKS_64
+#error "BOARD_BAUD cannot be made from 50 MHz within 2 %"
+#endif
+
+#define TICK_CLOCKS (CLOCK / 1000u)
 
 static volatile uint8_t ring[256]; /* its indices wrap by themselves */
 static volatile uint8_t head;
 static volatile uint8_t tail;
 static volatile uint16_t overruns;
 static volatile uint32_t milliseconds;
-static uint8_t looks;
 
 static void start_clock(void)
 {
@@ -107,7 +99,7 @@ static void start_clock(void)
     while ((SYSCTL_RIS & RIS_PLLLRIS) == 0u) {
     }
     SYSCTL_RCC &= ~RCC_BYPASS;
-    SYST_RVR = CLOCK / 1000u - 1u;
+    SYST_RVR = TICK_CLOCKS - 1u;
     SYST_CVR = 0u;
     SYST_CSR = 7u; /* on, interrupt, processor clock */
 }
@@ -119,8 +111,6 @@ static void start_pins(void)
     GPIO_DATA(PORT_B, PIN_DIRECTION) = 0u;
     GPIO_DIR(PORT_B) |= PIN_DIRECTION;
     GPIO_DEN(PORT_B) |= PIN_DIRECTION;
-    GPIO_AFSEL(PORT_A) |= PIN_RX_TX;
-    GPIO_DEN(PORT_A) |= PIN_RX_TX;
     GPIO_PUR(PORT_E) |= PIN_BUTTONS;
     GPIO_DEN(PORT_E) |= PIN_BUTTONS;
     GPIO_PUR(PORT_F) |= PIN_SELECT;
@@ -130,59 +120,45 @@ static void start_pins(void)
 
 static void start_uart(void)
 {
-    SYSCTL_RCGC1 |= RCGC1_UART0 | RCGC1_TIMER0;
+    SYSCTL_RCGC1 |= RCGC1_UART0;
     (void)SYSCTL_RCGC1;
     UART_IBRD = DIVISOR / 64u;
     UART_FBRD = DIVISOR % 64u;
-    UART_LCRH = LCRH_WLEN_8 | LCRH_FEN;
-    UART_IFLS = 0u; /* 2 of 16 bytes */
-    UART_IM = IM_RX | IM_RT;
+    UART_LCRH = LCRH_WLEN_8;
+    UART_IM = IM_RX;
     UART_CTL = CTL_UARTEN | CTL_TXE | CTL_RXE;
-    TIMER_TAMR = TAMR_ONE_SHOT;
-    TIMER_TAILR = BYTE_TIME;
-    TIMER_IMR = IMR_TATO;
-    NVIC_ISER0 = IRQ_UART0 | IRQ_TIMER0A;
+    GPIO_PUR(PORT_A) |= PIN_RX; /* RO of the driver floats while /RE is high */
+    GPIO_AFSEL(PORT_A) |= PIN_RX | PIN_TX;
+    GPIO_DEN(PORT_A) |= PIN_RX | PIN_TX;
+    NVIC_ISER0 = IRQ_UART0;
 }
 
 void board_start(void)
 {
+    start_pins(); /* first, since the clock takes milliseconds: the driver is off from here on */
     start_clock();
-    start_pins();
     start_uart();
 }
 
-/* Where the ring is full the rest waits in the FIFO for the next look. */
-static void take_waiting(void)
+/* Reading DR is the acknowledgement. Where the ring is full the byte waits in the UART until board_receive. A byte
+ * without its stop bit is dropped: the frame it belongs to is lost, and the receiver finds the next one. */
+void uart0_interrupt(void)
 {
     while ((UART_FR & FR_RXFE) == 0u) {
         uint32_t data;
-        looks = LOOKS;
         if ((uint8_t)(head + 1u) == tail) {
+            UART_IM = 0u;
             break;
         }
         data = UART_DR;
-        ring[head] = (uint8_t)data;
-        ++head;
         if ((data & DR_OE) != 0u && overruns != UINT16_MAX) {
-            ++overruns; /* the FIFO was full before this byte */
+            ++overruns; /* a byte came while another one was still here */
+        }
+        if ((data & (DR_FE | DR_BE)) == 0u) {
+            ring[head] = (uint8_t)data;
+            ++head;
         }
     }
-    if (looks > 0u) {
-        --looks;
-        TIMER_CTL = CTL_TAEN;
-    }
-}
-
-void uart0_interrupt(void)
-{
-    UART_ICR = IM_RX | IM_RT; /* first: a byte that comes from here on asks again */
-    take_waiting();
-}
-
-void timer0a_interrupt(void)
-{
-    TIMER_ICR = IMR_TATO;
-    take_waiting();
 }
 
 void systick_interrupt(void)
@@ -197,11 +173,29 @@ bool board_receive(uint8_t *byte)
     }
     *byte = ring[tail];
     ++tail;
+    UART_IM = IM_RX; /* there is room again */
     return true;
 }
 
+static void wait_microseconds(uint32_t duration)
+{
+    uint32_t before = SYST_CVR;
+    uint32_t left = duration * (CLOCK / 1000000u);
+    while (left > 0u) {
+        const uint32_t now = SYST_CVR; /* counts down to 0, then begins at the top */
+        const uint32_t gone = before >= now ? before - now : before + TICK_CLOCKS - now;
+        left -= gone < left ? gone : left;
+        before = now;
+    }
+}
+
+/* Nothing ends the waiting for the UART: it needs its clock only, and that is the processor's. */
 void board_send(const uint8_t *bytes, size_t size)
 {
+    if (size == 0u) {
+        return;
+    }
+    wait_microseconds(BOARD_TURNAROUND_US);
     board_driver(true);
     for (size_t index = 0u; index < size; ++index) {
         while ((UART_FR & FR_TXFF) != 0u) {

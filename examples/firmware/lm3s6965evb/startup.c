@@ -15,7 +15,6 @@ int main(void);
 void reset(void);
 void systick_interrupt(void);
 void uart0_interrupt(void);
-void timer0a_interrupt(void);
 
 void reset(void)
 {
@@ -32,7 +31,8 @@ void reset(void)
     }
 }
 
-/* A fault, or an interrupt that nobody has asked for. A reset makes all pins inputs, so the line is released. */
+/* A fault, or an interrupt that nobody has asked for. A reset makes all pins inputs: the line is released where 10 kOhm
+ * at DE pull it low, and is held by nobody knows whom where DE floats. */
 static void fault(void)
 {
     *(volatile uint32_t *)0xE000ED0Cu = 0x05FA0004u; /* AIRCR: SYSRESETREQ */
@@ -58,6 +58,5 @@ __attribute__((section(".vectors"), used)) static const struct vectors vectors =
         [5] = fault, /* usage */
         [14] = systick_interrupt,
         [INTERRUPT(5)] = uart0_interrupt,
-        [INTERRUPT(19)] = timer0a_interrupt,
     },
 };

@@ -26,14 +26,18 @@
 #define UART_BAUDRATE REGISTER(0x40002524u)
 #define INTEN_RXDRDY (1u << 2)
 #define ENABLE_ENABLED 4u
-#define ERRORSRC_OVERRUN 1u
+#define ERRORSRC_OVERRUN (1u << 0)
+#define ERRORSRC_FRAMING (1u << 2)
+#define ERRORSRC_BREAK (1u << 3)
 
 #define TIMER_TASKS_START REGISTER(0x40008000u)
+#define TIMER_TASKS_CAPTURE1 REGISTER(0x40008044u)
 #define TIMER_EVENTS_COMPARE0 REGISTER(0x40008140u)
 #define TIMER_SHORTS REGISTER(0x40008200u)
 #define TIMER_INTENSET REGISTER(0x40008304u)
 #define TIMER_PRESCALER REGISTER(0x40008510u)
 #define TIMER_CC0 REGISTER(0x40008540u)
+#define TIMER_CC1 REGISTER(0x40008544u)
 #define SHORTS_COMPARE0_CLEAR 1u
 #define INTEN_COMPARE0 (1u << 16)
 
@@ -55,7 +59,8 @@
 #ifndef BOARD_PIN_RXD
 #define BOARD_PIN_RXD 25u
 #endif
-#define PIN_DIRECTION 16u /* P16 of the edge connector: high while sending */
+/* P16 of the edge connector: high while sending; 10 kOhm to ground at DE hold it low until board_start. */
+#define PIN_DIRECTION 16u
 #define PIN_BUTTON_A 17u  /* input 1, low when pressed */
 #define PIN_BUTTON_B 26u  /* input 2, low when pressed */
 #define PIN_OUTPUT_1 3u   /* P0 of the edge connector */
@@ -63,7 +68,17 @@
 #define PIN_OUTPUT_3 1u   /* P2 */
 
 /* The baud rate in units of 16 MHz / 2^32, of which the chip takes the upper 20 bits. */
-#define BAUDRATE ((uint32_t)((((uint64_t)BOARD_BAUD << 32) / 16000000u + 0x800u) & 0xFFFFF000u))
+#define STEPS 0x100000000ull
+#define CLOCK 16000000u
+#define BAUDRATE ((BOARD_BAUD * STEPS / CLOCK + 0x800u) / 0x1000u * 0x1000u)
+#if BOARD_BAUD < 1200u || BOARD_BAUD > 1000000u
+#error "BOARD_BAUD must be 1200 to 1000000: the UART has no others"
+#elif 50u * BAUDRATE * CLOCK > 51u * BOARD_BAUD * STEPS || 50u * BAUDRATE * CLOCK < 49u * BOARD_BAUD * STEPS
+#error "BOARD_BAUD cannot be made from 16 MHz within 2 %"
+#endif
+
+#define BIT_US ((1000000u + BOARD_BAUD - 1u) / BOARD_BAUD) /* rounded up */
+#define TICK_US 1000u
 
 static volatile uint8_t ring[256]; /* its indices wrap by themselves */
 static volatile uint8_t head;
@@ -77,7 +92,7 @@ static void start_clock(void)
     while (CLOCK_EVENTS_HFCLKSTARTED == 0u) {
     }
     TIMER_PRESCALER = 4u; /* 1 MHz */
-    TIMER_CC0 = 1000u;
+    TIMER_CC0 = TICK_US;
     TIMER_SHORTS = SHORTS_COMPARE0_CLEAR;
     TIMER_INTENSET = INTEN_COMPARE0;
     TIMER_TASKS_START = 1u;
@@ -98,7 +113,7 @@ static void start_uart(void)
 {
     UART_PSELTXD = BOARD_PIN_TXD;
     UART_PSELRXD = BOARD_PIN_RXD;
-    UART_BAUDRATE = BAUDRATE;
+    UART_BAUDRATE = (uint32_t)BAUDRATE;
     UART_ENABLE = ENABLE_ENABLED;
     UART_EVENTS_RXDRDY = 0u;
     UART_INTENSET = INTEN_RXDRDY;
@@ -108,8 +123,8 @@ static void start_uart(void)
 
 void board_start(void)
 {
+    start_pins(); /* first, since the crystal takes its time: the driver is off from here on */
     start_clock();
-    start_pins();
     start_uart();
     NVIC_ISER = IRQ_UART0 | IRQ_TIMER0;
 }
@@ -121,10 +136,27 @@ static void count_overrun(void)
     }
 }
 
+/* What was wrong since it was last asked. */
+static uint32_t take_errors(void)
+{
+    const uint32_t errors = UART_ERRORSRC;
+    UART_ERRORSRC = errors; /* a 1 clears */
+    return errors;
+}
+
 /* The chip has a FIFO of six bytes behind RXD. Each byte that moves into RXD sets the event; cleared behind the
- * reading, it would hide the next one. Where the ring is full the rest waits in the FIFO until board_receive. */
+ * reading, it would hide the next one. Where the ring is full the rest waits in the FIFO until board_receive. A byte
+ * without its stop bit is dropped: the frame it belongs to is lost, and the receiver finds the next one. */
 void uart0_interrupt(void)
 {
+    const uint32_t errors = take_errors();
+    if ((errors & ERRORSRC_OVERRUN) != 0u) {
+        count_overrun();
+    }
+    if ((errors & (ERRORSRC_FRAMING | ERRORSRC_BREAK)) != 0u && UART_EVENTS_RXDRDY != 0u) {
+        UART_EVENTS_RXDRDY = 0u;
+        (void)UART_RXD;
+    }
     while (UART_EVENTS_RXDRDY != 0u) {
         if ((uint8_t)(head + 1u) == tail) {
             UART_INTENCLR = INTEN_RXDRDY;
@@ -133,10 +165,6 @@ void uart0_interrupt(void)
         UART_EVENTS_RXDRDY = 0u;
         ring[head] = (uint8_t)UART_RXD;
         ++head;
-    }
-    if ((UART_ERRORSRC & ERRORSRC_OVERRUN) != 0u) {
-        UART_ERRORSRC = ERRORSRC_OVERRUN;
-        count_overrun();
     }
 }
 
@@ -157,9 +185,32 @@ bool board_receive(uint8_t *byte)
     return true;
 }
 
-/* There is no buffer behind TXD: the event tells that a byte has been sent altogether. */
+static uint32_t microseconds(void)
+{
+    TIMER_TASKS_CAPTURE1 = 1u;
+    return TIMER_CC1;
+}
+
+static void wait_microseconds(uint32_t duration)
+{
+    uint32_t before = microseconds();
+    uint32_t left = duration + (duration > 0u ? 1u : 0u); /* the first may be over already */
+    while (left > 0u) {
+        const uint32_t now = microseconds(); /* begins at 0 with every tick */
+        const uint32_t gone = now >= before ? now - before : now + TICK_US - before;
+        left -= gone < left ? gone : left;
+        before = now;
+    }
+}
+
+/* The event tells that a byte has been sent, and there is no buffer behind TXD. Nothing ends the waiting for it: it
+ * needs the crystal only, from which the processor runs as well. */
 void board_send(const uint8_t *bytes, size_t size)
 {
+    if (size == 0u) {
+        return;
+    }
+    wait_microseconds(BOARD_TURNAROUND_US);
     board_driver(true);
     for (size_t index = 0u; index < size; ++index) {
         UART_EVENTS_TXDRDY = 0u;
@@ -167,6 +218,7 @@ void board_send(const uint8_t *bytes, size_t size)
         while (UART_EVENTS_TXDRDY == 0u) {
         }
     }
+    wait_microseconds(BIT_US); /* the manual does not say whether the stop bit has gone, too */
     board_driver(false);
 }
 

@@ -31,7 +31,8 @@ void reset(void)
     }
 }
 
-/* A fault, or an interrupt that nobody has asked for. A reset makes all pins inputs, so the line is released. */
+/* A fault, or an interrupt that nobody has asked for. A reset makes all pins inputs: the line is released where 10 kOhm
+ * at DE pull it low, and is held by nobody knows whom where DE floats. */
 static void fault(void)
 {
     *(volatile uint32_t *)0xE000ED0Cu = 0x05FA0004u; /* AIRCR: SYSRESETREQ */

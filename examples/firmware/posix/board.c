@@ -111,6 +111,9 @@ void board_wait(void)
 void board_send(const uint8_t *bytes, size_t size)
 {
     struct pollfd waiting = { .fd = line, .events = POLLOUT };
+    if (size == 0u) {
+        return;
+    }
     board_driver(true);
     while (size > 0u && poll(&waiting, 1, SEND_MS) > 0) {
         const ssize_t sent = write(line, bytes, size);

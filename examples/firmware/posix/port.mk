@@ -1,4 +1,4 @@
-# A process on a pty: Linux and macOS.
+# A process on a pty: Linux, and macOS untested.
 SIZE = size
 SUFFIX =
 APPS = qlink_node trio_keypad

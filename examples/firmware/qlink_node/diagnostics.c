@@ -24,18 +24,11 @@ void diagnostics_init(diagnostics_t *diagnostics)
     diagnostics->text_check = qlink_check_start();
     diagnostics->forced = false;
     diagnostics->configuring = false;
+    diagnostics->own = false;
     diagnostics->size = 0u;
 }
 
 /* ---- What the node reports ---- */
-
-void diagnostics_frame(node_t *node, const qlink_frame_t *frame)
-{
-    if ((frame->node == node->slave.node || frame->node == QLINK_BROADCAST) &&
-        qlink_request_check(frame) == QLINK_OK) {
-        COUNT(node, requests);
-    }
-}
 
 void diagnostics_words(node_t *node, const uint16_t *words, uint8_t count)
 {
@@ -212,9 +205,20 @@ static bool configure(node_t *node, arguments_t *arguments)
     return true;
 }
 
-void diagnostics_settle(node_t *node)
+/* What was answered is a request to this node. Only what was not is looked at once more: no answer waits for it. */
+static bool is_request(const node_t *node, const qlink_frame_t *frame, size_t size)
+{
+    return size > 0u ||
+        ((frame->node == node->slave.node || frame->node == QLINK_BROADCAST) && qlink_request_check(frame) == QLINK_OK);
+}
+
+void diagnostics_handled(node_t *node, const qlink_frame_t *frame, size_t size)
 {
     diagnostics_t *const diagnostics = &node->diagnostics;
+    if (!diagnostics->own && is_request(node, frame, size)) {
+        COUNT(node, requests);
+    }
+    diagnostics->own = false;
     if (diagnostics->configuring && diagnostics->size == 0u) {
         const node_settings_t settings = diagnostics->settings; /* power-up clears the one that it is in */
         node_power_up(node, &settings, board_inputs(), node->now);
@@ -324,7 +328,7 @@ bool diagnostics_take(node_t *node, const qlink_motor_request_request_t *request
     if (request->motor_data_size < MARK_SIZE || data[0] != MARK_1 || data[1] != MARK_2) {
         return false;
     }
-    --diagnostics->counters.requests;
+    diagnostics->own = true;
     diagnostics->configuring = false;
     diagnostics->size = 0u;
     if (request->motor_data_size > MARK_SIZE) {
@@ -347,7 +351,7 @@ bool diagnostics_poll(node_t *node, qlink_motor_response_poll_response_t *respon
     if (diagnostics->size == 0u) {
         return false;
     }
-    --diagnostics->counters.requests;
+    diagnostics->own = true;
     response->last_completion = QLINK_MOTOR_REQUEST_REQUEST_ID;
     response->motor_data_size = diagnostics->size;
     for (index = 0u; index < diagnostics->size; ++index) {

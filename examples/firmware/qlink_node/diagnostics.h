@@ -4,7 +4,7 @@
  * once: the operation and its data; FF and the operation where it is unknown or its arguments are wrong. A request of
  * the motor that is under way is not disturbed. Numbers are big-endian. Neither message counts in any counter.
  *
- * -DNODE_DIAGNOSTICS=0 leaves out all of it: then 7E D1 goes to the motor like anything else.
+ * Only a build with -DNODE_DIAGNOSTICS=1 has it; in any other one 7E D1 goes to the motor like anything else.
  */
 #ifndef DIAGNOSTICS_H
 #define DIAGNOSTICS_H
@@ -79,6 +79,7 @@ typedef struct diagnostics {
     uint32_t inputs;       /* that take the place of the pins */
     bool forced;           /* they do */
     bool configuring;      /* power-up when the answer has been told */
+    bool own;              /* the request that is being handled is one of these, and counts nowhere */
     uint8_t size;          /* of the answer that waits, 0 when there is none */
     uint8_t answer[MOTOR_MAX_DATA];
     node_settings_t settings; /* for that power-up */
@@ -89,9 +90,6 @@ typedef struct diagnostics {
 #define COUNT_MORE(node, counter, number) ((void)((node)->diagnostics.counters.counter += (number)))
 
 void diagnostics_init(diagnostics_t *diagnostics);
-
-/* Counts a frame if it is a request to this node. */
-void diagnostics_frame(node_t *node, const qlink_frame_t *frame);
 
 /* Goes on with the CRC over the path words, and with that over the program's text (begun again by an opening). */
 void diagnostics_words(node_t *node, const uint16_t *words, uint8_t count);
@@ -104,8 +102,9 @@ bool diagnostics_take(node_t *node, const qlink_motor_request_request_t *request
 /* Returns whether there was an answer to tell. */
 bool diagnostics_poll(node_t *node, qlink_motor_response_poll_response_t *response);
 
-/* Does what was put off until the answer was made. */
-void diagnostics_settle(node_t *node);
+/* Counts a frame that was handled, if it is a request to this node, and does what was put off until its answer was
+ * made: `size` bytes, 0 for none. */
+void diagnostics_handled(node_t *node, const qlink_frame_t *frame, size_t size);
 
 /* The inputs: those of the board, unless they are forced. */
 uint32_t diagnostics_inputs(const node_t *node, uint32_t inputs);
@@ -116,13 +115,12 @@ typedef uint8_t diagnostics_t;
 #define COUNT(node, counter) ((void)(node))
 #define COUNT_MORE(node, counter, number) ((void)(node), (void)(number))
 #define diagnostics_init(diagnostics) ((void)(diagnostics))
-#define diagnostics_frame(node, frame) ((void)(node), (void)(frame))
 #define diagnostics_words(node, words, count) ((void)(node))
 #define diagnostics_text(node, text, size) ((void)(node))
 #define diagnostics_opened(node) ((void)(node))
 #define diagnostics_take(node, request) ((void)(node), false)
 #define diagnostics_poll(node, response) ((void)(node), false)
-#define diagnostics_settle(node) ((void)(node))
+#define diagnostics_handled(node, frame, size) ((void)(node), (void)(frame), (void)(size))
 #define diagnostics_inputs(node, inputs) ((void)(node), (inputs))
 
 #endif

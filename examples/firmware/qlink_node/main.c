@@ -9,19 +9,56 @@
 static node_t node;
 static uint8_t answer[QLINK_MAX_WIRE_SIZE];
 
+static bool receive_within(uint8_t *byte, uint32_t milliseconds)
+{
+    const uint32_t begin = board_milliseconds();
+    while (!board_receive(byte)) {
+        if (board_milliseconds() - begin >= milliseconds) {
+            return false;
+        }
+        board_wait();
+    }
+    return true;
+}
+
 /* A frame is complete with its check value. If that ends with the byte of the preamble, one more is inserted behind
  * it, and whoever asks is still sending: the answer waits for that byte. */
 static void wait_for_inserted(void)
 {
-    const uint32_t begin = board_milliseconds();
     uint8_t byte;
-    while (!board_receive(&byte)) {
-        if (board_milliseconds() - begin >= BYTE_MS) {
+    if (receive_within(&byte, BYTE_MS)) {
+        (void)node_receive(&node, byte); /* a single byte completes no frame */
+    }
+}
+
+#if BOARD_HEARS_ITSELF
+/* What comes now is the answer itself, and some answers look like requests. Another byte or a silence is the end of
+ * it; what follows is for the receiver. */
+static void drop_echo(size_t size)
+{
+    size_t index;
+    uint8_t byte;
+    for (index = 0u; index < size && receive_within(&byte, BYTE_MS + 1u); ++index) {
+        if (byte != answer[index]) {
+            qlink_receiver_init(&node.receiver);
+            (void)node_receive(&node, byte);
             return;
         }
-        board_wait();
     }
-    (void)node_receive(&node, byte); /* a single byte completes no frame */
+}
+#endif
+
+static void send_answer(uint8_t last, size_t size)
+{
+    const uint8_t preamble = answer[0]; /* every frame begins with it */
+    if (last == preamble) {
+        wait_for_inserted();
+    }
+    board_send(answer, size);
+#if BOARD_HEARS_ITSELF
+    drop_echo(size);
+#endif
+    node_sent(&node);
 }
 
 static void advance(uint32_t now)
@@ -42,10 +79,7 @@ static void answer_frame(uint8_t last)
     size = node_answer(&node, answer);
     board_outputs(node.io.outputs);
     if (size > 0u) {
-        if (last == answer[0]) {
-            wait_for_inserted();
-        }
-        board_send(answer, size);
+        send_answer(last, size);
     }
 }
 

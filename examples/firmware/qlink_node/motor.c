@@ -3,8 +3,23 @@
 void motor_init(motor_t *motor, uint16_t delay)
 {
     motor->delay = delay;
+#if NODE_DIAGNOSTICS
     motor->backwards = false;
+#endif
     motor_forget(motor);
+}
+
+/* Which byte of a request stands at a place of its answer. */
+static uint8_t source(const motor_t *motor, uint8_t index, uint8_t size)
+{
+#if NODE_DIAGNOSTICS
+    if (motor->backwards) {
+        return (uint8_t)(size - 1u - index);
+    }
+#endif
+    (void)motor;
+    (void)size;
+    return index;
 }
 
 bool motor_take(motor_t *motor, const uint8_t *data, uint8_t size, uint32_t now)
@@ -13,7 +28,7 @@ bool motor_take(motor_t *motor, const uint8_t *data, uint8_t size, uint32_t now)
     uint8_t index;
     motor->size = (size < MOTOR_MAX_DATA) ? size : (uint8_t)MOTOR_MAX_DATA;
     for (index = 0u; index < motor->size; ++index) {
-        motor->answer[index] = data[motor->backwards ? size - 1u - index : index];
+        motor->answer[index] = data[source(motor, index, size)];
     }
     motor->since = now;
     motor->asked = true;

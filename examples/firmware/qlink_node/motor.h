@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "options.h"
 #include "qlink.h"
 
 /* Bytes of an answer that fit into that of a poll, beside the completion. */
@@ -19,9 +20,11 @@ typedef struct motor {
     uint8_t size;
     bool asked;     /* there is a request */
     bool completed; /* and it is answered */
-    bool backwards; /* the answer is the request backwards, for tests */
     uint32_t since; /* the millisecond of the request */
     uint16_t delay; /* milliseconds from then on to the answer */
+#if NODE_DIAGNOSTICS
+    bool backwards; /* the answer is the request backwards, for tests */
+#endif
 } motor_t;
 
 void motor_init(motor_t *motor, uint16_t delay);

@@ -25,8 +25,10 @@ static bool on_node_setup(qlink_slave_t *slave, const qlink_node_setup_request_t
 {
     node_t *const node = node_of(slave);
     slave->node = request->node_number; /* the answer carries it already */
+    node->settings.number = request->node_number;
     set_delays(node, request->t1_delay, request->t2_delay);
     node->settings.position_type = request->position_type;
+    node->settings_changed = true;
     return true;
 }
 
@@ -288,15 +290,8 @@ void node_set_functions(node_t *node)
 
 void node_init(node_t *node, uint32_t inputs, uint32_t now)
 {
-    const node_settings_t settings = { .number = NODE_NUMBER,
-        .capacity = NODE_FIFO,
-        .rate = NODE_RATE,
-        .started = NODE_STARTED,
-        .t1_tenths = NODE_T1_TENTHS,
-        .t2_tenths = NODE_T2_TENTHS,
-        .position_type = NODE_POSITION_TYPE,
-        .serial = NODE_SERIAL,
-        .motor_ms = NODE_MOTOR_MS };
+    node_settings_t settings;
+    settings_load(&settings);
     qlink_receiver_init(&node->receiver);
     node_power_up(node, &settings, inputs, now);
 }
@@ -304,6 +299,7 @@ void node_init(node_t *node, uint32_t inputs, uint32_t now)
 void node_power_up(node_t *node, const node_settings_t *settings, uint32_t inputs, uint32_t now)
 {
     node->settings = *settings;
+    node->settings_changed = false;
     node->slave.node = settings->number;
     node->slave.context = node;
     node_set_functions(node);
@@ -335,11 +331,17 @@ bool node_receive(node_t *node, uint8_t byte)
 size_t node_answer(node_t *node, uint8_t *answer)
 {
     const qlink_frame_t frame = qlink_receiver_frame(&node->receiver);
-    size_t size;
-    diagnostics_frame(node, &frame);
-    size = qlink_slave_dispatch(&node->slave, &frame, answer, QLINK_MAX_WIRE_SIZE);
-    diagnostics_settle(node);
+    const size_t size = qlink_slave_dispatch(&node->slave, &frame, answer, QLINK_MAX_WIRE_SIZE);
+    diagnostics_handled(node, &frame, size);
     return size;
+}
+
+void node_sent(node_t *node)
+{
+    if (node->settings_changed) {
+        node->settings_changed = false;
+        settings_store(&node->settings);
+    }
 }
 
 int32_t node_position(const node_t *node)

@@ -33,6 +33,7 @@ struct node {
     qlink_receiver_t receiver;
     qlink_slave_t slave;
     node_settings_t settings;
+    bool settings_changed; /* by a node_setup, and not stored yet */
     uint32_t now; /* the millisecond that it was told last */
     path_fifo_t path;
     io_image_t io;
@@ -43,7 +44,7 @@ struct node {
     diagnostics_t diagnostics;
 };
 
-/* Is as after power-up, with the settings of the build. `inputs` are the levels that were there before: no edge. */
+/* Is as after power-up, with the settings of settings_load. `inputs` are the levels that were there before: no edge. */
 void node_init(node_t *node, uint32_t inputs, uint32_t now);
 
 /* The same with other settings. */
@@ -61,6 +62,9 @@ bool node_receive(node_t *node, uint8_t byte);
 /* Does what the frame says, if it is for this node. Returns the size of the answer to send, 0 where there is none.
  * `answer` takes QLINK_MAX_WIRE_SIZE bytes. */
 size_t node_answer(node_t *node, uint8_t *answer);
+
+/* Stores settings that have changed. Call it when the answer has been sent: writing may take its time. */
+void node_sent(node_t *node);
 
 /* Where the motor is, in encoder counts, whether or not the node tells it. */
 int32_t node_position(const node_t *node);

@@ -35,7 +35,10 @@
 #endif
 
 #ifndef NODE_RATE
-#define NODE_RATE 1000 /* path words a second; 0 for a motor that never moves */
+/* Path words a second; 0 for a motor that never moves. The words of a millisecond are done at once, NODE_FIFO of them
+ * at most, and an answer that falls due meanwhile waits: on an 8-bit processor it can come late with more than some
+ * ten thousand a second. */
+#define NODE_RATE 1000
 #endif
 #ifndef NODE_STARTED
 #define NODE_STARTED 0 /* 1: the motor takes words after power-up and reset without a node_start */
@@ -56,7 +59,11 @@
 #endif
 
 #ifndef NODE_DIAGNOSTICS
-#define NODE_DIAGNOSTICS 1 /* 0 leaves out counters and diagnostics.c */
+#define NODE_DIAGNOSTICS 0 /* 1 takes in counters and diagnostics.c, for tests and service */
+#endif
+
+#ifndef BOARD_HEARS_ITSELF
+#define BOARD_HEARS_ITSELF 0 /* 1: what the node sends comes back to it, as with /RE tied low; it is dropped */
 #endif
 
 #endif

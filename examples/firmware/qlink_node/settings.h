@@ -1,4 +1,4 @@
-/* What a node is after power-up. */
+/* What a node is after power-up, and where that is kept while it is off. */
 #ifndef SETTINGS_H
 #define SETTINGS_H
 
@@ -16,5 +16,11 @@ typedef struct node_settings {
     uint32_t serial;
     uint16_t motor_ms;
 } node_settings_t;
+
+/* What the node begins with. */
+void settings_load(node_settings_t *settings);
+
+/* Called behind the answer to a node_setup that has changed them. */
+void settings_store(const node_settings_t *settings);
 
 #endif

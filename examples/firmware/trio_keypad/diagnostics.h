@@ -1,7 +1,7 @@
 /*
  * Looks inside through the ring itself, so that tests and service people need no second line. A keypad ignores
  * variables. With KEYPAD_DIAGNOSTICS it answers some that no Motion Coordinator has (16000 and above), also before it
- * has its offset. A keypad that is sold does none of this: build it with -DKEYPAD_DIAGNOSTICS=0.
+ * has its offset. A keypad that is sold does none of this, nor does one that is built without -DKEYPAD_DIAGNOSTICS=1.
  *
  * Number of the variable: DIAGNOSTICS_FIRST + 16 * operation + address; the answer goes so many nodes along the ring.
  * The value is a whole number, the operand.

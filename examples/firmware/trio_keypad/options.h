@@ -1,4 +1,4 @@
-/* What may be chosen when the application is built, such as -DKEYPAD_DIAGNOSTICS=0. */
+/* What may be chosen when the application is built, such as -DKEYPAD_ROWS=2u. */
 #ifndef OPTIONS_H
 #define OPTIONS_H
 
@@ -27,7 +27,7 @@
 
 /* Answers variables that a keypad does not have, for tests and service: see diagnostics.h. */
 #ifndef KEYPAD_DIAGNOSTICS
-#define KEYPAD_DIAGNOSTICS 1
+#define KEYPAD_DIAGNOSTICS 0
 #endif
 
 #endif

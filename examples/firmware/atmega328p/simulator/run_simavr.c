@@ -1,7 +1,7 @@
 /*
  * Runs a firmware on simavr, with the UART of the chip on a pty:
  *
- *   run_simavr [--hertz 14745600] firmware.elf
+ *   run_simavr [--hertz 18432000] firmware.elf
  *
  * The first line it prints is the path of the pty. SIGTERM and SIGINT end it.
  *
@@ -28,7 +28,7 @@
 #include <sim_elf.h>
 
 #define CHIP "atmega328p"
-#define DEFAULT_HERTZ 14745600u
+#define DEFAULT_HERTZ 18432000u
 #define UART '0'
 #define BUFFER_SIZE 256u
 #define LOOK_AFTER 20000u /* instructions without a sleep, until the pty is looked at all the same */
@@ -152,6 +152,11 @@ static int64_t real_cycles(const avr_t *avr)
         (int64_t)(now.tv_nsec - started.tv_nsec) * avr->frequency / 1000000000;
 }
 
+static avr_cycle_count_t least(avr_cycle_count_t one, avr_cycle_count_t other)
+{
+    return (one < other) ? one : other;
+}
+
 /* The chip sleeps for so many cycles, unless a byte comes before. */
 static void on_sleep(avr_t *avr, avr_cycle_count_t cycles)
 {
@@ -162,9 +167,10 @@ static void on_sleep(avr_t *avr, avr_cycle_count_t cycles)
     if (ahead >= SHORTEST_NS) {
         const struct timespec limit = { .tv_sec = ahead / 1000000000, .tv_nsec = ahead % 1000000000 };
         if (ppoll(&waiting, 1, &limit, NULL) > 0) {
-            /* Awake before the time: what was not slept has not passed. The caller adds all of it. */
+            /* Awake before the time: what was not slept has not passed. The caller adds all of it. The count stays
+             * above 0 in the first sleep too, or the UART would time the byte for the far end of it. */
             const int64_t left = end - real_cycles(avr);
-            avr->cycle -= (left < 0) ? 0u : ((avr_cycle_count_t)left < cycles) ? (avr_cycle_count_t)left : cycles;
+            avr->cycle -= (left < 0) ? 0u : least(least((avr_cycle_count_t)left, cycles), avr->cycle);
         }
     }
     read_line();
