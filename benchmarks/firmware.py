@@ -3,7 +3,7 @@
 Builds programs for a Cortex-M0 and an AVR with and without a part of a header, runs some of them in simavr,
 and builds the whole slave of examples/firmware; beside them MAVLink and nanopb where they are installed.
 `--write` puts the tables into docs/firmware.md, `--check` exits 1 where something is more than 10 % above its
-budget.
+budget, or an answer of the slave is late.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ T = TypeVar("T")
 ROOT = Path(__file__).resolve().parent.parent
 PROGRAMS = ROOT / "benchmarks" / "firmware"
 HEADERS = ROOT / "generated" / "c"
+EXAMPLES = ROOT / "examples" / "firmware"
 OPTIONS = ("-std=c99", "-Os", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections")
 _NANO = ("--specs=nano.specs", "--specs=nosys.specs")
 
@@ -63,6 +65,15 @@ CORTEX_M3 = Target(
 )
 AVR = Target("avr", "AVR", "avr", "gcc-avr", ("-mmcu=atmega328p",), 2)
 TARGETS = (CORTEX_M0, AVR)
+
+
+@functools.cache
+def clock() -> int:
+    """Hertz of the ATmega328P: the default of its port, which is the one place where it stands."""
+    place = EXAMPLES / "atmega328p" / "port.mk"
+    if (match := re.search(r"^F_CPU \?= (\d+)", place.read_text("utf-8"), re.MULTILINE)) is None:
+        raise ValueError(f"{place} has no line that begins with F_CPU ?= and hertz")
+    return int(match[1])
 
 
 def tool(name: str, package: str) -> str:

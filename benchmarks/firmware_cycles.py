@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.firmware_build import AVR, PROGRAMS, ToolMissing, Workshop, run, tool
+from benchmarks.firmware_build import AVR, PROGRAMS, ToolMissing, Workshop, clock, run, tool
 from benchmarks.firmware_size import CRC_FORMS
 
-CLOCK = 16_000_000
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 
 # The marks of benchmarks/firmware/cycles.c, and what its FRAME chooses.
@@ -98,9 +97,8 @@ def marks(shop: Workshop, simulate: Path, form: str, frame: int) -> list[Mark]:
     """What one run has marked; RuntimeError where it did not receive its frame."""
     options = [f"-DQLINK_CRC_FORM=QLINK_CRC_FORM_{form}", f"-DFRAME={frame}"]
     program = shop.link(AVR, f"cycles-{form}-{frame}", PROGRAMS / "cycles.c", options)
-    found = [
-        Mark(*map(int, line.split())) for line in run(simulate, program).splitlines() if line[:1].isdigit()
-    ]
+    lines = run(simulate, program, clock()).splitlines()
+    found = [Mark(*map(int, line.split())) for line in lines if line[:1].isdigit()]
     numbers = [mark.number for mark in found]
     if numbers.count(_FRAME_END) != 1 or _WRONG in numbers:
         raise RuntimeError(f"{program}: the frame was not received, or not answered: marks {numbers}")

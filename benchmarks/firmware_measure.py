@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.firmware_answers import Run, replies
 from benchmarks.firmware_build import HEADERS, TARGETS, Workshop, temporary
 from benchmarks.firmware_cycles import Cycles, all_forms
 from benchmarks.firmware_size import PROTOCOLS, Core, Costs, Dispatch, buffers, cores, costs, dispatch
-from benchmarks.firmware_slave import PORTS, Run, Slave, replies, slave
+from benchmarks.firmware_slave import PORTS, Slave, slave
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 
 import yaml
 
-from benchmarks.firmware_budget import ALLOWANCES, LIMITS, broken, goals
-from benchmarks.firmware_build import AVR, ROOT, TARGETS, Target
-from benchmarks.firmware_cycles import CLOCK, Frame
+from benchmarks.firmware_answers import BAUD, PHASES, Reply
+from benchmarks.firmware_budget import ALLOWANCES, LIMITS, STACK_ALLOWANCES, broken, goals
+from benchmarks.firmware_build import AVR, ROOT, TARGETS, Target, clock
+from benchmarks.firmware_cycles import Frame
 from benchmarks.firmware_measure import Measured
 from benchmarks.firmware_peers import Footprint
 from benchmarks.firmware_size import ANSWER, PAYLOAD, Core, Costs
-from benchmarks.firmware_slave import BAUD, PORTS
-from benchmarks.firmware_slave import CLOCK as SLAVE_CLOCK
+from benchmarks.firmware_slave import PORTS
 from benchmarks.report import Goal, as_markdown, number
 from qlinkgen_codecs import qlink
 
@@ -23,9 +23,6 @@ DEVIATIONS = ROOT / "tests" / "c" / "deviations.yaml"
 _TABLE = re.compile(
     r"(?P<head><!-- table: (?P<name>\w+) -->\n).*?(?P<end>^<!-- end -->$)", re.DOTALL | re.MULTILINE
 )
-
-# Clock cycles of three byte times on the line: what a slave may take before it answers.
-THREE_BYTES = 3 * CLOCK * qlink.BUS.bits_per_byte / BAUD
 
 OWN = "this header"
 FORMS = {"LOOP": "bitwise", "NIBBLE": "table of 16", "TABLE": "table of 256"}
@@ -74,8 +71,13 @@ def _allowances() -> str:
         flash = " / ".join(str(each.flash[target.name]) for target in TARGETS)
         rows.append(f"- {protocol}, {message}, {flash} bytes: {each.reason}")
     chips = " / ".join(target.title for target in TARGETS)
+    titles = {target.name: target.title for target in TARGETS}
+    rows += [
+        f"- qlink, {titles[target]}, {what}: {each} bytes"
+        for (target, what), each in STACK_ALLOWANCES.items()
+    ]
     return "\n".join(
-        [f"CI holds these messages to what they take now ({chips}), as they are above the budget:", "", *rows]
+        [f"CI holds these to what they take now ({chips}), as they are above the budget:", "", *rows]
     )
 
 
@@ -152,17 +154,37 @@ def _frame(frame: Frame) -> tuple[int, ...]:
     return len(calls), frame.encode, sum(calls), round(sum(calls) / len(calls)), max(calls)
 
 
+def _megahertz() -> str:
+    return f"{clock() / 1e6:g} MHz"
+
+
+def _three_bytes() -> float:
+    """Clock cycles of three byte times on the line: what a slave may take before it answers."""
+    return 3 * clock() * qlink.BUS.bits_per_byte / BAUD
+
+
 def _time(measured: Measured) -> str:
     """What the cycles mean on the line, in words."""
     calls = {form: measured.cycles[form].worst_call for form in FORMS}
-    byte = THREE_BYTES / 3
+    byte = _three_bytes() / 3
     most = 100 * max(calls.values()) / byte
     shares = ", ".join(f"{calls[form]} cycles ({title})" for form, title in FORMS.items())
-    late = [name for name, reply in measured.run.replies.items() if reply.us > reply.allowed_us]
-    verdict = f"The slave is too late with {', '.join(late)}." if late else "The slave is never late."
+    verdict = _verdict_of_time(measured)
     return (
-        f"A byte takes {byte:.0f} cycles on the line at {BAUD} baud and {CLOCK / 1e6:g} MHz. The longest "
+        f"A byte takes {byte:.0f} cycles on the line at {BAUD} baud and {_megahertz()}. The longest "
         f"call of `qlink_receive` takes {shares}: at most {most:.0f} % of that. {verdict}"
+    )
+
+
+def _verdict_of_time(measured: Measured) -> str:
+    seen = measured.run
+    asked = f"each command asked at {PHASES} places of the clock's tick, its motor at rest and moving"
+    if seen.late:
+        return f"The slave of the examples is too late with {', '.join(seen.late)}: {asked}."
+    reply = seen.replies[seen.slowest]
+    return (
+        f"The slave of the examples was never late, {asked}: its slowest answer, {seen.slowest}, takes "
+        f"{reply.us:.0f} us of {reply.allowed_us} us."
     )
 
 
@@ -170,16 +192,16 @@ def _answers(measured: Measured) -> str:
     rows = []
     for form, title in FORMS.items():
         for name, answer in measured.cycles[form].answers.items():
-            total, share = answer.total, answer.total / THREE_BYTES
+            total, share = answer.total, answer.total / _three_bytes()
             cells = [
                 str(answer.last_byte),
                 str(answer.dispatch),
-                f"{1e6 * total / CLOCK:.0f} us",
+                f"{1e6 * total / clock():.0f} us",
                 f"{100 * share:.0f} %",
             ]
             rows.append([f"{title}: {name}", *cells])
     return as_markdown(
-        ["CRC: data", "last byte", "dispatch", f"both at {CLOCK / 1e6:g} MHz", "of three byte times"], rows
+        ["CRC: data", "last byte", "dispatch", f"both at {_megahertz()}", "of three byte times"], rows
     )
 
 
@@ -193,11 +215,14 @@ def _slave(measured: Measured) -> str:
 
 
 def _replies(measured: Measured) -> str:
-    rows = [
-        [name, str(reply.cycles), f"{reply.us:.0f} us", f"{reply.allowed_us} us"]
-        for name, reply in measured.run.replies.items()
-    ]
-    return as_markdown(["", "cycles", f"at {SLAVE_CLOCK / 1e6:g} MHz", "allowed"], rows)
+    rows = [[name, *_reply(reply)] for name, reply in measured.run.replies.items()]
+    columns = ["", "cycles, motor at rest", "cycles, moving", f"slower at {_megahertz()}", "allowed"]
+    return as_markdown(columns, rows)
+
+
+def _reply(reply: Reply) -> list[str]:
+    moving = "not answered" if reply.moving is None else str(reply.moving)
+    return [str(reply.rest), moving, f"{reply.us:.0f} us", f"{reply.allowed_us} us"]
 
 
 def peers(measured: Measured, found: Mapping[str, Mapping[str, Footprint]], missing: Sequence[str]) -> str:

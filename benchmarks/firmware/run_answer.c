@@ -1,12 +1,16 @@
 /*
  * Sends requests to a slave's program for an ATmega328P in simavr, and prints how long it takes to answer.
  *
- *   run_answer program.elf HERTZ HEX...
+ *   run_answer program.elf HERTZ PHASES SCENE...
  *
- * Each HEX is a request. A line is printed for each: the clock cycles from its last byte being complete to the first
- * byte of the answer being written to the UART, then the answer. A last line tells how many bytes of stack were in use
- * at most. Status 1: the program ended, or did not answer.
+ * A SCENE is one request or several in hexadecimal digits, with + between them. Each is played PHASES times, the end of
+ * its last request that many parts of a millisecond apart, so that the millisecond's interrupt comes everywhere around
+ * it. A line is printed for each request: the clock cycle at which its last byte was complete, the cycles from there to
+ * the first byte of the answer being written to the UART, and the answer; 0 and - where there is none, for which all but
+ * the last of a scene are given a millisecond. A last line tells how many bytes of stack were in use at most. Status 1:
+ * the program ended, or did not answer the last of a scene.
  */
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,16 +21,19 @@
 #include <sim_elf.h>
 
 #define UCSR0A 0xC0 /* addresses in data space */
+#define UBRR0L 0xC4
+#define UBRR0H 0xC5
 #define RXC0 0x80
+#define U2X0 0x02
 #define SPL 0x5D
 #define SPH 0x5E
-#define SHIFT 97u /* cycles that each pause is longer than the one before: the clock ticks anywhere in a request */
 #define LIMIT 400000u /* cycles that an answer may take: a guard */
 
 static uint8_t answer[256];
 static unsigned answered;
 static avr_cycle_count_t first;
 static avr_cycle_count_t latest;
+static avr_cycle_count_t per_byte; /* of the request before, on the line */
 static unsigned lowest = 0xFFFFu; /* that the stack pointer has been */
 
 static void written(struct avr_irq_t *irq, uint32_t value, void *context)
@@ -72,70 +79,143 @@ static void stop_after(const avr_t *avr, avr_cycle_count_t begin)
     }
 }
 
-/* Sends a request; returns the cycle at which its last byte was complete. A byte is given to simavr's UART when the one
- * before has come through, at the rate that it makes of the program's settings. */
-static avr_cycle_count_t ask(avr_t *avr, const char *hex)
+static bool is_received(const avr_t *avr)
 {
-    avr_irq_t *const input = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
-    avr_cycle_count_t begin = avr->cycle;
-    for (; hex[0] != '\0' && hex[1] != '\0'; hex += 2) {
-        const char pair[3] = {hex[0], hex[1], '\0'};
-        begin = avr->cycle;
-        avr_raise_irq(input, (uint32_t)strtoul(pair, NULL, 16));
-        while ((avr->data[UCSR0A] & RXC0) == 0) {
-            stop_after(avr, begin);
-            step(avr);
-        }
-        begin = avr->cycle;
-        if (hex[2] != '\0') {
-            while ((avr->data[UCSR0A] & RXC0) != 0) {
-                stop_after(avr, begin);
-                step(avr);
-            }
-        }
-    }
-    return begin;
+    return (avr->data[UCSR0A] & RXC0) != 0;
 }
 
-int main(int count, char **words)
+/* Sends one byte when the program has taken the one before; it is complete when this returns. */
+static void send(avr_t *avr, uint8_t byte)
+{
+    const avr_cycle_count_t begin = avr->cycle;
+    while (is_received(avr)) {
+        stop_after(avr, begin);
+        step(avr);
+    }
+    avr_raise_irq(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT), byte);
+    while (!is_received(avr)) {
+        stop_after(avr, begin);
+        step(avr);
+    }
+}
+
+static avr_uart_t *uart_of(const avr_t *avr)
+{
+    avr_io_t *io = avr->io_port;
+    while (io != NULL && strcmp(io->kind, "uart") != 0) {
+        io = io->next;
+    }
+    if (io == NULL) {
+        fprintf(stderr, "run_answer: this simavr has no UART\n");
+        exit(EXIT_FAILURE);
+    }
+    return (avr_uart_t *)io;
+}
+
+/* A byte has ten bits of eight clocks, times the divider that the program has set. simavr takes longer for one that
+ * comes, how much depends on its version; so after the first request its UART is told otherwise. */
+static void keep_rate(avr_t *avr)
+{
+    static bool is_set;
+    const unsigned divider = (((unsigned)avr->data[UBRR0H] << 8) | avr->data[UBRR0L]) + 1u;
+    const unsigned wanted = 10u * ((avr->data[UCSR0A] & U2X0) != 0 ? 8u : 16u) * divider;
+    if (!is_set) {
+        avr_uart_t *const uart = uart_of(avr);
+        uart->cycles_per_byte = uart->cycles_per_byte * wanted / per_byte;
+        is_set = true;
+    } else if (per_byte * 100u > wanted * 105u || per_byte * 100u < wanted * 95u) {
+        fprintf(stderr, "run_answer: bytes come in %u cycles, not in %u\n", (unsigned)per_byte, wanted);
+        exit(EXIT_FAILURE);
+    }
+}
+
+/* Sends a request of so many digits; returns the cycle at which its last byte was complete. */
+static avr_cycle_count_t ask(avr_t *avr, const char *hex, size_t digits)
+{
+    const avr_cycle_count_t begin = avr->cycle;
+    for (size_t at = 0u; at < digits; at += 2u) {
+        const char pair[3] = {hex[at], hex[at + 1u], '\0'};
+        send(avr, (uint8_t)strtoul(pair, NULL, 16));
+    }
+    per_byte = (avr->cycle - begin) / (digits / 2u);
+    keep_rate(avr);
+    return avr->cycle;
+}
+
+/* Waits until a request that begins now would be complete in this part of a millisecond. */
+static void wait_for_phase(avr_t *avr, size_t digits, unsigned phase, unsigned phases)
+{
+    const avr_cycle_count_t period = avr->frequency / 1000u;
+    const avr_cycle_count_t end = avr->cycle + per_byte * (digits / 2u);
+    run_for(avr, (period * phase / phases + period - end % period) % period);
+}
+
+/* Waits for the answer and its end, and prints it. */
+static void hear(avr_t *avr, avr_cycle_count_t complete, bool is_last)
+{
+    const avr_cycle_count_t millisecond = avr->frequency / 1000u;
+    while (answered == 0u && (is_last || avr->cycle < complete + millisecond)) {
+        stop_after(avr, complete);
+        step(avr);
+    }
+    while (answered != 0u && avr->cycle < latest + millisecond) {
+        step(avr);
+    }
+    printf("%llu %llu ", (unsigned long long)complete, answered == 0u ? 0ull : (unsigned long long)(first - complete));
+    for (unsigned index = 0u; index < answered && index < sizeof answer; ++index) {
+        printf("%02x", answer[index]);
+    }
+    printf("%s\n", answered == 0u ? "-" : "");
+}
+
+static void play(avr_t *avr, const char *scene, unsigned phase, unsigned phases)
+{
+    for (bool is_last = false; !is_last; ) {
+        const size_t digits = strcspn(scene, "+");
+        is_last = scene[digits] == '\0';
+        if (is_last) {
+            wait_for_phase(avr, digits, phase, phases);
+        }
+        answered = 0u;
+        hear(avr, ask(avr, scene, digits), is_last);
+        scene += digits + !is_last;
+    }
+}
+
+static avr_t *start(const char *path, uint32_t hertz)
 {
     static elf_firmware_t firmware;
-    avr_t *avr;
+    avr_t *const avr = avr_make_mcu_by_name("atmega328p");
     uint32_t flags = 0;
 
-    if (count < 4 || elf_read_firmware(words[1], &firmware) != 0) {
-        fprintf(stderr, "usage: run_answer PROGRAM.elf HERTZ HEX...\n");
-        return 2;
-    }
-    avr = avr_make_mcu_by_name("atmega328p");
-    if (avr == NULL) {
-        fprintf(stderr, "run_answer: this simavr has no atmega328p\n");
-        return 2;
+    if (avr == NULL || elf_read_firmware(path, &firmware) != 0) {
+        fprintf(stderr, "run_answer: no %s\n", avr == NULL ? "atmega328p in this simavr" : path);
+        exit(2);
     }
     avr_init(avr);
-    firmware.frequency = (uint32_t)strtoul(words[2], NULL, 10);
+    firmware.frequency = hertz;
     avr_load_firmware(avr, &firmware);
     avr->sleep = no_sleep;
     avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS('0'), &flags);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), written, avr);
-    run_for(avr, firmware.frequency / 1000u);
-    for (int word = 3; word < count; ++word) {
-        avr_cycle_count_t complete;
-        answered = 0u;
-        complete = ask(avr, words[word]);
-        while (answered == 0u) {
-            stop_after(avr, complete);
-            step(avr);
+    run_for(avr, avr->frequency / 1000u);
+    return avr;
+}
+
+int main(int count, char **words)
+{
+    unsigned phases;
+    avr_t *avr;
+
+    if (count < 5 || (phases = (unsigned)strtoul(words[3], NULL, 10)) == 0u) {
+        fprintf(stderr, "usage: run_answer PROGRAM.elf HERTZ PHASES SCENE...\n");
+        return 2;
+    }
+    avr = start(words[1], (uint32_t)strtoul(words[2], NULL, 10));
+    for (int word = 4; word < count; ++word) {
+        for (unsigned phase = 0u; phase < phases; ++phase) {
+            play(avr, words[word], phase, phases);
         }
-        while (avr->cycle < latest + firmware.frequency / 1000u) {
-            step(avr);
-        }
-        run_for(avr, (avr_cycle_count_t)word * SHIFT);
-        printf("%llu ", (unsigned long long)(first - complete));
-        for (unsigned index = 0u; index < answered && index < sizeof answer; ++index) {
-            printf("%02x", answer[index]);
-        }
-        printf("\n");
     }
     printf("stack %u\n", (unsigned)avr->ramend - lowest);
     return EXIT_SUCCESS;

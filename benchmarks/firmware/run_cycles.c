@@ -1,7 +1,7 @@
 /*
  * Runs a program for an ATmega328P in simavr to its end, and prints what it has marked.
  *
- *   run_cycles program.elf
+ *   run_cycles program.elf HERTZ
  *
  * The program writes the number of a mark to GPIOR0, which does nothing else; a line for each is printed: the mark, the
  * clock cycle, the stack pointer, and its lowest value since the mark before. It ends by `cli` and `sleep`. Status 1:
@@ -18,7 +18,6 @@
 #define GPIOR0 0x3E /* address in data space */
 #define SPL 0x5D
 #define SPH 0x5E
-#define CLOCK 16000000u
 #define LONGEST 50000000u /* cycles: a guard against a program that never ends */
 
 static unsigned lowest = 0xFFFFu;
@@ -42,8 +41,8 @@ int main(int count, char **words)
     avr_t *avr;
     int state = cpu_Running;
 
-    if (count != 2 || elf_read_firmware(words[1], &firmware) != 0) {
-        fprintf(stderr, "usage: run_cycles PROGRAM.elf\n");
+    if (count != 3 || elf_read_firmware(words[1], &firmware) != 0) {
+        fprintf(stderr, "usage: run_cycles PROGRAM.elf HERTZ\n");
         return 2;
     }
     avr = avr_make_mcu_by_name("atmega328p");
@@ -52,7 +51,7 @@ int main(int count, char **words)
         return 2;
     }
     avr_init(avr);
-    firmware.frequency = CLOCK;
+    firmware.frequency = (uint32_t)strtoul(words[2], NULL, 10);
     avr_load_firmware(avr, &firmware);
     avr_register_io_write(avr, GPIOR0, marked, NULL);
     while (state != cpu_Done && state != cpu_Crashed && avr->cycle < LONGEST) {

@@ -9,7 +9,15 @@ from typing import NoReturn
 
 import pytest
 
-from benchmarks.firmware_budget import broken, complaints, core_goals, each_message, receiver_goal
+from benchmarks.firmware_answers import replies, requests
+from benchmarks.firmware_budget import (
+    answer_goal,
+    broken,
+    complaints,
+    core_goals,
+    each_message,
+    receiver_goal,
+)
 from benchmarks.firmware_build import AVR, CORTEX_M0, HEADERS, TARGETS, Target, Workshop
 from benchmarks.firmware_cycles import SIMAVR, build_simulator, frame
 from benchmarks.firmware_measure import measure
@@ -88,8 +96,8 @@ def test_budget_and_page(require_tool: Tool, missing_tool: Missing) -> None:
 GROWTH = "static volatile uint8_t grown; " + "grown = (uint8_t)(grown + 1u); " * 20
 BLOWN = {
     "receiver": ("qlink", "uint8_t position = receiver->position;", GROWTH, "one message"),
-    "encode": ("qlink", "from[2] = node;", GROWTH, "one message"),
-    "stack": ("qlink", "from[2] = node;", "volatile uint8_t deep[60]; deep[size] = 0u;", "stack"),
+    "encode": ("qlink", "head[2] = node;", GROWTH, "one message"),
+    "stack": ("qlink", "head[2] = node;", "volatile uint8_t deep[60]; deep[size] = 0u;", "stack"),
     "message": ("trio", "message->offset = payload[0];", GROWTH, "keypad_offset"),
     "ram": ("trio", "typedef struct trio_receiver {", "uint8_t spare[40];", "RAM to receive"),
 }
@@ -111,6 +119,18 @@ def test_growth_breaks_the_budget(
         goals = each_message(AVR, name, messages(shop, AVR, name, framed=False))
         goals.append(receiver_goal(AVR, name, buffers(shop, AVR, name)))
     assert [goal for goal in goals if broken(goal) and goal.what.endswith(noticed)]
+
+
+@pytest.mark.parametrize("form", ["LOOP", "TABLE"])
+def test_a_late_answer_breaks_the_budget(
+    form: str, tmp_path: Path, require_tool: Tool, missing_tool: Missing
+) -> None:
+    require(require_tool, missing_tool, AVR)
+    options = f"-UQLINK_CRC_FORM -DQLINK_CRC_FORM=QLINK_CRC_FORM_{form}"
+    asked = {name: requests()[name] for name in ("node_setup", "loop_back")}
+    seen = replies(Workshop(tmp_path), asked, options)
+    assert broken(answer_goal(seen)) == (form == "LOOP")
+    assert seen.late == (["loop_back"] if form == "LOOP" else [])
 
 
 @pytest.mark.parametrize("number", [1, 3])
