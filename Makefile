@@ -39,7 +39,7 @@ demo: .venv/.user  ## A message of each protocol in construct, Python and C; the
 
 test: lint  ## Lint, types, layers, drift of the generated files, then every test
 	@echo "== pytest"
-	@$(BIN)/python -m pytest -n auto
+	@$(BIN)/python -m pytest -n auto --dist worksteal
 
 lint: setup  ## Everything of `test` that runs no test
 	@echo "== ruff"

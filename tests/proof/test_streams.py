@@ -83,7 +83,7 @@ def streams(draw: st.DrawFn, name: str, direction: str) -> tuple[bytes, ...]:
         if (name, each) != NO_STREAM
     ],
 )
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_the_same_events(make: Make, name: str, direction: str, data: st.DataObject) -> None:
     chunks = data.draw(streams(name, direction))

@@ -43,7 +43,7 @@ def summary(events: Iterable[Any]) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.parametrize(("name", "direction"), STREAMS)
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(data=st.data())
 def test_the_pieces_do_not_matter(name: str, direction: Any, data: st.DataObject) -> None:
     wire = data.draw(streams(name, direction))
@@ -77,7 +77,7 @@ def described(events: Iterable[Any]) -> list[tuple[object, ...]]:
 
 
 @pytest.mark.parametrize(("name", "direction"), STREAMS)
-@settings(max_examples=100)
+@settings(max_examples=80)
 @given(data=st.data())
 def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObject) -> None:
     wire = data.draw(streams(name, direction))

@@ -47,7 +47,7 @@ KINDS = {"crc", "stuffing", "length", "range", "unknown", "truncated", "frame", 
 
 
 @pytest.mark.parametrize("name", EVERY)
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(data=st.data())
 def test_any_bytes_give_a_message_or_the_documented_error(name: str, data: st.DataObject) -> None:
     codec = module(name)
