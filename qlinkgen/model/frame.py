@@ -7,7 +7,8 @@ from functools import cached_property
 from typing import Literal
 
 from qlinkgen.model.checksum import Algorithm, Sum
-from qlinkgen.model.types import Chunk, Scalar
+from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
+from qlinkgen.model.types import Scalar
 
 #: What a part of a frame is for.
 Role = Literal["constant", "length", "message", "address", "payload", "checksum"]
@@ -28,6 +29,20 @@ class Checksum:
     def mask(self) -> int:
         """The bits that are sent."""
         return sum(chunk.mask << chunk.shift for chunk in self.chunks)
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return len(self.chunks)
+
+    @property
+    def regular(self) -> ByteOrder | None:
+        """Byte order of a check value that is sent whole; None where some bits are left out or regrouped."""
+        return Integer(self.algorithm.width, False, self.chunks).byteorder
+
+    def pack(self, value: int) -> bytes:
+        """The wire bytes of a check value; bits that are not sent are dropped."""
+        return pack_chunks(value, self.chunks)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

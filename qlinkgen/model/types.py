@@ -13,7 +13,29 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
-ByteOrder = Literal["big", "little"]
+from qlinkgen.model.integer import ByteOrder, Chunk, Integer, byte_chunks, group_chunks
+
+__all__ = [
+    "DOUBLE_BITS",
+    "Array",
+    "BitField",
+    "Bits",
+    "Blob",
+    "ByteOrder",
+    "Chunk",
+    "Constant",
+    "Enum",
+    "FieldType",
+    "Flags",
+    "Integer",
+    "Length",
+    "Number",
+    "Scalar",
+    "Scaling",
+    "byte_chunks",
+    "group_chunks",
+]
+
 Number = int | float | Decimal
 
 #: Bits of a double's significand: a raw value with more of them is carried as a Decimal so that nothing is
@@ -21,40 +43,6 @@ Number = int | float | Decimal
 DOUBLE_BITS = 53
 
 _EXACT = Context(prec=100)
-
-
-@dataclass(frozen=True, slots=True)
-class Chunk:
-    """The bits ``shift .. shift + bits - 1`` of an integer, carried in the low bits of one wire byte."""
-
-    shift: int
-    bits: int
-
-    @property
-    def mask(self) -> int:
-        """Mask of the bits used in the wire byte; the others are zero."""
-        return (1 << self.bits) - 1
-
-
-def byte_chunks(size: int, byteorder: ByteOrder) -> tuple[Chunk, ...]:
-    """Chunks of an integer of ``size`` whole bytes."""
-    chunks = tuple(Chunk(8 * index, 8) for index in range(size))
-    return chunks if byteorder == "little" else chunks[::-1]
-
-
-def group_chunks(parts: tuple[tuple[int, int], ...], bits: int, least_first: bool) -> tuple[Chunk, ...]:
-    """Chunks of an integer sent in groups of ``bits`` bits.
-
-    Args:
-        parts: The (first bit, last bit) ranges in wire order; each begins a new byte.
-        bits: Bits in a group (7 where bit 7 marks the header).
-        least_first: The group with the least significant bits of a part is sent first.
-    """
-    chunks: list[Chunk] = []
-    for first, last in parts:
-        groups = [Chunk(at, min(bits, last + 1 - at)) for at in range(first, last + 1, bits)]
-        chunks += groups if least_first else groups[::-1]
-    return tuple(chunks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,22 +155,24 @@ class Scalar:
         return len(self.chunks)
 
     @cached_property
+    def integer(self) -> Integer:
+        """How it lies in bytes."""
+        return Integer(self.bits, self.signed, self.chunks)
+
+    @property
     def byteorder(self) -> ByteOrder | None:
         """Byte order of a plain integer of whole bytes; None where groups of fewer bits are used."""
-        for order in ("big", "little"):
-            if self.bits == 8 * self.size and self.chunks == byte_chunks(self.size, order):
-                return order
-        return None
+        return self.integer.byteorder
 
     @property
     def natural_minimum(self) -> int:
         """Least value that the bits can hold."""
-        return -(1 << (self.bits - 1)) if self.signed else 0
+        return self.integer.minimum
 
     @property
     def natural_maximum(self) -> int:
         """Greatest value that the bits can hold."""
-        return (1 << (self.bits - self.signed)) - 1
+        return self.integer.maximum
 
     @property
     def full_range(self) -> bool:

@@ -1,0 +1,109 @@
+"""Integers on the wire: which of their bits each byte carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+ByteOrder = Literal["big", "little"]
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """The bits ``shift .. shift + bits - 1`` of an integer, carried in the low bits of one wire byte."""
+
+    shift: int
+    bits: int
+
+    @property
+    def mask(self) -> int:
+        """Mask of the bits used in the wire byte; the others are zero."""
+        return (1 << self.bits) - 1
+
+
+def byte_chunks(size: int, byteorder: ByteOrder) -> tuple[Chunk, ...]:
+    """Chunks of an integer of ``size`` whole bytes."""
+    chunks = tuple(Chunk(8 * index, 8) for index in range(size))
+    return chunks if byteorder == "little" else chunks[::-1]
+
+
+def group_chunks(parts: tuple[tuple[int, int], ...], bits: int, least_first: bool) -> tuple[Chunk, ...]:
+    """Chunks of an integer sent in groups of ``bits`` bits.
+
+    Args:
+        parts: The (first bit, last bit) ranges in wire order; each begins a new byte.
+        bits: Bits in a group (7 where bit 7 marks the header).
+        least_first: The group with the least significant bits of a part is sent first.
+    """
+    chunks: list[Chunk] = []
+    for first, last in parts:
+        groups = [Chunk(at, min(bits, last + 1 - at)) for at in range(first, last + 1, bits)]
+        chunks += groups if least_first else groups[::-1]
+    return tuple(chunks)
+
+
+def pack_chunks(value: int, chunks: tuple[Chunk, ...]) -> bytes:
+    """The wire bytes of an integer; bits of no chunk are dropped."""
+    return bytes(value >> chunk.shift & chunk.mask for chunk in chunks)
+
+
+def unpack_chunks(data: bytes, chunks: tuple[Chunk, ...]) -> int:
+    """The unsigned integer in its wire bytes; bits of no chunk are ignored."""
+    return sum((byte & chunk.mask) << chunk.shift for byte, chunk in zip(data, chunks, strict=True))
+
+
+@dataclass(frozen=True)
+class Integer:
+    """How an integer lies in bytes; what it means is said elsewhere."""
+
+    bits: int
+    signed: bool
+    chunks: tuple[Chunk, ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return len(self.chunks)
+
+    @property
+    def minimum(self) -> int:
+        """Least value that the bits hold."""
+        return -(1 << (self.bits - 1)) if self.signed else 0
+
+    @property
+    def maximum(self) -> int:
+        """Greatest value that the bits hold."""
+        return (1 << (self.bits - self.signed)) - 1
+
+    @property
+    def mask(self) -> int:
+        """All bits set."""
+        return (1 << self.bits) - 1
+
+    @cached_property
+    def byteorder(self) -> ByteOrder | None:
+        """Byte order of a plain integer of whole bytes; None where groups of fewer bits are used."""
+        orders: tuple[ByteOrder, ...] = ("big", "little")
+        for order in orders:
+            if self.bits == 8 * self.size and self.chunks == byte_chunks(self.size, order):
+                return order
+        return None
+
+    def pack(self, value: int) -> bytes:
+        """The wire bytes of a value. Raises ValueError where the bits do not hold it."""
+        if not self.minimum <= value <= self.maximum:
+            raise ValueError(f"{value} does not fit {self.bits} bits")
+        return pack_chunks(value, self.chunks)
+
+    def unpack(self, data: bytes) -> int:
+        """The value in its wire bytes; bits of no chunk are ignored, see `stray`."""
+        return self.signed_value(unpack_chunks(data, self.chunks))
+
+    def signed_value(self, bits: int) -> int:
+        """The value of a bit pattern: two's complement where the integer is signed."""
+        return bits - (1 << self.bits) if self.signed and bits >> (self.bits - 1) else bits
+
+    def stray(self, data: bytes) -> bool:
+        """Bits are set that belong to no chunk, so the bytes are not those of a value."""
+        return any(byte & ~chunk.mask for byte, chunk in zip(data, self.chunks, strict=True))

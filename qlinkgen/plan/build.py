@@ -1,0 +1,94 @@
+"""From the model to the plan."""
+
+from __future__ import annotations
+
+from qlinkgen.model.message import Message
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import select
+from qlinkgen.plan.expr import OneOf, Within
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    Envelope,
+    FramePlan,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
+    frame_plan,
+)
+from qlinkgen.plan.payload import payload_plan
+from qlinkgen.plan.select import Options
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.tree import MessagePlan, Plan
+
+
+def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
+    """Plan a protocol for an output."""
+    options = options or Options()
+    messages = select.kept(protocol, options)
+    frame = frame_plan(protocol.frame)
+    names = {message.name for message in messages}
+    used = select.named(messages)
+    return Plan(
+        protocol=protocol,
+        role=options.role,
+        frame=frame,
+        messages=tuple(_message(frame, message, options) for message in messages),
+        commands=tuple(command for command in protocol.commands if command.request.name in names),
+        enums=tuple(each for each in protocol.enums if not options.only or each.name in used),
+        flags=tuple(each for each in protocol.flags if not options.only or each.name in used),
+        heard=select.heard(protocol, options.role),
+    )
+
+
+def _message(frame: FramePlan, message: Message, options: Options) -> MessagePlan:
+    payload = payload_plan(message)
+    envelope = frame.with_check(message.direction, checked=message.checksum)
+    size = envelope.overhead + payload.most
+    return MessagePlan(
+        message=message,
+        payload=payload,
+        envelope=envelope,
+        allowed=OneOf(tuple(Within(*each) for each in message.addresses)) if message.addresses else None,
+        frame_size=size,
+        wire_size=size + _growth(frame, envelope, message),
+        encoded=select.encoded(message, options.role),
+        decoded=select.decoded(message, options.role),
+    )
+
+
+def _growth(frame: FramePlan, envelope: Envelope, message: Message) -> int:
+    """Most bytes that transparency adds to a frame of the message."""
+    transparency = frame.transparency
+    match transparency:
+        case Plain() | SevenBit():
+            return 0
+        case PayloadStuffing():
+            return transparency.rule.growth(message.max_size)
+        case FrameStuffing():
+            parts = envelope.between(transparency.front, transparency.back)
+            return transparency.rule.growth(sum(_stuffable(each, message, transparency) for each in parts))
+
+
+def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
+    """Bytes of a part that may be stuffed ones; a value's known range leaves many of them out."""
+    after = stuffing.rule.after
+    if len(after) > 1:
+        return message.max_size if isinstance(part, PayloadPart) else part.size
+    mark = after[0]
+    match part:
+        case PayloadPart():
+            return message.max_size
+        case ConstantPart():
+            return part.size
+        case LengthPart(size=1):
+            return int(message.min_size + part.bias <= mark <= message.max_size + part.bias)
+        case IdPart(size=1):
+            return int(message.id == mark)
+        case AddressPart(size=1):
+            return int(any(first <= mark <= last for first, last in message.addresses))
+        case LengthPart() | IdPart() | AddressPart() | CheckPart() | MarkPart():
+            return part.size

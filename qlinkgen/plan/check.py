@@ -1,0 +1,62 @@
+"""The check value of a frame: over which bytes, and how it is sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from qlinkgen.model.checksum import Algorithm, Sum
+from qlinkgen.model.frame import Checksum
+from qlinkgen.model.integer import ByteOrder
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A check value.
+
+    Attributes:
+        value: algorithm, wire bytes and covered parts, as the document states them.
+        word: bytes that a sum adds as one big-endian number; 1 where it adds bytes.
+        chained: the sum continues over the request that is answered: its id as a number, then its payload.
+        rejected: the value by which a request is refused, None where there is none.
+    """
+
+    value: Checksum
+    word: int = 1
+    chained: bool = False
+    rejected: int | None = None
+
+    @property
+    def algorithm(self) -> Algorithm | Sum:
+        """How the value is computed."""
+        return self.value.algorithm
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return self.value.size
+
+    @property
+    def over(self) -> tuple[str, ...]:
+        """Names of the parts covered, in wire order."""
+        return self.value.over
+
+    @property
+    def regular(self) -> ByteOrder | None:
+        """Byte order of a value that is sent whole, None where bits are left out or regrouped."""
+        return self.value.regular
+
+    @property
+    def complete(self) -> bool:
+        """Every bit of the value is sent."""
+        return self.value.mask == self.algorithm.mask
+
+    def of(self, *runs: bytes, start: int = 0) -> int:
+        """The value over runs of bytes; a sum takes words of each run apart, and ``start`` first."""
+        if isinstance(self.algorithm, Algorithm):
+            return self.algorithm.compute(b"".join(runs))
+        words = [run[at : at + self.word] for run in runs for at in range(0, len(run), self.word)]
+        return self.algorithm.compute([start, *(int.from_bytes(word, "big") for word in words)])
+
+    def pack(self, value: int) -> bytes:
+        """The wire bytes of a value."""
+        return self.value.pack(value)

@@ -1,0 +1,206 @@
+"""Runs a frame plan, messages to wire bytes and back: the reference for every target.
+
+The checks of a whole frame come in one order, the same in every target:
+
+1. no bytes at all, or fewer than the frame has: ``truncated``;
+2. in wire order, up to the end of the header: a constant that is another one is ``frame``; an inserted byte
+   that is another one is ``stuffing``; a length that no frame has is ``length``; without a length, a message
+   number that is not known is ``unknown``, and a count that its run cannot have is ``length``;
+3. a constant after the payload is ``frame``; a payload stuffed alone with a wrong inserted byte is
+   ``stuffing``, one that is too long is ``length``;
+4. bytes after the end: ``length``;
+5. the check value: ``crc``, or ``illegal`` where it is that of a refusal;
+6. a message number that the direction does not have: ``unknown``;
+7. the payload: its sizes are ``length``, then its values ``range``; at last the address, ``range``.
+
+A marked frame has no length: whatever does not fit between its header and its end is ``frame``. In a frame
+without leading constants an unknown number or a forbidden address is found in step 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import assert_never
+
+from qlinkgen.model.message import Direction
+from qlinkgen.plan import content
+from qlinkgen.plan.content import BadContent, Raw, Unsendable
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    Envelope,
+    Hunt,
+    IdPart,
+    InStep,
+    LengthPart,
+    MarkPart,
+    Marks,
+    Part,
+    PayloadPart,
+    Rescan,
+)
+from qlinkgen.plan.reading import Astray, BadFrame, FrameReader, Missing, Taken, read_marked
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.tree import MessagePlan, Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Decoded:
+    """A message that was received.
+
+    Attributes:
+        message: which one.
+        address: the address in its frame, None where that has none.
+        values: by name, as they are on the wire.
+        payload: its bytes, without stuffing.
+    """
+
+    message: MessagePlan
+    address: int | None
+    values: Mapping[str, Raw]
+    payload: bytes
+
+
+class Codec:
+    """Encodes and decodes the messages of a plan."""
+
+    def __init__(self, plan: Plan) -> None:
+        """``plan`` is what is run."""
+        self.plan = plan
+
+    # To the wire
+
+    def encode(
+        self, name: str, values: Mapping[str, Raw], address: int | None = None, request: bytes = b""
+    ) -> bytes:
+        """The frame of a message; ``request`` is the packet that is answered. Raises Unsendable."""
+        message = self.plan.message(name)
+        whom = message.message.default_address if address is None else address
+        if message.allowed is not None and not message.allowed.holds(whom):
+            raise Unsendable(self.plan.frame.address, whom)
+        return self.seal(name, content.pack(message.payload, values), whom, request)
+
+    def seal(
+        self, name: str, payload: bytes, address: int = 0, request: bytes = b"", number: int | None = None
+    ) -> bytes:
+        """The frame of a payload that may be wrong, right in all else; ``number`` replaces the message id."""
+        message = self.plan.message(name)
+        transparency = self.plan.frame.transparency
+        sent = transparency.rule.stuff(payload) if isinstance(transparency, PayloadStuffing) else payload
+        shown = message.id if number is None else number
+        cells = {part.name: _cell(part, sent, shown, address) for part in message.envelope.parts}
+        if (part := message.envelope.check) is not None:
+            cells[part.name] = part.check.pack(self.check_value(message.envelope, cells, request))
+        frame = b"".join(cells[part.name] for part in message.envelope.parts)
+        match transparency:
+            case FrameStuffing():
+                return transparency.stuff(frame)
+            case Plain() | SevenBit() | PayloadStuffing():
+                return frame
+            case _:
+                assert_never(transparency)
+
+    def check_value(self, envelope: Envelope, cells: Mapping[str, bytes], request: bytes = b"") -> int:
+        """The check value over the bytes of the covered parts, as they are sent."""
+        part = envelope.check
+        assert part is not None
+        if part.check.chained:
+            return part.check.of(request[1:], cells[envelope.payload.name], start=request[0])
+        return part.check.of(b"".join(cells[name] for name in part.check.over))
+
+    # From the wire
+
+    def decode(self, wire: bytes, direction: Direction, request: bytes = b"") -> Decoded:
+        """The message of exactly one frame; ``request`` is the packet that is answered. Raises BadFrame."""
+        if not wire:
+            raise BadFrame("truncated", 0)
+        try:
+            return self._decode(wire, direction, request)
+        except Missing:
+            raise BadFrame("truncated", len(wire)) from None
+        except Astray as astray:
+            raise BadFrame(astray.kind, astray.at) from None
+
+    def _decode(self, wire: bytes, direction: Direction, request: bytes) -> Decoded:
+        frame, known = self.plan.frame, self.plan.known(direction)
+        match frame.receiver:
+            case InStep():
+                return self._packet(wire, direction, request)
+            case Marks():
+                return self.judge(read_marked(frame, known, wire), direction)
+            case Hunt() | Rescan():
+                hunting = isinstance(frame.receiver, Hunt)
+                taken = FrameReader(frame, known, direction).read(wire, hunting=hunting)
+                if wire[taken.end :] not in (b"", taken.due):
+                    raise BadFrame("length", taken.end)
+                return self.judge(taken, direction)
+            case _:
+                assert_never(frame.receiver)
+
+    def judge(self, taken: Taken, direction: Direction, request: bytes = b"") -> Decoded:
+        """The message of a frame that was taken off the wire. Raises BadFrame."""
+        message = self.plan.known(direction).get(-1 if taken.number is None else taken.number)
+        envelope = message.envelope if message else self.plan.frame.envelopes[direction]
+        if part := envelope.check:
+            right = part.check.pack(self.check_value(envelope, taken.cells, request))
+            if taken.cells[part.name] != right:
+                refusal = part.check.rejected is not None and part.check.pack(part.check.rejected)
+                raise BadFrame("illegal" if taken.cells[part.name] == refusal else "crc", taken.end)
+        if message is None:
+            raise BadFrame("unknown", taken.end)
+        try:
+            values = content.unpack(message.payload, taken.payload)
+        except BadContent as bad:
+            raise BadFrame(bad.kind, taken.end, bad.field) from None
+        if message.allowed and taken.address is not None and not message.allowed.holds(taken.address):
+            raise BadFrame("range", taken.end, self.plan.frame.address)
+        return Decoded(message, taken.address, values, taken.payload)
+
+    # Packets
+
+    def _packet(self, wire: bytes, direction: Direction, request: bytes) -> Decoded:
+        message = self.plan.known(direction).get(request[0] if direction == "response" else wire[0])
+        if message is None:
+            raise BadFrame("unknown", 1 if direction == "request" else 0)
+        beside = message.envelope.overhead
+        least = 0 if message.payload.empty_is_default else message.payload.least
+        if len(wire) < least + beside:
+            raise BadFrame("truncated", len(wire))
+        if len(wire) > message.payload.most + beside:
+            raise BadFrame("length", message.payload.most + beside)
+        return self.judge(take_packet(message, wire), direction, request)
+
+
+def take_packet(message: MessagePlan, wire: bytes) -> Taken:
+    """The parts of a packet whose message is known."""
+    taken = Taken(number=message.id, end=len(wire))
+    at = 0
+    for part in message.envelope.parts:
+        size = len(wire) - message.envelope.overhead if isinstance(part, PayloadPart) else part.size
+        taken.cells[part.name] = wire[at : at + size]
+        at += size
+    taken.payload = taken.cells[message.envelope.payload.name]
+    return taken
+
+
+def _cell(part: Part, payload: bytes, number: int, address: int) -> bytes:
+    """The bytes of a part, those of the check value left out."""
+    match part:
+        case ConstantPart():
+            return part.data
+        case LengthPart():
+            return part.integer.pack(len(payload) + part.bias)
+        case IdPart():
+            return part.integer.pack(number)
+        case AddressPart():
+            return part.integer.pack(address)
+        case MarkPart():
+            return bytes((part.byte(number, address),))
+        case PayloadPart():
+            return payload
+        case CheckPart():
+            return b""
+        case _:
+            assert_never(part)

@@ -1,0 +1,275 @@
+"""Runs the steps of a payload: values to bytes and back, without generating code.
+
+Values are raw: an integer as it is on the wire, bytes for bytes and text, a list of integers for an array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import assert_never
+
+from qlinkgen.model.integer import Integer
+from qlinkgen.model.types import Scalar
+from qlinkgen.plan.expr import Condition, Within
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    Compare,
+    ConstantStep,
+    CountStep,
+    Infer,
+    ItemsStep,
+    Learn,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    PayloadPlan,
+    ReservedStep,
+    RunStep,
+    Step,
+    ValueStep,
+    conditions,
+)
+
+Raw = int | bytes | list[int]
+
+
+class Unsendable(ValueError):
+    """A value that cannot be sent; ``field`` names it."""
+
+    def __init__(self, field: str, value: object) -> None:
+        """Word the message."""
+        super().__init__(f"{field}: {value!r} cannot be sent")
+        self.field = field
+
+
+class BadContent(ValueError):
+    """Bytes that are no payload of the message.
+
+    Attributes:
+        kind: length or range.
+        field: what is wrong, "" where it is the size of the whole.
+        offset: where it begins in the payload.
+    """
+
+    def __init__(self, kind: str, field: str = "", offset: int = 0) -> None:
+        """Word the message."""
+        super().__init__(f"{kind}: {field or 'payload'} at {offset}")
+        self.kind = kind
+        self.field = field
+        self.offset = offset
+
+
+class MoreNeeded(Exception):
+    """The bytes so far do not tell how long the payload is; it has at least ``least`` bytes."""
+
+    def __init__(self, least: int) -> None:
+        """Note the least size."""
+        super().__init__(least)
+        self.least = least
+
+
+# Encoding ---------------------------------------------------------------------------------------------------
+
+
+def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
+    """The payload with these values; one that is missing has its default. Raises Unsendable."""
+    whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
+    counts = {run.name: _count(run, whole[run.name]) for run in plan.runs}
+    return b"".join(_packed(step, whole, counts) for step in plan.steps)
+
+
+def default_of(each: ValueStep | MemberValue | RunStep) -> Raw:
+    """What is sent where the caller gives nothing."""
+    match each:
+        case ValueStep() | MemberValue():
+            return each.number.default
+        case BytesStep():
+            return each.default
+        case ItemsStep():
+            return list(each.default)
+        case _:
+            assert_never(each)
+
+
+def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) -> bytes:
+    match step:
+        case ValueStep():
+            return step.integer.pack(_checked(step.name, step.number, values[step.name]))
+        case ConstantStep() | ReservedStep():
+            return step.integer.pack(step.value)
+        case CountStep():
+            number = counts[step.run] * step.scale
+            if number > step.integer.maximum:
+                raise Unsendable(step.run, values[step.run])
+            return step.integer.pack(number)
+        case BitsStep():
+            pattern = sum(_member_bits(member, values) << member.shift for member in step.members)
+            return step.integer.pack(step.integer.signed_value(pattern))
+        case BytesStep():
+            _count(step, values[step.name])
+            return _octets(step, values[step.name])
+        case ItemsStep():
+            _count(step, values[step.name])
+            items = values[step.name]
+            assert isinstance(items, list)
+            return b"".join(step.item.pack(_checked(step.name, step.number, item)) for item in items)
+        case _:
+            assert_never(step)
+
+
+def _member_bits(member: MemberValue | MemberConstant | MemberReserved, values: Mapping[str, Raw]) -> int:
+    match member:
+        case MemberValue():
+            return _checked(member.name, member.number, values[member.name]) & member.number.integer.mask
+        case MemberConstant() | MemberReserved():
+            return member.value
+        case _:
+            assert_never(member)
+
+
+def _checked(name: str, number: Scalar, value: object) -> int:
+    fits = isinstance(value, int) and number.natural_minimum <= value <= number.natural_maximum
+    if not isinstance(value, int) or not fits or _broken(conditions(number), value):
+        raise Unsendable(name, value)
+    return value
+
+
+def _octets(step: BytesStep, value: object) -> bytes:
+    if not isinstance(value, bytes) or (step.text and not value.isascii()):
+        raise Unsendable(step.name, value)
+    return value
+
+
+def _count(step: RunStep, value: object) -> int:
+    if not isinstance(value, bytes | list) or not step.length.minimum <= len(value) <= step.length.maximum:
+        raise Unsendable(step.name, value)
+    return len(value)
+
+
+def _broken(rules: tuple[Condition, ...], value: int) -> bool:
+    return not all(rule.holds(value) for rule in rules)
+
+
+# Decoding ---------------------------------------------------------------------------------------------------
+
+
+def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
+    """The values of a payload: its sizes first, then every step in wire order. Raises BadContent."""
+    if not payload and plan.empty_is_default:
+        return {each.name: default_of(each) for each in plan.settable}
+    counts = count_items(plan, payload)
+    values: dict[str, Raw] = {}
+    for step in plan.steps:
+        at = step.place.front.value(counts)
+        values |= _unpacked(step, payload[at:], counts, at)
+    return values
+
+
+def count_items(plan: PayloadPlan, payload: bytes) -> dict[str, int]:
+    """Items of each run of variable size. Raises BadContent with the kind length where sizes disagree."""
+    if not plan.least <= len(payload) <= plan.most:
+        raise BadContent("length")
+    counts: dict[str, int] = {}
+    for each in plan.sizing:
+        match each:
+            case Infer():
+                left, size = len(payload) - each.others.value(counts), each.run.item_size
+                if left % size or not each.run.length.minimum <= left // size <= each.run.length.maximum:
+                    raise BadContent("length", each.run.name)
+                counts[each.run.name] = left // size
+            case Learn():
+                counts[each.count.run] = _learn(each.count, payload, counts)
+            case Compare():
+                if _number(each.count, payload, counts) != counts[each.count.run] * each.count.scale:
+                    raise BadContent("length", each.count.name)
+            case _:
+                assert_never(each)
+    if plan.size.value(counts) != len(payload):
+        raise BadContent("length")
+    return counts
+
+
+def measure(plan: PayloadPlan, start: bytes) -> int:
+    """The size of the payload that begins so, where its counts alone tell it.
+
+    Raises MoreNeeded while counts are missing, BadContent where one is not allowed.
+    """
+    counts = {run.name: run.length.minimum for run in plan.runs}
+    for each in plan.sizing:
+        if isinstance(each, Learn):
+            end = each.count.place.front.value(counts) + each.count.integer.size
+            if len(start) < end:
+                raise MoreNeeded(plan.size.value(counts))
+            counts[each.count.run] = _learn(each.count, start, counts)
+    return plan.size.value(counts)
+
+
+def _learn(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:
+    number = _number(count, payload, counts)
+    if number % count.scale or not count.bounds.holds(number):
+        raise BadContent("length", count.name)
+    return number // count.scale
+
+
+def _number(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:
+    at = count.place.front.value(counts)
+    data = payload[at : at + count.integer.size]
+    if len(data) < count.integer.size:
+        raise BadContent("length", count.name, at)
+    return count.integer.unpack(data)
+
+
+def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> dict[str, Raw]:
+    """The values of one step whose bytes begin ``data``."""
+    match step:
+        case ValueStep():
+            return {step.name: _valid(step.name, step.integer, step.conditions, data, at)}
+        case ConstantStep():
+            _valid(step.name, step.integer, (Within(step.value, step.value),), data, at)
+        case CountStep():
+            _valid(step.name, step.integer, (), data, at)
+        case BitsStep():
+            return _members(step, _valid(step.name, step.integer, (), data, at), at)
+        case BytesStep():
+            taken = data[: counts.get(step.name, step.length.maximum)]
+            if step.text and not taken.isascii():
+                raise BadContent("range", step.name, at)
+            return {step.name: taken}
+        case ItemsStep():
+            starts = range(0, step.item_size * counts.get(step.name, step.length.maximum), step.item_size)
+            return {step.name: [_valid(step.name, step.item, step.conditions, data[i:], at) for i in starts]}
+        case ReservedStep():
+            pass
+        case _:
+            assert_never(step)
+    return {}
+
+
+def _valid(name: str, integer: Integer, rules: tuple[Condition, ...], data: bytes, at: int) -> int:
+    """The integer that begins ``data``, if its bytes are those of one and it keeps the rules."""
+    own = data[: integer.size]
+    value = integer.unpack(own)
+    if integer.stray(own) or _broken(rules, value):
+        raise BadContent("range", name, at)
+    return value
+
+
+def _members(step: BitsStep, whole: int, at: int) -> dict[str, Raw]:
+    found: dict[str, Raw] = {}
+    for member in step.members:
+        bits = whole >> member.shift & ((1 << member.bits) - 1)
+        match member:
+            case MemberValue():
+                value = member.number.integer.signed_value(bits)
+                if _broken(member.conditions, value):
+                    raise BadContent("range", member.name, at)
+                found[member.name] = value
+            case MemberConstant():
+                if bits != member.value:
+                    raise BadContent("range", member.name, at)
+            case MemberReserved():
+                pass
+            case _:
+                assert_never(member)
+    return found

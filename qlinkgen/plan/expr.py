@@ -1,0 +1,71 @@
+"""Sizes that depend on counts, and conditions on numbers: the two kinds of expression that targets print."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """``factor`` bytes for each item of the run ``run``."""
+
+    run: str
+    factor: int
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """A number of bytes: ``fixed``, and some for each item of runs of variable size, in wire order."""
+
+    fixed: int = 0
+    terms: tuple[Term, ...] = ()
+
+    def __add__(self, other: int) -> Size:
+        """The same with more fixed bytes."""
+        return Size(self.fixed + other, self.terms)
+
+    def plus(self, run: str, factor: int) -> Size:
+        """The same with the bytes of one more run."""
+        return Size(self.fixed, (*self.terms, Term(run, factor)))
+
+    def value(self, counts: Mapping[str, int]) -> int:
+        """The number, given how many items each run has."""
+        return self.fixed + sum(term.factor * counts[term.run] for term in self.terms)
+
+
+@dataclass(frozen=True, slots=True)
+class Within:
+    """The number lies between two bounds, both included."""
+
+    low: int
+    high: int
+
+    def holds(self, number: int) -> bool:
+        """Whether the condition is true of a number."""
+        return self.low <= number <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class Clear:
+    """No bit of the mask is set."""
+
+    mask: int
+
+    def holds(self, number: int) -> bool:
+        """Whether the condition is true of a number."""
+        return number & self.mask == 0
+
+
+@dataclass(frozen=True, slots=True)
+class OneOf:
+    """The number lies in one of several ranges."""
+
+    ranges: tuple[Within, ...]
+
+    def holds(self, number: int) -> bool:
+        """Whether the condition is true of a number."""
+        return any(each.holds(number) for each in self.ranges)
+
+
+Condition = Within | Clear | OneOf

@@ -1,0 +1,506 @@
+"""A frame as parts in wire order, and what follows from them: sizes, coverage, the end, the receiver.
+
+Three kinds of document lead to one kind of plan. A frame of parts is an envelope whose end follows from a
+length or from its message; a marked frame is one whose header and end are single bytes with a marker bit; a
+packet is one whose request is an id and a payload, and whose response is a payload and a check value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import assert_never
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import Part as StatedPart
+from qlinkgen.model.integer import Chunk, Integer, byte_chunks
+from qlinkgen.model.message import Direction
+from qlinkgen.plan.check import Check
+from qlinkgen.plan.transparency import (
+    FrameStuffing,
+    Insertion,
+    PayloadStuffing,
+    Plain,
+    SevenBit,
+    Transparency,
+)
+
+# Parts ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantPart:
+    """Bytes that are always the same."""
+
+    name: str
+    data: bytes
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return len(self.data)
+
+
+@dataclass(frozen=True, slots=True)
+class LengthPart:
+    """The number of payload bytes as they are sent, plus ``bias``; from ``least`` to ``most``."""
+
+    name: str
+    integer: Integer
+    bias: int
+    least: int
+    most: int
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return self.integer.size
+
+
+@dataclass(frozen=True, slots=True)
+class IdPart:
+    """The number of the message."""
+
+    name: str
+    integer: Integer
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return self.integer.size
+
+
+@dataclass(frozen=True, slots=True)
+class AddressPart:
+    """The node that is addressed, or that answers."""
+
+    name: str
+    integer: Integer
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return self.integer.size
+
+
+@dataclass(frozen=True, slots=True)
+class MarkPart:
+    """A byte with the marker bit, the address and the number of the message.
+
+    Attributes:
+        end_id: number that makes it an end byte, None in a header.
+    """
+
+    name: str
+    marker: int
+    address_name: str
+    address: Chunk
+    id_name: str
+    id: Chunk
+    end_id: int | None
+
+    #: Bytes before stuffing.
+    size = 1
+
+    def byte(self, number: int, address: int) -> int:
+        """The byte for a message number and an address."""
+        shown = number if self.end_id is None else self.end_id
+        return self.marker | address << self.address.shift | shown << self.id.shift
+
+    def id_of(self, byte: int) -> int:
+        """The message number in the byte."""
+        return byte >> self.id.shift & self.id.mask
+
+    def address_of(self, byte: int) -> int:
+        """The address in the byte."""
+        return byte >> self.address.shift & self.address.mask
+
+
+@dataclass(frozen=True, slots=True)
+class PayloadPart:
+    """The payload: fewest and most bytes, before stuffing and (``most_sent``) as a length counts them."""
+
+    name: str
+    least: int
+    most: int
+    most_sent: int
+
+    #: Bytes of no payload.
+    size = 0
+
+
+@dataclass(frozen=True, slots=True)
+class CheckPart:
+    """The check value."""
+
+    name: str
+    check: Check
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return self.check.size
+
+
+Part = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | PayloadPart | CheckPart
+
+
+# Where a frame ends -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ByLength:
+    """A length says how many bytes of payload follow."""
+
+    part: LengthPart
+
+
+@dataclass(frozen=True, slots=True)
+class ByMessage:
+    """The size of the payload follows from its message and the counts in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ByMark:
+    """The next byte with the marker bit ends the payload."""
+
+    header: MarkPart
+    end: MarkPart
+
+
+End = ByLength | ByMessage | ByMark
+
+
+# How a receiver finds frames --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Hunt:
+    """The preamble is found nowhere else: each byte is looked at once, nothing is kept but the frame itself.
+
+    Attributes:
+        mark: the byte of which the preamble is two, and after which ``insert`` follows inside a frame.
+    """
+
+    mark: int
+    insert: int
+
+
+@dataclass(frozen=True, slots=True)
+class Rescan:
+    """What looks like the start of a frame may be data: a failed search goes on from the next byte.
+
+    Attributes:
+        bare: no constant begins a frame, so only a known message number and an allowed address tell one from
+            noise.
+        verified: a check value proves a frame, so one whose contents are wrong is consumed as a whole.
+    """
+
+    bare: bool
+    verified: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """A bit tells header and end from all other bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class InStep:
+    """Nothing marks a frame: both sides must agree where one begins."""
+
+
+Receiver = Hunt | Rescan | Marks | InStep
+
+
+# Envelopes --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """The parts of a frame in wire order, as they are before stuffing."""
+
+    parts: tuple[Part, ...]
+
+    @cached_property
+    def payload_at(self) -> int:
+        """Index of the payload among the parts."""
+        return next(index for index, part in enumerate(self.parts) if isinstance(part, PayloadPart))
+
+    @property
+    def payload(self) -> PayloadPart:
+        """The payload."""
+        part = self.parts[self.payload_at]
+        assert isinstance(part, PayloadPart)
+        return part
+
+    @property
+    def front(self) -> tuple[Part, ...]:
+        """Parts before the payload."""
+        return self.parts[: self.payload_at]
+
+    @property
+    def back(self) -> tuple[Part, ...]:
+        """Parts after the payload."""
+        return self.parts[self.payload_at + 1 :]
+
+    @cached_property
+    def header_size(self) -> int:
+        """Bytes before the payload."""
+        return sum(part.size for part in self.front)
+
+    @cached_property
+    def trailer_size(self) -> int:
+        """Bytes after the payload."""
+        return sum(part.size for part in self.back)
+
+    @property
+    def overhead(self) -> int:
+        """Bytes beside the payload."""
+        return self.header_size + self.trailer_size
+
+    @property
+    def max_frame(self) -> int:
+        """Most bytes of a frame of any payload, as a length counts them."""
+        return self.overhead + self.payload.most_sent
+
+    @property
+    def preamble(self) -> bytes:
+        """Constant bytes that begin the frame, b"" where there are none."""
+        first = self.parts[0]
+        return first.data if isinstance(first, ConstantPart) else b""
+
+    @property
+    def length(self) -> LengthPart | None:
+        """The length, None where there is none."""
+        return next((part for part in self.parts if isinstance(part, LengthPart)), None)
+
+    @property
+    def id(self) -> IdPart | None:
+        """The number of the message, None where it shares a byte or is not sent."""
+        return next((part for part in self.parts if isinstance(part, IdPart)), None)
+
+    @property
+    def address(self) -> AddressPart | None:
+        """The address, None where it shares a byte or there is none."""
+        return next((part for part in self.parts if isinstance(part, AddressPart)), None)
+
+    @property
+    def check(self) -> CheckPart | None:
+        """The check value, None where there is none."""
+        return next((part for part in self.parts if isinstance(part, CheckPart)), None)
+
+    def offset(self, wanted: Part) -> int:
+        """Bytes before a part; those after the payload are counted as if it were empty."""
+        return sum(part.size for part in self.parts[: self.parts.index(wanted)])
+
+    def from_end(self, wanted: Part) -> int:
+        """Bytes from the first one of a part after the payload to the end of the frame."""
+        return sum(part.size for part in self.parts[self.parts.index(wanted) :])
+
+    def between(self, front: int, back: int) -> tuple[Part, ...]:
+        """Parts but for those in the first ``front`` and the last ``back`` bytes."""
+        return tuple(
+            part
+            for index, part in enumerate(self.parts)
+            if (index >= self.payload_at or self.offset(part) >= front)
+            and (index <= self.payload_at or self.from_end(part) > back)
+        )
+
+    def covered(self, part: Part) -> bool:
+        """The check value covers the part."""
+        return self.check is not None and part.name in self.check.check.over
+
+    @cached_property
+    def coverage(self) -> tuple[tuple[Part, ...], ...]:
+        """Covered parts, those that follow one another together."""
+        runs: list[list[Part]] = []
+        last = -2
+        for index, part in enumerate(self.parts):
+            if self.covered(part):
+                if index == last + 1:
+                    runs[-1].append(part)
+                else:
+                    runs.append([part])
+                last = index
+        return tuple(map(tuple, runs))
+
+
+@dataclass(frozen=True)
+class FramePlan:
+    """How messages travel.
+
+    Attributes:
+        envelopes: by direction; equal ones are the same object.
+        end: what tells where a frame ends.
+        transparency: how its bytes travel.
+        receiver: how frames are found in a stream.
+        address: name of the address, "" where there is none.
+        id_name: name of the message number.
+    """
+
+    envelopes: Mapping[Direction, Envelope]
+    end: End
+    transparency: Transparency
+    receiver: Receiver
+    address: str
+    id_name: str
+
+    @property
+    def envelope(self) -> Envelope:
+        """The envelope where every direction has the same; that of responses where they differ."""
+        return self.envelopes["response"]
+
+    @property
+    def check(self) -> Check | None:
+        """The check value, None where there is none."""
+        part = self.envelope.check
+        return part.check if part else None
+
+    @property
+    def max_payload(self) -> int:
+        """Most payload bytes that the frame allows."""
+        return self.envelope.payload.most
+
+    def with_check(self, direction: Direction, *, checked: bool) -> Envelope:
+        """The envelope of a message that carries the check value, or does not."""
+        envelope = self.envelopes[direction]
+        if checked or envelope.check is None:
+            return envelope
+        return Envelope(tuple(part for part in envelope.parts if not isinstance(part, CheckPart)))
+
+
+# From the model ---------------------------------------------------------------------------------------------
+
+
+def frame_plan(frame: Frame) -> FramePlan:
+    """Plan the frame of a protocol."""
+    match frame:
+        case DelimitedFrame():
+            return _delimited(frame)
+        case MarkedFrame():
+            return _marked(frame)
+        case PacketFrame():
+            return _packet(frame)
+        case _:
+            assert_never(frame)
+
+
+def _delimited(frame: DelimitedFrame) -> FramePlan:
+    transparency = _transparency(frame)
+    envelope = Envelope(tuple(_part(frame, part, transparency) for part in frame.parts))
+    return FramePlan(
+        envelopes=dict.fromkeys(("request", "response", "message"), envelope),
+        end=ByLength(envelope.length) if envelope.length else ByMessage(),
+        transparency=transparency,
+        receiver=_receiver(envelope, transparency),
+        address=envelope.address.name if envelope.address else "",
+        id_name=envelope.id.name if envelope.id else "",
+    )
+
+
+def _transparency(frame: DelimitedFrame) -> Transparency:
+    stuffing = frame.stuffing
+    if stuffing is None:
+        return Plain()
+    rule = Insertion(stuffing.after, stuffing.insert)
+    if stuffing.before_checksum:
+        return PayloadStuffing(rule)
+    names = [part.name for part in frame.parts]
+    stuffed = [index for index, name in enumerate(names) if name not in stuffing.exempt]
+    front, back = frame.parts[: stuffed[0]], frame.parts[stuffed[-1] + 1 :]
+    return FrameStuffing(rule, sum(part.size for part in front), sum(part.size for part in back))
+
+
+def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -> Part:
+    match part.role:
+        case "constant":
+            return ConstantPart(part.name, part.constant)
+        case "payload":
+            return PayloadPart(part.name, part.min_size, part.max_size, transparency.most_sent(part.max_size))
+        case "checksum":
+            assert part.checksum is not None
+            return CheckPart(part.name, Check(part.checksum))
+        case "length" | "message" | "address":
+            return _integer_part(frame, part, transparency)
+        case _:
+            assert_never(part.role)
+
+
+def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -> Part:
+    assert part.scalar is not None
+    integer = part.scalar.integer
+    if part.role == "message":
+        return IdPart(part.name, integer)
+    if part.role == "address":
+        return AddressPart(part.name, integer)
+    bias, payload = frame.length_bias, frame.payload
+    most = min(integer.maximum, bias + transparency.most_sent(payload.max_size))
+    return LengthPart(part.name, integer, bias, bias + payload.min_size, most)
+
+
+def _receiver(envelope: Envelope, transparency: Transparency) -> Receiver:
+    """The one decision between hunting and rescanning, for every target."""
+    if isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
+        return Hunt(transparency.rule.after[0], transparency.rule.insert)
+    return Rescan(bare=not envelope.preamble, verified=envelope.check is not None)
+
+
+def _unique(envelope: Envelope, stuffing: FrameStuffing) -> bool:
+    """The preamble cannot appear in a frame, and the rest is plain enough to be taken byte by byte.
+
+    The preamble is a byte twice, alone exempt from stuffing after that byte. A length of one byte follows
+    that cannot be that byte. The check value is sent whole, comes last and covers everything between.
+    """
+    rule, length, check = stuffing.rule, envelope.length, envelope.check
+    if len(rule.after) != 1 or rule.after * 2 != envelope.preamble or rule.insert in rule.after:
+        return False
+    if (stuffing.front, stuffing.back) != (len(envelope.preamble), 0):
+        return False
+    if length is None or envelope.parts[1] is not length or length.size != 1:
+        return False
+    if length.least <= rule.after[0] <= length.most or check is None or envelope.parts[-1] is not check:
+        return False
+    inner = envelope.parts[1:-1]
+    plain = not any(isinstance(part, ConstantPart) for part in inner)
+    number = envelope.id is not None and envelope.id.size == 1
+    return plain and number and envelope.coverage == (inner,) and check.check.regular is not None
+
+
+def _marked(frame: MarkedFrame) -> FramePlan:
+    def mark(name: str, end_id: int | None) -> MarkPart:
+        return MarkPart(
+            name, frame.marker, frame.address_name, frame.address_bits, frame.id_name, frame.id_bits, end_id
+        )
+
+    header, end = mark("header", None), mark("end", frame.end_id)
+    most = frame.payload_max
+    check = (CheckPart("checksum", Check(frame.checksum)),) if frame.checksum else ()
+    envelope = Envelope((header, PayloadPart("payload", 0, most, most), *check, end))
+    return FramePlan(
+        envelopes=dict.fromkeys(("request", "response", "message"), envelope),
+        end=ByMark(header, end),
+        transparency=SevenBit(frame.marker),
+        receiver=Marks(),
+        address=frame.address_name,
+        id_name=frame.id_name,
+    )
+
+
+def _packet(frame: PacketFrame) -> FramePlan:
+    payload = PayloadPart("payload", 0, frame.payload_max, frame.payload_max)
+    number = IdPart(frame.id_name, Integer(8, signed=False, chunks=byte_chunks(1, "big")))
+    request = Envelope((number, payload))
+    check: tuple[Part, ...] = ()
+    if frame.checksum is not None:
+        value = Check(frame.checksum, frame.word_size, chained=True, rejected=frame.rejected)
+        check = (CheckPart(frame.checksum_name, value),)
+    return FramePlan(
+        envelopes={"request": request, "message": request, "response": Envelope((payload, *check))},
+        end=ByMessage(),
+        transparency=Plain(),
+        receiver=InStep(),
+        address="",
+        id_name=frame.id_name,
+    )

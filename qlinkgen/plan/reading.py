@@ -1,0 +1,294 @@
+"""Takes one frame off the wire, part by part in wire order.
+
+What shows that no frame begins here is found as early as the bytes allow, so it does not depend on how they
+are cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import assert_never
+
+from qlinkgen.model.message import Direction
+from qlinkgen.plan.content import BadContent, MoreNeeded, measure
+from qlinkgen.plan.framing import (
+    AddressPart,
+    ByLength,
+    ByMark,
+    ByMessage,
+    CheckPart,
+    ConstantPart,
+    FramePlan,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
+    Rescan,
+)
+from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing
+from qlinkgen.plan.tree import MessagePlan
+
+
+class BadFrame(ValueError):
+    """Bytes that are not a frame with a message.
+
+    Attributes:
+        kind: frame, stuffing, length, truncated, crc, illegal, unknown or range.
+        end: wire bytes of the frame up to where it was found out.
+        field: the field that is wrong, "" where it is none.
+    """
+
+    def __init__(self, kind: str, end: int, field: str = "") -> None:
+        """Word the message."""
+        super().__init__(f"{kind} at {end}{field and f': {field}'}")
+        self.kind = kind
+        self.end = end
+        self.field = field
+
+
+class Astray(Exception):
+    """No frame begins here.
+
+    Attributes:
+        kind: what a decoder of one whole frame calls it; a receiver goes on silently.
+        at: place on the wire.
+    """
+
+    def __init__(self, kind: str, at: int) -> None:
+        """Note kind and place."""
+        super().__init__(kind, at)
+        self.kind = kind
+        self.at = at
+
+
+class Missing(Exception):
+    """The bytes so far may be the beginning of a frame."""
+
+
+@dataclass
+class Taken:
+    """A frame as it was taken off the wire.
+
+    Attributes:
+        cells: bytes of each part without inserted ones; a payload that is stuffed alone is as it was sent.
+        payload: the payload without stuffing.
+        number: number of the message, None where the frame has none.
+        address: the address, None where the frame has none.
+        end: place on the wire after its last byte.
+        due: the inserted byte that may follow the end, b"" where none may.
+    """
+
+    cells: dict[str, bytes] = field(default_factory=dict)
+    payload: bytes = b""
+    number: int | None = None
+    address: int | None = None
+    end: int = 0
+    due: bytes = b""
+
+
+class Cursor:
+    """A place on the wire; takes bytes without the inserted ones."""
+
+    def __init__(self, wire: bytes, at: int, rule: Insertion | None, *, hunting: bool = False) -> None:
+        """``rule`` is that of the stuffed parts, None where the frame is not stuffed as a whole."""
+        self._wire = wire
+        self._rule = rule
+        self._hunting = hunting
+        self._recent = b""
+        self.at = at
+        #: An inserted byte must come next, if anything does.
+        self.due = False
+
+    def take(self, size: int, *, stuffed: bool) -> bytes:
+        """Bytes of a part. Raises Missing, or BadFrame where an inserted byte is another one."""
+        taken = bytearray()
+        while len(taken) < size:
+            self._pass_inserted()
+            taken.append(self._byte())
+            if stuffed and self._rule is not None:
+                self._recent = (self._recent + taken[-1:])[-len(self._rule.after) :]
+                self.due = self._recent == self._rule.after
+        if not stuffed:
+            self._recent = b""
+        return bytes(taken)
+
+    def _pass_inserted(self) -> None:
+        if self.due and self._rule is not None:
+            byte = self._byte()
+            if byte != self._rule.insert:
+                again = self._hunting and byte == self._rule.after[0]
+                # A preamble inside a frame: the frame ends before it.
+                raise BadFrame("truncated", self.at - 2) if again else BadFrame("stuffing", self.at)
+            self.due, self._recent = False, b""
+
+    def _byte(self) -> int:
+        if self.at == len(self._wire):
+            raise Missing
+        self.at += 1
+        return self._wire[self.at - 1]
+
+
+class FrameReader:
+    """Reads frames of parts that a length or the message itself ends."""
+
+    def __init__(self, plan: FramePlan, known: Mapping[int, MessagePlan], direction: Direction) -> None:
+        """``known`` are the messages that the direction has, by number."""
+        self._plan = plan
+        self._known = known
+        self._envelope = plan.envelopes[direction]
+        stuffing = plan.transparency
+        self._whole = stuffing if isinstance(stuffing, FrameStuffing) else None
+        self._alone = stuffing if isinstance(stuffing, PayloadStuffing) else None
+        parts = self._envelope.between(self._whole.front, self._whole.back) if self._whole else ()
+        self._stuffed = {part.name for part in parts}
+        self._bare = isinstance(plan.receiver, Rescan) and plan.receiver.bare
+
+    def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
+        """The frame that begins at ``start``, its check value and contents not looked at.
+
+        Raises Astray, Missing or BadFrame.
+        """
+        rule = self._whole.rule if self._whole else None
+        cursor, taken = Cursor(wire, start, rule, hunting=hunting), Taken()
+        length = 0
+        for part in self._envelope.front:
+            length = self._head(cursor, part, taken) or length
+        sent = self._payload(cursor, taken, length)
+        for part in self._envelope.back:
+            taken.cells[part.name] = self._take(cursor, part, part.size)
+        taken.end = cursor.at
+        taken.due = bytes((rule.insert,)) if rule and cursor.due else b""
+        taken.payload = self._judged(taken, sent)
+        return taken
+
+    def _take(self, cursor: Cursor, part: Part, size: int) -> bytes:
+        return cursor.take(size, stuffed=part.name in self._stuffed)
+
+    def _head(self, cursor: Cursor, part: Part, taken: Taken) -> int:
+        """Take a part of the header; gives the value of a length."""
+        match part:
+            case ConstantPart():
+                taken.cells[part.name] = b""
+                for byte in part.data:
+                    taken.cells[part.name] += self._take(cursor, part, 1)
+                    if taken.cells[part.name][-1] != byte:
+                        raise Astray("frame", cursor.at - 1)
+                return 0
+            case LengthPart() | IdPart() | AddressPart():
+                data = self._take(cursor, part, part.size)
+                taken.cells[part.name] = data
+                return self._number(cursor, part, part.integer.unpack(data), taken)
+            case MarkPart() | PayloadPart() | CheckPart():
+                raise AssertionError(f"{part.name} is not a part of a header")
+            case _:
+                assert_never(part)
+
+    def _number(
+        self, cursor: Cursor, part: LengthPart | IdPart | AddressPart, value: int, taken: Taken
+    ) -> int:
+        match part:
+            case LengthPart():
+                if not part.least <= value <= part.most:
+                    raise BadFrame("length", cursor.at)
+                return value
+            case IdPart():
+                taken.number = value
+            case AddressPart():
+                taken.address = value
+            case _:
+                assert_never(part)
+        if self._bare:
+            self._admit(cursor, taken)
+        return 0
+
+    def _admit(self, cursor: Cursor, taken: Taken) -> None:
+        """Without a constant in front, only number and address tell a frame from noise."""
+        if taken.number is None:
+            return
+        message = self._known.get(taken.number)
+        if message is None:
+            raise Astray("unknown", cursor.at)
+        if taken.address is not None and message.allowed and not message.allowed.holds(taken.address):
+            raise Astray("range", cursor.at)
+
+    def _payload(self, cursor: Cursor, taken: Taken, length: int) -> bytes:
+        part, end = self._envelope.payload, self._plan.end
+        match end:
+            case ByLength():
+                sent = self._take(cursor, part, length - end.part.bias)
+            case ByMessage():
+                sent = self._measured(cursor, part, taken)
+            case ByMark():
+                raise AssertionError("a marked frame is read by its marks")
+            case _:
+                assert_never(end)
+        taken.cells[part.name] = sent
+        return sent
+
+    def _measured(self, cursor: Cursor, part: PayloadPart, taken: Taken) -> bytes:
+        message = self._known.get(taken.number if taken.number is not None else -1)
+        if message is None:
+            raise BadFrame("unknown", cursor.at)
+        sent = b""
+        while True:
+            try:
+                size = measure(message.payload, sent)
+            except MoreNeeded:
+                sent += self._take(cursor, part, 1)
+            except BadContent:
+                raise BadFrame("length", cursor.at) from None
+            else:
+                return sent + self._take(cursor, part, size - len(sent))
+
+    def _judged(self, taken: Taken, sent: bytes) -> bytes:
+        """The payload without stuffing, if what surrounds it is right."""
+        for part in self._envelope.back:
+            if isinstance(part, ConstantPart) and taken.cells[part.name] != part.data:
+                raise BadFrame("frame", taken.end)
+        if self._alone is None:
+            return sent
+        payload = self._alone.unstuff(sent)
+        if payload is None:
+            raise BadFrame("stuffing", taken.end)
+        if len(payload) > self._envelope.payload.most:
+            raise BadFrame("length", taken.end)
+        return payload
+
+
+def read_marked(plan: FramePlan, known: Mapping[int, MessagePlan], wire: bytes) -> Taken:
+    """The frame from a header to the next end, if that is all there is. Raises Missing or BadFrame."""
+    assert isinstance(plan.end, ByMark)
+    header, end = plan.end.header, plan.end.end
+    marks = [at for at, byte in enumerate(wire) if byte & header.marker]
+    if not marks or marks[0] != 0 or header.id_of(wire[0]) == end.end_id:
+        raise BadFrame("frame", 0)
+    if len(marks) == 1:
+        raise Missing
+    last = marks[1]
+    if header.id_of(wire[last]) != end.end_id:
+        raise BadFrame("frame", last)
+    if last != len(wire) - 1:
+        raise BadFrame("frame", last + 1)
+    return take_marked(plan, known, wire)
+
+
+def take_marked(plan: FramePlan, known: Mapping[int, MessagePlan], wire: bytes) -> Taken:
+    """The parts of a frame that begins with a header and ends with the next end. Raises BadFrame."""
+    assert isinstance(plan.end, ByMark)
+    header, end = plan.end.header, plan.end.end
+    number, address = header.id_of(wire[0]), header.address_of(wire[0])
+    message = known.get(number)
+    if message is None or address == 0 or end.address_of(wire[-1]) != address:
+        raise BadFrame("frame", len(wire))
+    part = message.envelope.check
+    size = len(wire) - 2 - (part.size if part else 0)
+    plan_ = message.payload
+    if not (plan_.least <= size <= plan_.most or (size == 0 and plan_.empty_is_default)):
+        raise BadFrame("frame", len(wire))
+    payload = wire[1 : 1 + size]
+    cells = {header.name: wire[:1], message.envelope.payload.name: payload, end.name: wire[-1:]}
+    if part:
+        cells[part.name] = wire[1 + size : -1]
+    return Taken(cells, payload, number, address, len(wire))

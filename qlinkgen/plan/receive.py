@@ -1,0 +1,325 @@
+"""Finds frames in a stream of bytes: the reference for the receivers of every target, simple and slow.
+
+Every byte is fed alone, so what is delivered cannot depend on how a stream is cut. `docs/receiver.md`
+describes the four strategies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import assert_never
+
+from qlinkgen.model.message import Direction
+from qlinkgen.plan.codec import Codec, Decoded, take_packet
+from qlinkgen.plan.content import BadContent, MoreNeeded, measure
+from qlinkgen.plan.framing import ByMark, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.reading import Astray, BadFrame, FrameReader, Missing, Taken, take_marked
+from qlinkgen.plan.tree import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A message or a fault.
+
+    Attributes:
+        kind: "message", or what is wrong.
+        at: number of the byte that completed it; that of the next byte where the end of the stream did.
+        offset: place of its first byte in the stream.
+        raw: its bytes as they were received.
+        decoded: the message, None for a fault.
+    """
+
+    kind: str
+    at: int
+    offset: int
+    raw: bytes
+    decoded: Decoded | None = None
+
+
+class Receiver:
+    """What the strategies have in common."""
+
+    def __init__(self, plan: Plan, direction: Direction) -> None:
+        """Listen to one direction."""
+        self.plan = plan
+        self.direction = direction
+        self.codec = Codec(plan)
+        self.known = plan.known(direction)
+        #: Bytes taken so far.
+        self.taken = 0
+
+    def run(self, stream: bytes) -> list[Event]:
+        """The events of a whole stream, those of its end included."""
+        return [event for byte in stream for event in self.feed(byte)] + list(self.finish())
+
+    def feed(self, byte: int) -> Iterator[Event]:
+        """Take one byte."""
+        self.taken += 1
+        yield from self.take(byte)
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """Take one byte, the one before ``taken``."""
+        raise NotImplementedError
+
+    def finish(self) -> Iterator[Event]:
+        """The stream has ended; the receiver is as new."""
+        raise NotImplementedError
+
+    def event(self, kind: str, raw: bytes, offset: int | None = None, *, ended: bool = False) -> Event:
+        """A fault; without an offset it ends with the byte taken last."""
+        start = self.taken - len(raw) if offset is None else offset
+        return Event(kind, self.taken if ended else self.taken - 1, start, bytes(raw))
+
+    def judged(self, taken: Taken, raw: bytes, offset: int, request: bytes = b"") -> Event:
+        """The message of a frame, or what is wrong with it."""
+        try:
+            decoded = self.codec.judge(taken, self.direction, request)
+        except BadFrame as bad:
+            return Event(bad.kind, self.taken - 1, offset, raw)
+        return Event("message", self.taken - 1, offset, raw, decoded)
+
+
+def receiver(plan: Plan, direction: Direction) -> Receiver:
+    """The receiver of a protocol's frames."""
+    strategy = plan.frame.receiver
+    match strategy:
+        case Hunt():
+            return HuntingReceiver(plan, direction)
+        case Rescan():
+            return RescanningReceiver(plan, direction)
+        case Marks():
+            return MarkReceiver(plan, direction)
+        case InStep():
+            return PacketReceiver(plan, direction)
+        case _:
+            assert_never(strategy)
+
+
+class HuntingReceiver(Receiver):
+    """The preamble is found nowhere else: every byte is looked at once."""
+
+    def __init__(self, plan: Plan, direction: Direction) -> None:
+        """Hunt for a preamble."""
+        super().__init__(plan, direction)
+        assert isinstance(plan.frame.receiver, Hunt)
+        self._mark = plan.frame.receiver.mark
+        self._reader = FrameReader(plan.frame, self.known, direction)
+        self._marks = 0
+        self._raw = b""
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """One step."""
+        if not self._raw:
+            yield from self._hunt(byte)
+            return
+        self._raw += bytes((byte,))
+        yield from self._inside()
+
+    def _hunt(self, byte: int) -> Iterator[Event]:
+        if byte == self._mark:
+            self._marks += 1
+            return
+        marks, self._marks = self._marks, 0
+        if marks >= 2:
+            self._raw = bytes((self._mark, self._mark, byte))
+            yield from self._inside()
+
+    def _inside(self) -> Iterator[Event]:
+        try:
+            taken = self._reader.read(self._raw, hunting=True)
+        except Missing:
+            return
+        except BadFrame as bad:
+            aborted = bad.kind == "truncated"
+            raw, self._raw, self._marks = self._raw[: bad.end], b"", 2 if aborted else 0
+            yield self.event(bad.kind, raw, self.taken - len(raw) - (2 if aborted else 0))
+            return
+        raw, self._raw = self._raw, b""
+        self._marks = int(raw[-1] == self._mark)
+        yield self.judged(taken, raw, self.taken - len(raw))
+
+    def finish(self) -> Iterator[Event]:
+        """An unfinished frame is truncated."""
+        raw = self._raw or (bytes((self._mark, self._mark)) if self._marks >= 2 else b"")
+        if raw:
+            yield self.event("truncated", raw, ended=True)
+        self._raw, self._marks = b"", 0
+
+
+class RescanningReceiver(Receiver):
+    """Bytes are kept until a frame has proven right; else the search goes on from the next byte."""
+
+    def __init__(self, plan: Plan, direction: Direction) -> None:
+        """Begin with an empty buffer."""
+        super().__init__(plan, direction)
+        assert isinstance(plan.frame.receiver, Rescan)
+        self._strategy = plan.frame.receiver
+        self._reader = FrameReader(plan.frame, self.known, direction)
+        self._longest = plan.frame.envelopes[direction].max_frame
+        self._buffer, self._skipped, self._due = b"", b"", b""
+        self._ended = False
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """Everything that the buffer now holds."""
+        self._buffer += bytes((byte,))
+        yield from self._scan()
+
+    def _scan(self) -> Iterator[Event]:
+        while self._buffer:
+            due, self._due = self._due, b""
+            if due and self._buffer[:1] == due:
+                self._buffer = self._buffer[1:]
+                continue
+            try:
+                taken = self._reader.read(self._buffer)
+            except Missing:
+                if not self._ended:
+                    return
+                yield from self._drop("", b"")
+            except Astray:
+                yield from self._drop("", b"")
+            except BadFrame as bad:
+                yield from self._drop(bad.kind, self._buffer[: bad.end])
+            else:
+                yield from self._whole(taken)
+
+    @property
+    def _start(self) -> int:
+        return self.taken - len(self._buffer)
+
+    def _whole(self, taken: Taken) -> Iterator[Event]:
+        raw = self._buffer[: taken.end]
+        event = self.judged(taken, raw, self._start)
+        proven = self._strategy.verified and event.kind != "crc"
+        if event.kind != "message" and not proven:
+            yield from self._drop(event.kind, raw)
+            return
+        yield from self._report(self._start)
+        yield event
+        self._buffer = self._buffer[taken.end :]
+        self._due = taken.due
+
+    def _drop(self, kind: str, raw: bytes) -> Iterator[Event]:
+        """No frame begins with the first byte."""
+        if kind and not self._strategy.bare:
+            yield self.event(kind, raw, self._start)
+        if self._strategy.bare:
+            self._skipped += self._buffer[:1]
+            if len(self._skipped) == self._longest:
+                yield from self._report(self._start + 1)
+        self._buffer = self._buffer[1:]
+
+    def _report(self, end: int) -> Iterator[Event]:
+        """The bytes skipped in a row, as one fault."""
+        if self._skipped:
+            yield self.event("frame", self._skipped, end - len(self._skipped), ended=self._ended)
+        self._skipped = b""
+
+    def finish(self) -> Iterator[Event]:
+        """The frame that is not complete is given up, and others are looked for in its bytes."""
+        self._ended = True
+        if self._due and self._buffer[:1] == self._due:
+            self._buffer = self._buffer[1:]
+        self._due = b""
+        if self._buffer and not self._strategy.bare:
+            yield self.event("truncated", self._buffer, self._start, ended=True)
+            self._buffer = self._buffer[1:]
+        yield from self._scan()
+        yield from self._report(self.taken)
+        self._buffer, self._due, self._ended = b"", b"", False
+
+
+class MarkReceiver(Receiver):
+    """Header and end carry a bit that nothing between them has."""
+
+    def __init__(self, plan: Plan, direction: Direction) -> None:
+        """Wait for a header."""
+        super().__init__(plan, direction)
+        assert isinstance(plan.frame.end, ByMark)
+        self._header, self._end_id = plan.frame.end.header, plan.frame.end.end.end_id
+        envelope = plan.frame.envelopes[direction]
+        self._most = envelope.payload.most + (envelope.check.size if envelope.check else 0)
+        self._raw = b""
+        #: Everything up to the next header belongs to a fault that was reported.
+        self._hunting = False
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """One step."""
+        marked = bool(byte & self._header.marker)
+        if marked and self._header.id_of(byte) != self._end_id:
+            if self._raw:
+                yield self.event("frame", self._raw, self.taken - 1 - len(self._raw))
+            self._raw, self._hunting = bytes((byte,)), False
+        elif self._raw:
+            self._raw += bytes((byte,))
+            if marked:
+                yield self._ended()
+            elif len(self._raw) - 1 > self._most:
+                yield self.event("frame", self._raw)
+                self._raw, self._hunting = b"", True
+        elif not self._hunting:
+            self._hunting = True
+            yield self.event("frame", bytes((byte,)))
+
+    def _ended(self) -> Event:
+        raw, self._raw = self._raw, b""
+        try:
+            taken = take_marked(self.plan.frame, self.known, raw)
+        except BadFrame as bad:
+            return self.event(bad.kind, raw)
+        event = self.judged(taken, raw, self.taken - len(raw))
+        return self.event("frame", raw) if event.kind == "length" else event
+
+    def finish(self) -> Iterator[Event]:
+        """An unfinished message is truncated."""
+        if self._raw:
+            yield self.event("truncated", self._raw, ended=True)
+        self._raw, self._hunting = b"", False
+
+
+class PacketReceiver(Receiver):
+    """Nothing marks a packet: its first byte tells the size of a request, the request that of a response."""
+
+    def __init__(self, plan: Plan, direction: Direction) -> None:
+        """Begin between packets."""
+        super().__init__(plan, direction)
+        self._raw = b""
+        self._requests: list[bytes] = []
+
+    def expect(self, request: bytes) -> None:
+        """The next bytes, after what is expected already, answer this request."""
+        if request[0] in self.known:
+            self._requests.append(request)
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """One step."""
+        self._raw += bytes((byte,))
+        answers = self.direction == "response"
+        if answers and not self._requests:
+            raw, self._raw = self._raw, b""
+            yield self.event("frame", raw)
+            return
+        message = self.known.get(self._requests[0][0] if answers else self._raw[0])
+        if message is None:
+            raw, self._raw = self._raw, b""
+            yield self.event("unknown", raw)
+            return
+        start = self._raw if answers else self._raw[1:]
+        try:
+            size = measure(message.payload, start) + message.envelope.overhead
+        except MoreNeeded:
+            return
+        except BadContent:
+            size = 0
+        if len(self._raw) >= size:
+            raw, self._raw = self._raw, b""
+            request = self._requests.pop(0) if answers else b""
+            yield self.judged(take_packet(message, raw), raw, self.taken - len(raw), request)
+
+    def finish(self) -> Iterator[Event]:
+        """An unfinished packet is truncated."""
+        if self._raw:
+            yield self.event("truncated", self._raw, ended=True)
+        self._raw = b""
+        self._requests.clear()
