@@ -354,7 +354,7 @@ class Rescan(Delimited):
         raw = raw_of(count, data)
         unit = counted.item_size if count.counts_unit == "bytes" else 1
         least, most = counted.length.minimum * unit, counted.length.maximum * unit
-        if not least <= raw <= most:
+        if raw % unit or not least <= raw <= most:
             raise Refused("length")
         return (raw - least) * (counted.item_size // unit)
 

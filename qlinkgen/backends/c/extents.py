@@ -74,6 +74,8 @@ class _Extent:
         terms = [f"{value} < {least}U"] if least else []
         if most < scalar.natural_maximum:
             terms.append(f"{value} > {unsigned(most, max(scalar.bits, 16))}")
+        if scale > 1:
+            terms.append(f"({value} % {scale}U) != 0U")
         if terms:
             self._refuse(condition(terms), "LENGTH")
 

@@ -59,12 +59,13 @@ def _count(message: Message, scalar: Scalar, start: str) -> list[str]:
     least, most = length.minimum * scale, length.maximum * scale
     count = f"{counted.name}_{scalar.counts_unit}"
     number = f"{count} = {_number(scalar, start)}"
+    odd = f"{count} % {scale} or " if scale > 1 else ""
     more = f"({count} - {least})" if least else count
     return [
         f"if len(data) < {_plus(start, scalar.size)}:",
         "    return size",
         number,
-        f"if not {least} <= {count} <= {most}:",
+        f"if {odd}not {least} <= {count} <= {most}:",
         "    return -1",
         f"size += {more} * {item}" if item > 1 else f"size += {more}",
     ]
