@@ -140,6 +140,8 @@ class Scalar:
     scaling: Scaling | None = None
     unit: str = ""
     meaning: Enum | Flags | Literal["bool"] | None = None
+    #: The named type that the field has, "" where its type has no name. Equal layouts may differ in it.
+    type_name: str = field(default="", compare=False)
     #: A constant is always sent as ``default`` and must be received as it.
     constant: bool = False
     #: Reserved bits are sent as ``default`` and ignored when received.

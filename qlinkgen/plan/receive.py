@@ -268,8 +268,7 @@ class MarkReceiver(Receiver):
             taken = take_marked(self.plan.frame, self.known, raw)
         except BadFrame as bad:
             return self.event(bad.kind, raw)
-        event = self.judged(taken, raw, self.taken - len(raw))
-        return self.event("frame", raw) if event.kind == "length" else event
+        return self.judged(taken, raw, self.taken - len(raw))
 
     def finish(self) -> Iterator[Event]:
         """An unfinished message is truncated."""

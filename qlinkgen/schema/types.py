@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from qlinkgen.model.types import FieldType
+from dataclasses import replace
+
+from qlinkgen.model.types import Array, FieldType, Scalar
 from qlinkgen.schema.compounds import build_array, build_bits, build_blob, is_plain_item
 from qlinkgen.schema.constants import INTEGER, build_enum, build_flags
 from qlinkgen.schema.file_model import FieldSpec, SchemaFile
@@ -85,7 +87,18 @@ class TypeBuilder:
         kind = self._build(*resolved, site) if resolved else None
         if kind is None:
             self._report.taint(path)
-        return kind
+        return self._named(spec, kind)
+
+    def _named(self, spec: FieldSpec, kind: FieldType | None) -> FieldType | None:
+        """The type with the name that the file gives it."""
+        if not isinstance(kind, Scalar | Array):
+            return kind
+        name = type_text(spec.type).base
+        if name not in self._file.types:
+            return kind
+        if isinstance(kind, Array):
+            return replace(kind, item=replace(kind.item, type_name=name))
+        return replace(kind, type_name=name)
 
     def _build(self, spec: FieldSpec, text: TypeText, site: Site) -> FieldType | None:
         if text.base in ("bytes", "text"):

@@ -432,7 +432,8 @@ class Marked(Machine):
             payload, sent = payload[: max(0, cut)], payload[max(0, cut) :]
             if cut < 0:
                 return self.event("frame", offset, raw)
-        if payload_fault(message, payload) == "length":
+        size = len(payload)
+        if not message.min_size <= size <= message.max_size and (size or not message.empty_is_default):
             return self.event("frame", offset, raw)
         if checksum and message.checksum and _wrong_check(checksum, payload, sent):
             return self.event("crc", offset, raw)

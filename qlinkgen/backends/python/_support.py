@@ -71,16 +71,16 @@ class OutOfRange(ValueError):
     """Raised inside an encoder; the caller sees an EncodeError that names the field."""
 
 
-class Misfit(LookupError):
-    """Raised inside a decoder: the bytes do not have the shape of the message."""
+class LayoutError(LookupError):
+    """Raised inside a decoder: the bytes do not have the layout of the message."""
 
 
-#: What an encoder meets when a value is of the wrong type or too large.
+#: Raised inside an encoder by a value of the wrong type or out of range.
 REFUSALS = (struct_error, TypeError, ValueError, ArithmeticError, AttributeError, LookupError)
-#: What a decoder meets when bytes are not the message that they seem to be.
-MISFITS = (struct_error, LookupError, CodecError)
-#: What it meets beside them where the argument may be anything.
-UNREADABLE = (*MISFITS, TypeError, BufferError, NotImplementedError)
+#: Raised inside a decoder by bytes that are not the message that they seem to be.
+UNREAD = (struct_error, LookupError, CodecError)
+#: Raised besides where the argument may be anything.
+UNREADABLE = (*UNREAD, TypeError, BufferError, NotImplementedError)
 
 
 class Fault:
@@ -106,8 +106,6 @@ class Fault:
         if not isinstance(other, Fault):
             return NotImplemented
         return (self.kind, self.offset, self.raw) == (other.kind, other.offset, other.raw)
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         return f"Fault({self.kind!r}, offset={self.offset}, raw={self.raw.hex(' ')!r})"
@@ -279,21 +277,13 @@ def _span(fewest: int, most: int) -> str:
     return str(most) if fewest == most else f"{fewest}..{most}"
 
 
-class Steps(Rule):
-    """A value that is sent in whole steps: value = (raw * factor + bias) / divisor, raw in low..high."""
+class Scale:
+    """Steps of a scaled value: value = (raw * factor + bias) / divisor, raw in low..high."""
 
     __slots__ = ("bias", "ceiling", "divisor", "factor", "floor", "high", "low")
 
     def __init__(
-        self,
-        name: str,
-        low: int,
-        high: int,
-        *,
-        factor: int = 1,
-        bias: int = 0,
-        divisor: int = 1,
-        unit: str = "",
+        self, low: int, high: int, *, factor: int = 1, bias: int = 0, divisor: int = 1
     ) -> None:
         self.low, self.high = low, high
         self.factor, self.bias, self.divisor = factor, bias, divisor
@@ -301,8 +291,6 @@ class Steps(Rule):
         # Whole numbers outside of all that rounds to a legal step.
         self.floor = (first - abs(factor)) // divisor
         self.ceiling = -((-last - abs(factor)) // divisor)
-        bounds = sorted((self.value(low), self.value(high)))
-        super().__init__(name, f"a number, {bounds[0]}..{bounds[1]}{unit and ' '}{unit}")
 
     def value(self, raw: int) -> Any:
         """The value that a number on the wire stands for, correctly rounded."""
@@ -320,22 +308,35 @@ class Steps(Rule):
             raise OutOfRange
         return raw
 
-    def allows(self, value: Any) -> bool:
-        """The value has a nearest step, and that is in range."""
-        self.raw(value)
-        return True
 
-
-class DecimalSteps(Steps):
+class DecimalScale(Scale):
     """Steps of a value that a float cannot hold: a Decimal loses nothing."""
 
     __slots__ = ()
 
     def value(self, raw: int) -> Any:
         """The value that a number on the wire stands for, exactly."""
-        from decimal import Context, Decimal  # noqa: PLC0415  # only protocols with such values pay for it
+        # Only protocols with such values pay for the import.
+        from decimal import Context, Decimal  # noqa: PLC0415
 
-        return Context(prec=100).divide(Decimal(raw * self.factor + self.bias), Decimal(self.divisor))
+        number = Decimal(raw * self.factor + self.bias)
+        return Context(prec=100).divide(number, Decimal(self.divisor))
+
+
+class Scaled(Rule):
+    """A value that is sent in whole steps."""
+
+    __slots__ = ("scale",)
+
+    def __init__(self, name: str, scale: Scale, *, unit: str = "") -> None:
+        self.scale = scale
+        low, high = sorted((scale.value(scale.low), scale.value(scale.high)))
+        super().__init__(name, f"a number, {low}..{high}{unit and ' '}{unit}")
+
+    def allows(self, value: Any) -> bool:
+        """The value has a nearest step, and that is in range."""
+        self.scale.raw(value)
+        return True
 
 
 def _too_fine(value: Any) -> bool:
@@ -377,6 +378,8 @@ class BaseMessage:
     RULES: ClassVar[tuple[Rule, ...]] = ()
     #: Name of the address, "" where the frame has none.
     ADDRESS: ClassVar[str] = ""
+    #: A payload of no bytes stands for every default.
+    EMPTY: ClassVar[bool] = False
 
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
@@ -390,8 +393,6 @@ class BaseMessage:
         if type(other) is not type(self):
             return NotImplemented
         return all(getattr(self, name) == getattr(other, name) for name in self._attributes())
-
-    __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={getattr(self, name, None)!r}" for name in self._attributes())
@@ -423,6 +424,18 @@ def illegal(message: type[BaseMessage], name: str, seen: object, offset: int, pa
     legal = next((rule.legal for rule in message.RULES if rule.name == name), "something else")
     text = f"{message.NAME}: {name}: {shown(seen)} was received; legal is {legal}"
     return DecodeError(text, "range", name, offset if offset >= 0 else len(payload) + offset, payload)
+
+
+def short_of(message: type[BaseMessage], packet: bytes, size: int) -> DecodeError:
+    """The error for a packet that ends too early."""
+    text = f"{message.NAME}: {len(packet)} bytes of at least {size}"
+    return DecodeError(text, "truncated", offset=len(packet), data=packet)
+
+
+def wrong_check(seen: bytes, right: bytes, checksum: Checksum, frame: bytes) -> DecodeError:
+    """The error for a check value that is another one."""
+    text = f"checksum {seen.hex(' ')} was received, {right.hex(' ')} is right ({checksum.name})"
+    return DecodeError(text, "crc", data=frame)
 
 
 def as_bytes(data: BytesLike) -> bytes:

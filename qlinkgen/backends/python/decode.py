@@ -1,119 +1,461 @@
-"""The statements that turn bytes into a message: sizes first, one struct for each run, then every check."""
+"""The statements that turn bytes into a message: sizes first, a struct for each row of steps, then every value."""
 
 from __future__ import annotations
 
-from qlinkgen.backends.python import scalars, values
-from qlinkgen.backends.python.decode_fields import FieldReader, negated
-from qlinkgen.backends.python.place import in_ranges
-from qlinkgen.model.frame import Part
-from qlinkgen.model.message import Field
-from qlinkgen.model.types import Array, Blob
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import assert_never
+
+from qlinkgen.backends.python import integers, values
+from qlinkgen.backends.python.layout import WIDTH, comprehension, indented, joined, wrapped
+from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.place import Place
+from qlinkgen.backends.python.structs import format_of, table, tabled
+from qlinkgen.model.integer import Integer
+from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.plan.expr import Size, Within
+from qlinkgen.plan.framing import AddressPart, CheckPart, ConstantPart, IdPart, LengthPart, MarkPart, Part, PayloadPart
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    Compare,
+    ConstantStep,
+    CountStep,
+    Infer,
+    ItemsStep,
+    Learn,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    ReservedStep,
+    RunStep,
+    Sizing,
+    Step,
+    ValueStep,
+)
+from qlinkgen.plan.tree import MessagePlan
+
+#: Indent of the statements of a decoder.
+_INDENT = 8
 
 
-class Decoder(FieldReader):
+@dataclass
+class Row:
+    """Steps of fixed size in a row: where they begin, formats, and what they are unpacked into."""
+
+    start: Size
+    codes: list[str] = field(default_factory=list)
+    targets: list[str] = field(default_factory=list)
+
+    @property
+    def starred(self) -> bool:
+        """A target takes several items; one assignment can have one such."""
+        return any(target.startswith("*") for target in self.targets)
+
+
+@dataclass
+class Decoder:
     """Collects the code that decodes one message.
 
-    A message with one field of variable size takes its size from the payload's, one with several follows
-    their counts: ``rest`` is then how many bytes there are beyond the fewest, and each field takes its share.
+    Attributes:
+        message: the plan.
+        place: what surrounds the payload.
+        title: the message in the names of its constants.
+        scales: constant that converts each scaled value.
+        constants: definitions that precede the class.
     """
+
+    message: MessagePlan
+    place: Place
+    title: str
+    scales: dict[str, str]
+    constants: list[str] = field(default_factory=list)
+    _rows: list[Row] = field(default_factory=list)
+    _open: bool = False
+    _sizes: list[str] = field(default_factory=list)
+    _slices: list[str] = field(default_factory=list)
+    _values: list[str] = field(default_factory=list)
 
     def statements(self) -> list[str]:
         """Lines of the function's body."""
-        if self.message.empty_is_default:
-            self._take_empty()
-        self._check_size()
-        self.lines.append("message = _new(cls)")
-        self._head()
-        for each in self.message.fields:
-            self._field(each)
-        self._is_last = True
-        self._flush()
-        if len(self.message.variable) > 1:
-            self._misfit("rest")
-        return [*self.lines, *self._checks, "return message"]
+        payload = self.message.payload
+        self._tabled = tabled(payload, self.place.byteorder)
+        at = Size(-self.place.header)
+        for part in self.place.front:
+            self._part(part, at)
+            at += part.size
+        for step in payload.steps:
+            self._step(step)
+        taken = self._taken_rows()
+        counted = [] if payload.fixed or self._tabled else self._counted()
+        return [
+            *(self._empty() if payload.empty_is_default else []),
+            *counted,
+            "message = _new(cls)",
+            *taken,
+            *self._sizes,
+            *self._slices,
+            *self._values,
+            "return message",
+        ]
+
+    @property
+    def _bad_layout(self) -> str:
+        return f"    raise {self.place.use('LayoutError')}"
+
+    def _at(self, size: Size) -> str:
+        """A place in the payload as an index of what is read."""
+        return integers.size_text(size + self.place.header)
+
+    # A payload of no bytes
+
+    def _empty(self) -> list[str]:
+        place, chosen = self.place, values.required_defaults(self.message, self.place)
+        test = f"len({place.data}) == {place.overhead}" if place.overhead else f"not {place.data}"
+        lines: list[str] = []
+        if place.envelope and (address := place.envelope.address):
+            raw = f"{address.name}_raw"
+            at = place.envelope.offset(address) - place.skipped
+            lines = [f"{raw} = {integers.read(address.integer, place.data, lambda more: str(at + more))}"]
+            lines += self._address_check(address, raw, _INDENT + 4)
+            chosen = [f"{place.address}={raw}", *chosen]
+        lines += wrapped("return cls(", chosen, ")", _INDENT + 4)
+        return [f"if {test}:", *indented(lines)]
+
+    # Parts of the frame
+
+    def _part(self, part: Part, at: Size) -> None:
+        match part:
+            case AddressPart():
+                number = self._get(part.integer, f"{part.name}_raw", at)
+                self._put_together(part.integer, number)
+                self._values += self._address_check(part, number, _INDENT)
+                self._values.append(f"message.{self.place.address} = {number}")
+            case LengthPart() if self.place.unique:
+                # The receiver relies on it, so nothing but this compares the length with the size.
+                number = self._get(part.integer, f"{part.name}_raw", at)
+                self._sizes += [f"if {number} != {self._length(part)}:", self._bad_layout]
+            case LengthPart() | IdPart() | ConstantPart():
+                self._row(at).codes.append(f"{part.size}x")
+            case MarkPart() | PayloadPart() | CheckPart():
+                raise AssertionError(f"{part.name} is not read by a message's class")
+            case _:
+                assert_never(part)
+
+    def _length(self, part: LengthPart) -> str:
+        if self.message.payload.fixed:
+            return str(self.message.payload.most + part.bias)
+        beyond = self.place.overhead - part.bias
+        return f"len({self.place.data}) - {beyond}" if beyond else f"len({self.place.data})"
+
+    def _address_check(self, part: AddressPart, number: str, indent: int) -> list[str]:
+        place = self.place
+        assert place.envelope is not None
+        if self.message.allowed is None:
+            return []
+        frame = f"_PREAMBLE + {place.data}" if place.unique else place.data
+        seen = ["cls", f'"{part.name}"', number, str(place.envelope.offset(part)), frame]
+        test = f"if {integers.broken(self.message.allowed, number)}:"
+        return [test, *indented(wrapped(f"raise {self.place.use('illegal')}(", seen, ")", indent + 4))]
+
+    # Rows
+
+    def _row(self, at: Size, *, starred: bool = False) -> Row:
+        """The row that goes on at a place, or a new one."""
+        if not self._open or (starred and self._rows[-1].starred):
+            self._rows.append(Row(at))
+            self._open = True
+        return self._rows[-1]
+
+    def _get(self, integer: Integer, local: str, at: Size, target: str = "") -> str:
+        """Unpack an integer, directly into ``target`` if struct knows it; the name of the number."""
+        taken = integers.get(integer, local, self.place.byteorder)
+        row = self._row(at)
+        row.codes.append(taken.code)
+        row.targets.extend(taken.targets if taken.terms else [target or local])
+        return local if taken.terms or not target else target
+
+    def _put_together(self, integer: Integer, local: str, name: str = "", offset: str = "") -> None:
+        """Make the number of several targets, and refuse bits that are not its own."""
+        taken = integers.get(integer, local, self.place.byteorder)
+        if not taken.terms:
+            return
+        if taken.stray:
+            self._refuse(" or ".join(taken.stray), name, taken.targets[0], offset)
+        self._values += joined(f"{local} = ", taken.terms, "|", _INDENT)
+        if integer.byteorder is None and integer.signed:
+            self._values.append(f"{local} = {integers.sign_extended(local, integer.bits)}")
+
+    def _taken_rows(self) -> list[str]:
+        """The statements that unpack the rows."""
+        payload, place = self.message.payload, self.place
+        rows = [row for row in self._rows if row.targets]
+        alone = len(self._rows) == 1 and len(rows) == 1 and not self._slices
+        lines: list[str] = []
+        for number, row in enumerate(rows):
+            name = f"_UNPACK_{self.title}" + (f"_{number + 1}" if len(rows) > 1 else "")
+            if alone and (payload.fixed or self._tabled):
+                lines += self._whole(name, row)
+                continue
+            while row.codes[-1].endswith("x"):
+                row.codes.pop()
+            self.constants.append(f'{name} = {place.use("Struct")}("{place.prefix}{format_of(row.codes)}").unpack_from')
+            lines += _assigned(row.targets, f"{name}({place.data}, {self._at(row.start)})")
+        if payload.fixed and not (alone and rows):
+            size = payload.most + place.overhead
+            wrong = f"len({place.data}) != {size}" if size else place.data
+            return [f"if {wrong}:", self._bad_layout, *lines]
+        return lines
+
+    def _whole(self, name: str, row: Row) -> list[str]:
+        """Unpack everything at once: struct, or the table of structs, checks the size too."""
+        place, run = self.place, self._tabled
+        trailer = [f"{place.trailer}x"] if place.trailer else []
+        text = place.prefix + format_of([*row.codes, *trailer])
+        if run is None:
+            self.constants.append(f'{name} = {place.use("Struct")}("{text}").unpack')
+            return _assigned(row.targets, f"{name}({place.data})")
+        fixed = self.message.payload.size.fixed + place.overhead
+        key = f"{fixed} + n * {run.item_size}" if fixed else f"n * {run.item_size}"
+        place.use("Struct")
+        self.constants += table(name, text, "unpack", run, key)
+        return _assigned(row.targets, f"{name}[len({place.data})]({place.data})")
 
     # Sizes
 
-    def _take_empty(self) -> None:
-        place = self.place
-        part = place.frame.part("address") if place.frame else None
-        if place.frame is None or part is None or part.scalar is None:
-            self.lines += ["if not payload:", f"    return cls({', '.join(self._chosen())})"]
+    def _counted(self) -> list[str]:
+        """The statements that find how many items each run has."""
+        payload, lines = self.message.payload, list[str]()
+        for each in payload.sizing:
+            lines += self._sizing(each)
+        if not any(isinstance(each, Infer) for each in payload.sizing):
+            size = integers.size_text(payload.size + self.place.overhead)
+            lines += [f"if len({self.place.data}) != {size}:", self._bad_layout]
+        return lines
+
+    def _sizing(self, sizing: Sizing) -> list[str]:
+        match sizing:
+            case Infer():
+                others = integers.size_text(sizing.others + self.place.overhead)
+                left = f"len({self.place.data})"
+                if others != "0":
+                    left += f" - {others}" if others.isdecimal() else f" - ({others})"
+                return _divided(sizing.run, left, sizing.run.item_size, self._bad_layout)
+            case Learn():
+                run = self.message.payload.run(sizing.count.run)
+                return _divided(run, self._count(sizing.count), sizing.count.scale, self._bad_layout)
+            case Compare():
+                return [f"if {self._count(sizing.count)} != {_expected(sizing.count)}:", self._bad_layout]
+            case _:
+                assert_never(sizing)
+
+    def _count(self, count: CountStep) -> str:
+        return integers.read(count.integer, self.place.data, lambda more: self._at(count.place.front + more))
+
+    # Steps
+
+    def _step(self, step: Step) -> None:
+        at = step.place.front
+        match step:
+            case ValueStep():
+                self._value(step, at)
+            case ConstantStep():
+                number = self._get(step.integer, f"{step.name}_raw", at)
+                self._put_together(step.integer, number, step.name, _offset(step))
+                rule = Within(step.value, step.value)
+                self._refuse(integers.broken(rule, number), step.name, number, _offset(step))
+            case ReservedStep():
+                self._row(at).codes.append(f"{step.integer.size}x")
+            case CountStep():
+                self._count_step(step, at)
+            case BitsStep():
+                self._bits(step, at)
+            case BytesStep():
+                self._bytes(step, at)
+            case ItemsStep():
+                self._items(step, at)
+            case _:
+                assert_never(step)
+
+    def _refuse(self, test: str, name: str, seen: str, offset: str) -> None:
+        call = wrapped(
+            f"raise {self.place.use('illegal')}(", ["cls", f'"{name}"', seen, offset, self.place.payload], ")", _INDENT + 4
+        )
+        self._values += [f"if {test}:", *indented(call)]
+
+    def _value(self, step: ValueStep, at: Size) -> None:
+        raw, target = f"{step.name}_raw", f"message.{attribute(step.name)}"
+        result = converted(step.number, raw, self.scales.get(step.name, ""), self.place)
+        direct = result == raw and not step.conditions
+        if direct and integers.letter(step.integer, self.place.byteorder):
+            self._get(step.integer, raw, at, target)
             return
-        start = place.frame.offset(part.name) - (place.frame.header_size - place.header)
-        data = f"{place.data}[{start} : {start + part.size}]"
-        self.lines.append(f"if len({place.data}) == {place.overhead}:")
-        self.lines.append(f"    {part.name} = {scalars.from_bytes(part.scalar, data)}")
-        self.lines.append(f"    if {negated(in_ranges(part.name, self.message.addresses))}:")
-        self.lines.append(f"        {self._bad_address(part.name)}")
-        arguments = [f"{part.name}={part.name}", *self._chosen()]
-        self.lines.append(f"    return cls({', '.join(arguments)})")
+        self._get(step.integer, raw, at)
+        self._put_together(step.integer, raw, step.name, _offset(step))
+        for rule in step.conditions:
+            self._refuse(integers.broken(rule, raw), step.name, raw, _offset(step))
+        self._values.append(f"{target} = {result}")
 
-    def _chosen(self) -> list[str]:
-        """Arguments for what has no default in the class."""
-        required = [value for value in self.message.values if value.required]
-        return [f"{value.name}={values.default(value, self.place)}" for value in required]
+    def _count_step(self, step: CountStep, at: Size) -> None:
+        """A count has been read with the sizes, but for a payload that one struct holds."""
+        strays = any(chunk.bits < 8 for chunk in step.integer.chunks)
+        if self._tabled is None and not strays:
+            self._row(at).codes.append(f"{step.integer.size}x")
+            return
+        raw = self._get(step.integer, f"{step.name}_raw", at)
+        self._put_together(step.integer, raw, step.name, _offset(step))
+        if self._tabled is None:
+            return
+        items = f"len(message.{attribute(step.run)})"
+        expected = f"{step.scale} * {items}" if step.scale > 1 else items
+        self._sizes += [f"if {raw} != {expected}:", self._bad_layout]
 
-    def _check_size(self) -> None:
-        message, overhead, size = self.message, self.place.overhead, f"len({self.place.data})"
-        low, high = message.min_size + overhead, message.max_size + overhead
-        if len(message.variable) > 1:
-            self.lines.append(f"rest = {size} - {low}" if low else f"rest = {size}")
-            self._misfit(f"not 0 <= rest <= {high - low}")
-        elif message.variable and not self._by_size(message.variable[0]):
-            self._count_by_size(message.variable[0], size, low)
+    def _bits(self, step: BitsStep, at: Size) -> None:
+        whole = f"{step.name}_whole"
+        self._get(step.integer, whole, at)
+        self._put_together(step.integer, whole, step.name, _offset(step))
+        for member in step.members:
+            mask = (1 << member.bits) - 1
+            taken = f"{whole} >> {member.shift} & {mask:#x}" if member.shift else f"{whole} & {mask:#x}"
+            match member:
+                case MemberValue():
+                    self._member(member, taken, _offset(step))
+                case MemberConstant():
+                    self._refuse(f"({taken}) != {member.value}", member.name, taken, _offset(step))
+                case MemberReserved():
+                    pass
+                case _:
+                    assert_never(member)
 
-    def _count_by_size(self, each: Field, size: str, low: int) -> None:
-        kind = each.type
-        assert isinstance(kind, Array | Blob)
-        least, most, item = kind.length.minimum, kind.length.maximum, kind.item_size
-        fixed = low - least * item
-        number = f"{size} - {fixed}" if fixed else size
-        count, odd = f"{each.name}_count", ""
-        if item > 1:
-            self.lines.append(f"{count}, {each.name}_odd = divmod({number}, {item})")
-            odd = f"{each.name}_odd or "
+    def _member(self, member: MemberValue, taken: str, offset: str) -> None:
+        raw, target = f"{member.name}_raw", f"message.{attribute(member.name)}"
+        if member.number.signed:
+            taken = integers.sign_extended(f"({taken})", member.bits)
+        result = converted(member.number, raw, self.scales.get(member.name, ""), self.place)
+        if result == raw and not member.conditions:
+            self._values.append(f"{target} = {taken}")
+            return
+        self._values.append(f"{raw} = {taken}")
+        for rule in member.conditions:
+            self._refuse(integers.broken(rule, raw), member.name, raw, offset)
+        self._values.append(f"{target} = {result}")
+
+    # Runs
+
+    def _bytes(self, step: BytesStep, at: Size) -> None:
+        target = f"message.{attribute(step.name)}"
+        raw = f"{step.name}_raw" if step.text else target
+        if step.fixed:
+            row = self._row(at)
+            row.codes.append(f"{step.length.maximum}s")
+            row.targets.append(raw)
         else:
-            self.lines.append(f"{count} = {number}")
-        self._misfit(f"{odd}not {least} <= {count} <= {most}")
+            self._slice(step, raw)
+        if step.text:
+            self._refuse(f"not {raw}.isascii()", step.name, raw, _offset(step))
+            self._values.append(f'{target} = {raw}.decode("ascii")')
 
-    # The frame in front of the payload
+    def _slice(self, step: RunStep, target: str) -> None:
+        """Take the bytes of a run of variable size."""
+        first, front = self._at(step.place.front), step.place.front
+        taken = f"{self.place.data}[{first} : {self._at(front.plus(step.name, step.item_size))}]"
+        # What a caller hands in may be a memoryview.
+        self._slices.append(f"{target} = bytes({taken})" if self.place.unique else f"{target} = {taken}")
+        self._open = False
 
-    def _head(self) -> None:
-        frame = self.place.frame
-        if frame is None:
-            return
-        for part in frame.parts[1:] if self.place.unique else frame.parts:
-            if part.role == "payload":
-                break
-            if part.role == "address":
-                self._address(part)
-            elif part.role == "length" and self.place.unique:
-                self._length(part)
-            else:
-                self._run.add(f"{part.size}x", part.size)
+    def _items(self, step: ItemsStep, at: Size) -> None:
+        target, code = f"message.{attribute(step.name)}", integers.letter(step.item, self.place.byteorder)
+        if code and step.fixed:
+            row = self._row(at, starred=True)
+            row.codes.append(f"{step.length.maximum}{code}")
+            row.targets.append(f"*{target}")
+        elif step is self._tabled:
+            row = self._row(at, starred=True)
+            row.codes.append(f"{{n}}{code}")
+            row.targets.append(f"*{target}")
+        elif code:
+            text = f'f"{self.place.prefix}{{{step.name}_count}}{code}"'
+            self._slices.append(f"{target} = list({self.place.use('unpack_from')}({text}, {self.place.data}, {self._at(at)}))")
+            self._open = False
+        else:
+            self._odd_items(step, target, at)
+        for rule in step.conditions:
+            test = f"not all({integers.holds(rule, 'item')} for item in {target})"
+            self._refuse(test, step.name, target, _offset(step))
 
-    def _length(self, part: Part) -> None:
-        """Nobody but the reader compares the length of a frame with its size."""
-        assert part.scalar is not None
-        assert self.place.frame is not None
-        number = self._get(part.scalar, part.name)
-        bias = self.place.frame.length_bias
-        expected = f"len({self.place.data}) - {self.place.overhead - bias}"
-        if not self.message.variable:
-            expected = str(self.message.max_size + bias)
-        self._run.after += [f"if {number} != {expected}:", "    raise Misfit"]
+    def _odd_items(self, step: ItemsStep, target: str, at: Size) -> None:
+        """Items that struct does not know, or not in this byte order."""
+        raw, item, size = f"{step.name}_raw", step.item, step.item_size
+        if step.fixed:
+            row = self._row(at)
+            row.codes.append(f"{step.length.maximum * size}s")
+            row.targets.append(raw)
+        else:
+            self._slice(step, raw)
+        places = f"for index in range(0, len({raw}), {size})"
+        if item.byteorder is not None:
+            number = integers.from_bytes(item, f"{raw}[index : index + {size}]")
+        else:
+            sources = [f"{raw}[index + {index}]" if index else f"{raw}[index]" for index in range(size)]
+            if stray := " or ".join(integers.stray(item, sources)):
+                self._refuse(f"any({stray} {places})", step.name, raw, _offset(step))
+            number = " | ".join(integers.group_terms(item, sources))
+            if item.signed:
+                number = integers.sign_extended(f"({number})", item.bits)
+        self._values += comprehension(f"{target} = [", number, places, "]", _INDENT)
 
-    def _address(self, part: Part) -> None:
-        assert part.scalar is not None
-        number = self._get(part.scalar, part.name)
-        if not number.isidentifier():
-            self._checks.append(f"{part.name} = {number}")
-        self._checks.append(f"if {negated(in_ranges(part.name, self.message.addresses))}:")
-        self._checks.append(f"    {self._bad_address(part.name)}")
-        self._checks.append(f"message.{part.name} = {part.name}")
 
-    def _bad_address(self, name: str) -> str:
-        assert self.place.frame is not None
-        frame = f"_PREAMBLE + {self.place.data}" if self.place.unique else self.place.data
-        return f'raise illegal(cls, "{name}", {name}, {self.place.frame.offset(name)}, {frame})'
+def converted(number: Scalar, raw: str, scale: str, place: Place) -> str:
+    """From the number on the wire to the value of the attribute."""
+    meaning, scaling = number.meaning, number.scaling
+    match meaning:
+        case Enum():
+            return f"{place.classes[meaning.name]}.members.get({raw}, {raw})"
+        case "bool":
+            return f"{raw} == 1"
+        case Flags() | None:
+            pass
+        case _:
+            assert_never(meaning)
+    if scaling is None:
+        return raw
+    if number.number == "decimal":
+        return f"{scale}.value({raw})"
+    product = raw if scaling.factor == 1 else f"{raw} * {scaling.factor}"
+    total = f"{product} {'+' if scaling.bias > 0 else '-'} {abs(scaling.bias)}" if scaling.bias else product
+    if scaling.divisor == 1:
+        return total
+    return f"({total}) / {scaling.divisor}" if scaling.bias else f"{total} / {scaling.divisor}"
+
+
+def _expected(count: CountStep) -> str:
+    return f"{count.scale} * {count.run}_count" if count.scale > 1 else f"{count.run}_count"
+
+
+def _divided(run: RunStep, number: str, unit: int, otherwise: str) -> list[str]:
+    """The count of a run from a number of units, if it is a legal one."""
+    count, odd = f"{run.name}_count", ""
+    bounds = integers.broken(Within(run.length.minimum, run.length.maximum), count)
+    if unit > 1:
+        odd = f"{run.name}_odd or "
+        first = f"{count}, {run.name}_odd = divmod({number}, {unit})"
+    else:
+        first = f"{count} = {number}"
+    return [first, f"if {odd}{bounds}:", otherwise]
+
+
+def _offset(step: Step) -> str:
+    """Where a step begins in the payload: from its front, negative from its end, or computed."""
+    if step.place.offset is not None:
+        return str(step.place.offset)
+    return str(-step.place.back) if step.place.back is not None else integers.size_text(step.place.front)
+
+
+def _assigned(targets: Sequence[str], call: str) -> list[str]:
+    if len(targets) == 1:
+        starred = targets[0].startswith("*")
+        return [f"({targets[0]},) = {call}" if not starred else f"{targets[0]}, = {call}"]
+    line = f"{', '.join(targets)} = {call}"
+    if _INDENT + len(line) <= WIDTH:
+        return [line]
+    return ["(", *(f"    {target}," for target in targets), f") = {call}"]

@@ -1,39 +1,55 @@
-"""The statements that turn a message into bytes: one struct for each run of fields of fixed size."""
+"""The statements that turn a message into bytes: one struct for each row of steps of fixed size."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import assert_never
 
-from qlinkgen.backends.python import scalars
-from qlinkgen.backends.python.place import (
-    Place,
-    folded,
-    in_ranges,
-    indented,
-    items_span,
-    joined_format,
-    literal,
-    wrapped,
+from qlinkgen.backends.python import integers
+from qlinkgen.backends.python.layout import WIDTH, condition, indented, joined, literal, wrapped
+from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.place import Place
+from qlinkgen.backends.python.structs import format_of, table, tabled
+from qlinkgen.model.integer import Integer
+from qlinkgen.model.types import Scalar
+from qlinkgen.plan.expr import Condition, Within
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
 )
-from qlinkgen.model.frame import Part
-from qlinkgen.model.message import Field, Message
-from qlinkgen.model.types import Array, Bits, Blob, Scalar
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    ReservedStep,
+    Step,
+    ValueStep,
+    conditions,
+)
+from qlinkgen.plan.tree import MessagePlan
 
-#: Up to so many items there is a struct for each count; beyond, the format is made when it is needed.
-MANY_ITEMS = 128
+#: Indent of the statements of an encoder inside its ``try``.
+_INDENT = 12
 
 
-@dataclass
-class Run:
-    """Fields of fixed size in a row: formats and arguments; ``items`` is the array among them, if any."""
+@dataclass(eq=False)
+class Row:
+    """Steps of fixed size in a row: formats and arguments; ``items`` is the run among them, if any."""
 
     codes: list[str] = field(default_factory=list)
     arguments: list[str] = field(default_factory=list)
-    items: Array | None = None
-
-    def format(self, prefix: str) -> str:
-        """Format of the struct, with {n} for the number of items."""
-        return prefix + joined_format(self.codes)
+    items: ItemsStep | None = None
 
 
 @dataclass
@@ -41,245 +57,247 @@ class Encoder:
     """Collects the code that encodes one message.
 
     Attributes:
-        body: expression for the encoded bytes, over one or several lines.
-        constants: definitions that stand in front of the class.
+        message: the plan.
+        place: what surrounds the payload.
+        title: the message in the names of its constants.
+        number: expression for its id.
+        scales: constant that converts each scaled value.
+        constants: definitions that precede the class.
     """
 
-    message: Message
+    message: MessagePlan
     place: Place
     title: str
     number: str
-    steps: dict[str, str]
-    lines: list[str] = field(default_factory=list)
-    conditions: list[str] = field(default_factory=list)
+    scales: dict[str, str]
     constants: list[str] = field(default_factory=list)
-    _pieces: list[Run | str] = field(default_factory=lambda: [Run()])
+    _lines: list[str] = field(default_factory=list)
+    _terms: list[str] = field(default_factory=list)
+    _pieces: list[Row | str] = field(default_factory=list)
 
     def statements(self, before: str) -> list[str]:
-        """Lines that compute the bytes; ``before`` is what stands before the expression, like ``return``."""
+        """Lines that compute the bytes; ``before`` precedes the expression, like ``return``."""
+        self._tabled = tabled(self.message.payload, self.place.byteorder)
         self._measure()
         for part in self.place.front:
             self._part(part)
-        for each in self.message.fields:
-            self._field(each)
+        for step in self.message.payload.steps:
+            self._step(step)
         for part in self.place.back:
             self._part(part)
-        guard = []
-        if self.conditions:
-            guard = [*wrapped_condition(self.conditions), "    raise OutOfRange"]
-        return [*self.lines, *guard, *self._expression(before)]
+        guard = [*condition(self._terms, _INDENT), f"    raise {self.place.use('OutOfRange')}"] if self._terms else []
+        return [*self._lines, *guard, *self._expression(before)]
+
+    def _require(self, number: str, *rules: Condition) -> None:
+        self._terms += [integers.holds(rule, number) for rule in rules]
 
     # Sizes of what is variable
 
     def _measure(self) -> None:
-        for each in self.message.variable:
-            kind = each.type
-            assert isinstance(kind, Array | Blob)
-            source = f"self.{each.name}"
-            if isinstance(kind, Blob):
-                source = f"{each.name}_raw"
-                self.lines.append(f"{source} = {_octets(kind, each.name)}")
-            self.lines.append(f"{each.name}_count = len({source})")
-            if not self._by_count(each):
-                low, high = kind.length.minimum, kind.length.maximum
-                count = f"{each.name}_count"
-                self.conditions.append(f"{count} <= {high}" if not low else f"{low} <= {count} <= {high}")
+        for run in self.message.payload.runs:
+            source = f"self.{attribute(run.name)}"
+            if isinstance(run, BytesStep):
+                source = self._octets(run)
+            self._lines.append(f"{run.name}_count = len({source})")
+            if run is not self._tabled:
+                bounds = Within(run.length.minimum, run.length.maximum)
+                count = f"{run.name}_count"
+                self._terms.append(
+                    integers.holds(bounds, count) if bounds.low else f"{count} <= {bounds.high}"
+                )
 
-    def _by_count(self, each: Field) -> bool:
-        """There is a struct for each number of items, and none for an illegal one."""
-        kind = each.type
-        return isinstance(kind, Array) and self._struct_items(kind) and kind.length.maximum <= MANY_ITEMS
-
-    def _struct_items(self, kind: Array) -> bool:
-        alone = len(self.message.variable) == 1
-        return bool(scalars.letter(kind.item, self.place.names.byteorder)) and (alone or kind.length.fixed)
-
-    def _payload_size(self, bias: int) -> str:
-        fixed = bias + sum(each.max_size for each in self.message.fields if each.fixed)
-        terms = [str(fixed)] if fixed or not self.message.variable else []
-        for each in self.message.variable:
-            assert isinstance(each.type, Array | Blob)
-            item = each.type.item_size
-            terms.append(f"{each.name}_count" if item == 1 else f"{item} * {each.name}_count")
-        return " + ".join(terms)
+    def _octets(self, run: BytesStep) -> str:
+        """The bytes of a run as a local."""
+        source = f"self.{attribute(run.name)}"
+        value = f'{source}.encode("ascii")' if run.text else f"{self.place.use('as_bytes')}({source})"
+        self._lines.append(f"{run.name}_raw = {value}")
+        return f"{run.name}_raw"
 
     # Parts of the frame
 
     def _part(self, part: Part) -> None:
-        if part.role == "constant":
-            self._add(f"{len(part.constant)}s", literal(part.constant))
-        elif part.role == "checksum":
-            self._add(f"{part.size}x")
-        else:
-            assert part.scalar is not None
-            number = {"length": "", "message": self.number, "address": f"self.{part.name}"}[part.role]
-            if part.role == "length":
-                assert self.place.frame is not None
-                number = self._payload_size(self.place.frame.length_bias)
-            if part.role == "address":
-                self.conditions.append(in_ranges(number, self.message.addresses))
-            self._scalar(part.scalar, number)
+        match part:
+            case ConstantPart():
+                self._add(f"{part.size}s", literal(part.data))
+            case CheckPart():
+                self._add(f"{part.size}x")
+            case LengthPart():
+                number = integers.size_text(self.message.payload.size + part.bias)
+                plain = integers.letter(part.integer, self.place.byteorder)
+                self._integer(part.integer, number if plain else f"({number})")
+            case IdPart():
+                self._integer(part.integer, self.number)
+            case AddressPart():
+                number = f"self.{self.place.address}"
+                if self.message.allowed is not None:
+                    self._require(number, self.message.allowed)
+                self._integer(part.integer, number)
+            case MarkPart() | PayloadPart():
+                raise AssertionError(f"{part.name} is not packed by a message's class")
+            case _:
+                assert_never(part)
 
-    # Fields
+    # Steps
 
     def _add(self, code: str, *arguments: str) -> None:
-        run = self._pieces[-1]
-        if isinstance(run, str):
-            run = Run()
-            self._pieces.append(run)
-        run.codes.append(code)
-        run.arguments.extend(arguments)
+        if not self._pieces or isinstance(self._pieces[-1], str):
+            self._pieces.append(Row())
+        row = self._pieces[-1]
+        assert isinstance(row, Row)
+        row.codes.append(code)
+        row.arguments.extend(arguments)
 
-    def _scalar(self, scalar: Scalar, number: str) -> None:
-        code, arguments = scalars.put(scalar, number, self.place.names.byteorder)
+    def _integer(self, integer: Integer, number: str) -> None:
+        code, arguments = integers.put(integer, number, self.place.byteorder)
         self._add(code, *arguments)
 
-    def _field(self, each: Field) -> None:
-        kind = each.type
-        if isinstance(kind, Scalar):
-            self._value(each.name, kind)
-        elif isinstance(kind, Bits):
-            self._bits(each.name, kind)
-        elif isinstance(kind, Blob):
-            self._blob(each, kind)
+    def _step(self, step: Step) -> None:
+        match step:
+            case ValueStep():
+                self._value(step)
+            case ConstantStep() | ReservedStep():
+                self._number(step.integer, step.value)
+            case CountStep():
+                count = f"{step.run}_count"
+                self._computed(step.name, step.integer, f"{step.scale} * {count}" if step.scale > 1 else count)
+            case BitsStep():
+                self._bits(step)
+            case BytesStep():
+                self._bytes(step)
+            case ItemsStep():
+                self._items(step)
+            case _:
+                assert_never(step)
+
+    def _number(self, integer: Integer, value: int) -> None:
+        """A number that is known here; what struct has no letter for is bytes."""
+        if integers.letter(integer, self.place.byteorder):
+            self._integer(integer, str(value))
         else:
-            self._array(each, kind)
+            self._add(f"{integer.size}s", literal(integer.pack(value)))
 
-    def _value(self, name: str, scalar: Scalar) -> None:
-        if scalar.counts:
-            self._count(scalar)
-        elif not scalar.settable:
-            self._scalar(scalar, str(scalar.default))
-        else:
-            self._scalar(scalar, self._outgoing(name, scalar, in_struct=True))
-
-    def _outgoing(self, name: str, scalar: Scalar, *, in_struct: bool) -> str:
-        """The number of an attribute, checked as far as struct will not."""
-        plain = in_struct and scalar.byteorder is not None
-        conversion = scalars.outgoing(
-            scalar, f"self.{name}", f"{name}_raw", self.steps.get(name, ""), checked=plain
-        )
-        self.lines.extend(conversion.lines)
-        self.conditions.extend(conversion.conditions)
-        if in_struct and scalar.byteorder is None and conversion.result != f"{name}_raw":
-            self.lines.append(f"{name}_raw = {conversion.result}")
-            return f"{name}_raw"
-        return conversion.result
-
-    def _count(self, scalar: Scalar) -> None:
-        counted = next(each for each in self.message.fields if each.name == scalar.counts)
-        assert isinstance(counted.type, Array | Blob)
-        scale = counted.type.item_size if scalar.counts_unit == "bytes" else 1
-        if counted.fixed:
-            self._scalar(scalar, str(counted.type.length.maximum * scale))
-        else:
-            count = f"{counted.name}_count"
-            self._scalar(scalar, count if scale == 1 else f"{count} * {scale}")
-
-    def _bits(self, name: str, kind: Bits) -> None:
-        terms = []
-        for member in kind.members:
-            if member.type.settable:
-                number = self._outgoing(member.name, member.type, in_struct=False)
-                mask = (1 << member.type.bits) - 1
-                number = f"({number} & {mask:#x})" if member.type.signed else number
-            else:
-                number = str(member.type.default & ((1 << member.type.bits) - 1))
-            terms.append(f"{number} << {member.shift}" if member.shift else number)
-        self.lines += folded(f"{name}_raw = ", terms, " | ")
-        container = kind.container
-        raw = f"{name}_raw"
-        if container.signed:  # bits have no sign; only the way out of the struct has
-            raw = scalars.sign_extended(raw, container.bits)
-        self._scalar(container, raw)
-
-    def _blob(self, each: Field, kind: Blob) -> None:
-        raw = f"{each.name}_raw"
-        if not kind.length.fixed:
-            self._pieces.append(raw)
+    def _computed(self, name: str, integer: Integer, number: str) -> None:
+        """A number that is an expression; what struct has no letter for uses it as a local."""
+        if integers.letter(integer, self.place.byteorder):
+            self._integer(integer, number)
             return
-        self.lines.append(f"{raw} = {_octets(kind, each.name)}")
-        self.conditions.append(f"len({raw}) == {kind.length.maximum}")
-        self._add(f"{kind.length.maximum}s", raw)
+        self._lines.append(f"{name}_raw = {number}")
+        self._require(f"{name}_raw", Within(integer.minimum, integer.maximum))
+        self._integer(integer, f"{name}_raw")
 
-    def _array(self, each: Field, kind: Array) -> None:
-        source = f"self.{each.name}"
-        code = scalars.letter(kind.item, self.place.names.byteorder)
-        if kind.length.fixed:
-            self.conditions.append(f"len({source}) == {kind.length.maximum}")
-        if not self._struct_items(kind):
-            self._odd_items(each, kind)
-            return
-        self._add(f"{kind.length.maximum}{code}" if kind.length.fixed else f"{{n}}{code}", f"*{source}")
-        if not kind.length.fixed:
-            run = self._pieces[-1]
-            assert isinstance(run, Run)
-            run.items = kind
-
-    def _odd_items(self, each: Field, kind: Array) -> None:
-        """Items that struct does not know, or not in this byte order."""
-        source, item = f"self.{each.name}", kind.item
-        if item.byteorder is None:
-            self.conditions.append(f"all({scalars.within('item', item)} for item in {source})")
-            _, groups = scalars.put(item, "item", self.place.names.byteorder)
-            self._pieces.append(f"bytes([byte for item in {source} for byte in ({', '.join(groups)},)])")
+    def _value(self, step: ValueStep) -> None:
+        source, plain = f"self.{attribute(step.name)}", integers.letter(step.integer, self.place.byteorder)
+        if step.number.scaling is not None:
+            self._lines.append(f"{step.name}_raw = {self.scales[step.name]}.raw({source})")
+            self._integer(step.integer, f"{step.name}_raw")
+        elif plain:  # struct asks for an integer, and refuses one that does not fit
+            self._require(source, *step.conditions)
+            self._integer(step.integer, source)
         else:
-            self._pieces.append(f'b"".join([{scalars.to_bytes(item, "item")} for item in {source}])')
+            self._indexed(step.name, step.number)
+            self._integer(step.integer, f"{step.name}_raw")
+
+    def _indexed(self, name: str, number: Scalar) -> None:
+        """A local that holds a value as an integer of Python's own, in range."""
+        self._lines.append(f"{name}_raw = {self.place.use('index')}(self.{attribute(name)})")
+        rules = conditions(number)
+        if not any(isinstance(rule, Within) for rule in rules):
+            rules = (Within(number.natural_minimum, number.natural_maximum), *rules)
+        self._require(f"{name}_raw", *rules)
+
+    def _bits(self, step: BitsStep) -> None:
+        terms = [term for member in step.members if (term := self._member(member))]
+        raw = f"{step.name}_whole"
+        self._lines += joined(f"{raw} = ", terms or ["0"], "|", _INDENT)
+        if step.integer.signed:  # bits have no sign; only the way out of the struct has
+            self._lines.append(f"{raw} = {integers.sign_extended(raw, step.integer.bits)}")
+        self._integer(step.integer, raw)
+
+    def _member(self, member: MemberValue | MemberConstant | MemberReserved) -> str:
+        match member:
+            case MemberValue():
+                number = f"{member.name}_raw"
+                if member.number.scaling is not None:
+                    source = f"self.{attribute(member.name)}"
+                    self._lines.append(f"{number} = {self.scales[member.name]}.raw({source})")
+                else:
+                    self._indexed(member.name, member.number)
+                if member.number.signed:
+                    number = f"({number} & {(1 << member.bits) - 1:#x})"
+            case MemberConstant() | MemberReserved():
+                if not member.value:
+                    return ""
+                number = f"{member.value:#x}"
+            case _:
+                assert_never(member)
+        return f"{number} << {member.shift}" if member.shift else number
+
+    def _bytes(self, step: BytesStep) -> None:
+        if step.fixed:
+            raw = self._octets(step)
+            self._terms.append(f"len({raw}) == {step.length.maximum}")
+            self._add(f"{step.length.maximum}s", raw)
+        else:
+            self._pieces.append(f"{step.name}_raw")
+
+    def _items(self, step: ItemsStep) -> None:
+        source, code = f"self.{attribute(step.name)}", integers.letter(step.item, self.place.byteorder)
+        if step.fixed:
+            self._terms.append(f"len({source}) == {step.length.maximum}")
+        if not code or step.conditions:
+            self._odd_items(step, source)
+            return
+        if step.fixed:
+            self._add(f"{step.length.maximum}{code}", f"*{source}")
+        elif step is self._tabled:
+            self._add(f"{{n}}{code}", f"*{source}")
+            row = self._pieces[-1]
+            assert isinstance(row, Row)
+            row.items = step
+        else:
+            order = self.place.prefix
+            self._pieces.append(f'{self.place.use("pack")}(f"{order}{{{step.name}_count}}{code}", *{source})')
+
+    def _odd_items(self, step: ItemsStep, source: str) -> None:
+        """Items that struct does not know, not in this byte order, or not all of their values."""
+        local = f"{step.name}_raw"
+        self._lines.append(f"{local} = [{self.place.use('index')}(item) for item in {source}]")
+        rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
+        for rule in rules:
+            self._terms.append(f"all({integers.holds(rule, 'item')} for item in {local})")
+        if step.item.byteorder is None:
+            groups = ", ".join(integers.group_out("item", chunk) for chunk in step.item.chunks)
+            self._pieces.append(f"bytes([byte for item in {local} for byte in ({groups},)])")
+        else:
+            self._pieces.append(f'b"".join([{integers.to_bytes(step.item, "item")} for item in {local}])')
 
     # The expression
 
     def _expression(self, before: str) -> list[str]:
-        runs = [piece for piece in self._pieces if isinstance(piece, Run) and piece.codes]
-        pieces: list[list[str]] = []
-        for piece in self._pieces:
-            if isinstance(piece, str):
-                pieces.append([piece])
-            elif piece.codes:
-                pieces.append(
-                    self._call(piece, runs.index(piece) + 1 if len(runs) > 1 else 0, len(before) + 9)
-                )
+        rows = [piece for piece in self._pieces if isinstance(piece, Row)]
+        pieces = [
+            [piece] if isinstance(piece, str) else self._call(piece, rows, len(before))
+            for piece in self._pieces
+        ]
         if not pieces:
             return [f'{before}b""']
-        return _joined(before, pieces)
+        if len(pieces) == 1:
+            return [before + pieces[0][0], *pieces[0][1:]]
+        flat = before + " + ".join(piece[0] for piece in pieces)
+        if all(len(piece) == 1 for piece in pieces) and _INDENT + len(flat) <= WIDTH:
+            return [flat]
+        lines = [f"{before}("]
+        for index, piece in enumerate(pieces):
+            lines += indented([("+ " if index else "") + piece[0], *piece[1:]])
+        return [*lines, ")"]
 
-    def _call(self, run: Run, index: int, indent: int) -> list[str]:
-        name = f"_PACK_{self.title}" + (f"_{index}" if index else "")
-        text = run.format(self.place.names.prefix)
-        if run.items is None:
-            self.constants.append(f'{name} = Struct("{text}").pack')
-            return wrapped(f"{name}(", run.arguments, ")", indent)
-        counted = next(each for each in self.message.variable if each.type is run.items)
-        length = run.items.length
-        if length.maximum > MANY_ITEMS:
-            fixed = text.replace("{n}", f"{{{counted.name}_count}}")
-            return wrapped("pack(", [f'f"{fixed}"', *run.arguments], ")", indent)
-        span = items_span(length)
-        self.constants.append(f'{name} = {{n: Struct(f"{text}").pack for n in {span}}}')
-        return wrapped(f"{name}[{counted.name}_count](", run.arguments, ")", indent)
-
-
-def _octets(kind: Blob, name: str) -> str:
-    return f'self.{name}.encode("ascii")' if kind.text else f"as_bytes(self.{name})"
-
-
-def _joined(before: str, pieces: list[list[str]]) -> list[str]:
-    if len(pieces) == 1:
-        return [before + pieces[0][0], *pieces[0][1:]]
-    if all(len(piece) == 1 for piece in pieces):
-        line = before + " + ".join(piece[0] for piece in pieces)
-        if len(line) <= 94:
-            return [line]
-    lines = [f"{before}("]
-    for index, piece in enumerate(pieces):
-        lines += indented([("+ " if index else "") + piece[0], *piece[1:]])
-    return [*lines, ")"]
-
-
-def wrapped_condition(conditions: list[str]) -> list[str]:
-    """``if not (all of them):`` over as many lines as it takes."""
-    if len(conditions) == 1:
-        only = conditions[0]
-        if " == " in only and " <= " not in only and " or " not in only:
-            return [f"if {only.replace(' == ', ' != ')}:"]
-        return [f"if not {only}:"]
-    return folded("if not ", conditions, " and ", ":", always=True)
+    def _call(self, row: Row, rows: list[Row], before: int) -> list[str]:
+        name = f"_PACK_{self.title}" + (f"_{rows.index(row) + 1}" if len(rows) > 1 else "")
+        text = self.place.prefix + format_of(row.codes)
+        indent = _INDENT + before
+        if row.items is None:
+            self.constants.append(f'{name} = {self.place.use("Struct")}("{text}").pack')
+            return wrapped(f"{name}(", row.arguments, ")", indent)
+        self.place.use("Struct")
+        self.constants += table(name, text, "pack", row.items, "n")
+        return wrapped(f"{name}[{row.items.name}_count](", row.arguments, ")", indent)

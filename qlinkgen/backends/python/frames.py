@@ -1,86 +1,570 @@
-"""What every kind of frame has in common for the templates, and which templates it takes."""
+"""Frames for the templates: names, numbers and expressions, one view for each way to receive."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import assert_never
 
-from qlinkgen.backends.python.frames_delimited import delimited_model, unique_model
-from qlinkgen.backends.python.frames_other import marked_model, packet_model
-from qlinkgen.model.frame import Checksum, DelimitedFrame, MarkedFrame
-from qlinkgen.model.protocol import Protocol
-
-
-def kind_of(protocol: Protocol, *, unique: bool) -> str:
-    """Name of the templates for the protocol's kind of frame."""
-    return "unique" if unique else protocol.frame.kind
-
-
-def checksum_of(protocol: Protocol) -> Checksum | None:
-    """The checksum of the protocol's frames."""
-    if isinstance(protocol.frame, DelimitedFrame):
-        part = protocol.frame.part("checksum")
-        return part.checksum if part else None
-    return protocol.frame.checksum
-
-
-def measured(protocol: Protocol, *, unique: bool) -> bool:
-    """The end of a message follows from its own fields."""
-    frame = protocol.frame
-    if isinstance(frame, DelimitedFrame):
-        return not unique and frame.part("length") is None
-    return not isinstance(frame, MarkedFrame)
-
-
-def encoder_model(protocol: Protocol, *, unique: bool) -> dict[str, str]:
-    """Name and parameters of the two methods that every class has of its own."""
-    if isinstance(protocol.frame, DelimitedFrame):
-        doc = "The whole frame as it is on the wire. Raises EncodeError."
-        return {
-            "encoder": "to_frame",
-            "encoder_doc": doc,
-            "parameters": "body: bytes" if unique else "frame: bytes",
-        }
-    doc = "The payload alone. Raises EncodeError."
-    return {"encoder": "to_bytes", "encoder_doc": doc, "parameters": "payload: bytes"}
+from qlinkgen.backends.python import integers
+from qlinkgen.backends.python.layout import in_hex, literal, wrapped
+from qlinkgen.backends.python.names import attribute, class_name
+from qlinkgen.model.checksum import Algorithm, Sum
+from qlinkgen.model.integer import ByteOrder
+from qlinkgen.model.message import Direction
+from qlinkgen.plan.check import Check
+from qlinkgen.plan.framing import (
+    AddressPart,
+    ByLength,
+    ByMark,
+    CheckPart,
+    ConstantPart,
+    Envelope,
+    Hunt,
+    IdPart,
+    InStep,
+    LengthPart,
+    MarkPart,
+    Marks,
+    Part,
+    PayloadPart,
+    Rescan,
+)
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
-def directions(protocol: Protocol, wanted: tuple[str, ...]) -> list[dict[str, str]]:
+@dataclass(frozen=True)
+class Row:
+    """A message in a table: its number and its class."""
+
+    id: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A direction that is decoded: its function, its word in texts, and the names of its tables."""
+
+    direction: Direction
+    function: str
+    words: str
+    classes: str
+    readers: str
+    rows: Sequence[Row]
+
+
+@dataclass(frozen=True)
+class CheckView:
+    """The check value of a frame.
+
+    Attributes:
+        definition: statement that defines the algorithm.
+        size: bytes that are sent.
+        order: byte order of a value that is sent whole, "" where bits are left out.
+        bytes: expression for the bytes of the number ``crc``.
+        selectable: another algorithm of the catalogue can take its place.
+        maker: function of the support module that the definition calls.
+    """
+
+    definition: list[str]
+    size: int
+    order: str
+    bytes: str
+    selectable: bool
+    maker: str
+
+
+@dataclass(frozen=True)
+class AddressView:
+    """The address of a frame.
+
+    Attributes:
+        name: attribute of the messages.
+        parameter: name of the parameter of ``from_bytes``.
+        bytes: expression for the bytes of ``number``, "" where the address shares a byte.
+        default: the address that is meant where none is given.
+    """
+
+    name: str
+    parameter: str
+    bytes: str
+    default: int
+
+
+@dataclass(frozen=True)
+class UniqueView:
+    """A frame whose preamble is found nowhere else."""
+
+    title: str
+    check: CheckView
+    address: AddressView | None
+    preamble: str
+    mark: str
+    insert: str
+    header: int
+    overhead: int
+    length_end: int
+    uncounted: int
+    min_length: int
+    max_length: int
+    body_start: int
+    id_at: int
+    blank_header: str
+    trailer: int
+    whole_sizes: Sequence[int]
+    prefix: str
+    check_letter: str
+
+    template = "unique"
+
+
+@dataclass(frozen=True)
+class HeadCheck:
+    """A test that fails where no frame begins, in wire order, and what ``_split`` then gives."""
+
+    test: str
+    found: str
+
+
+@dataclass(frozen=True)
+class LengthView:
+    """The length of a frame: bounds, place, and expressions for its value in ``head`` and the bytes of ``number``."""
+
+    bias: int
+    least: int
+    most: int
+    start: int
+    end: int
+    value: str
+    bytes: str
+
+
+@dataclass(frozen=True)
+class StuffingView:
+    """The inserted bytes: ``whole`` frames but for their first and last bytes, or payloads alone."""
+
+    whole: bool
+    after: str
+    insert: str
+    front: int
+    back: int
+
+
+@dataclass(frozen=True)
+class PlacedCheck:
+    """A check value, where it is in the frame, and the expression for the bytes that it covers."""
+
+    view: CheckView
+    start: str
+    end: str
+    last: bool
+    covered: str
+
+
+@dataclass(frozen=True)
+class PartsView:
+    """Any other frame of parts."""
+
+    title: str
+    placed: PlacedCheck | None
+    address: AddressView | None
+    length: LengthView | None
+    stuffing: StuffingView | None
+    preamble: str
+    begins_with: str
+    header: int
+    trailer: int
+    max_frame: int
+    max_payload: int
+    blank_header: str
+    id_start: int
+    id_end: int
+    id_of: str
+    address_of: str
+    bare: bool
+    verified: bool
+    head_checks: Sequence[HeadCheck]
+    tail_constants: Sequence[tuple[str, str]]
+
+    template = "delimited"
+
+    @property
+    def check(self) -> CheckView | None:
+        """The check value, None where there is none."""
+        return self.placed.view if self.placed else None
+
+
+@dataclass(frozen=True)
+class MarkedView:
+    """A frame whose header and end are marked by a bit."""
+
+    title: str
+    check: CheckView | None
+    address: AddressView
+    marker: str
+    address_shift: int
+    address_mask: str
+    id_shift: int
+    id_mask: str
+    end: int
+    most: int
+    checked_default: bool
+
+    template = "marked"
+
+
+@dataclass(frozen=True)
+class PacketView:
+    """Packets: nothing marks where one begins."""
+
+    title: str
+    requests: Sequence[Row]
+    responses: Sequence[Row]
+    check_size: int = 0
+    check_bytes: str = ""
+    check_mask: str = ""
+    word: int = 1
+    total: str = ""
+    rejected: str = ""
+
+    template = "packet"
+
+
+FrameView = UniqueView | PartsView | MarkedView | PacketView
+
+
+def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
+    """The view of a protocol's frame; ``sizes`` are those of bodies that never vary."""
+    receiver = plan.frame.receiver
+    match receiver:
+        case Hunt():
+            return _unique(plan, receiver, title, sizes)
+        case Rescan():
+            return _parts(plan, receiver, title)
+        case Marks():
+            return _marked(plan, title)
+        case InStep():
+            return _packet(plan, title)
+        case _:
+            assert_never(receiver)
+
+
+# Directions
+
+
+def heard(plan: Plan) -> list[Heard]:
     """Functions and tables for each direction that is decoded."""
-    if protocol.directions == ("message",):
-        return [
-            {
-                "function": "decode",
-                "words": "",
-                "name": "message",
-                "classes": "_MESSAGES",
-                "readers": "_READERS",
-            }
-        ]
+    return [_heard(plan, direction) for direction in plan.heard]
+
+
+def _heard(plan: Plan, direction: Direction) -> Heard:
+    rows = rows_of(plan.received(direction))
+    if direction == "message":
+        return Heard(direction, "decode", "", "_MESSAGES", "_READERS", rows)
+    upper = direction.upper()
+    return Heard(direction, f"decode_{direction}", f"{direction} ", f"_{upper}S", f"_{upper}_READERS", rows)
+
+
+def rows_of(messages: Sequence[MessagePlan]) -> list[Row]:
+    """Messages as rows of a table."""
+    return [Row(in_hex(message.id), class_name(message)) for message in messages]
+
+
+# Parts of views
+
+
+def _check_view(check: Check) -> CheckView:
+    algorithm = check.algorithm
+    selectable = isinstance(algorithm, Algorithm) and algorithm.width == 16
+    maker = "sum_of" if isinstance(algorithm, Sum) else "find_crc" if selectable else "crc"
+    definition = _definition(algorithm, maker)
+    return CheckView(definition, check.size, check.regular or "", _check_bytes(check), selectable, maker)
+
+
+def _definition(algorithm: Algorithm | Sum, maker: str) -> list[str]:
+    match algorithm:
+        case Sum():
+            complement = ", complement=True" if algorithm.complement else ""
+            return [f'_checksum = {maker}("{algorithm.name}", {algorithm.width}{complement})']
+        case Algorithm(width=16):
+            return [f'_checksum = {maker}("{algorithm.name}")']
+        case Algorithm():
+            digits = (algorithm.width + 3) // 4
+            numbers = {key: f"0x{getattr(algorithm, key):0{digits}X}" for key in ("poly", "init", "xorout")}
+            arguments = [
+                f'"{algorithm.name}"',
+                f"width={algorithm.width}",
+                f"poly={numbers['poly']}",
+                f"init={numbers['init']}",
+                f"refin={algorithm.refin}",
+                f"refout={algorithm.refout}",
+                f"xorout={numbers['xorout']}",
+            ]
+            return wrapped(f"_checksum = {maker}(", arguments, ")", 0)
+        case _:
+            assert_never(algorithm)
+
+
+def _check_bytes(check: Check, number: str = "crc") -> str:
+    """Expression for the bytes of a check value; bits that are not sent are dropped."""
+    if check.regular:
+        return f'{number}.to_bytes({check.size}, "{check.regular}")'
+    pieces = [integers.group_out(number, chunk) for chunk in check.value.chunks]
+    return f"bytes(({', '.join(pieces)}{',' if len(pieces) == 1 else ''}))"
+
+
+def _address_view(plan: Plan) -> AddressView | None:
+    if not plan.frame.address:
+        return None
+    part = plan.frame.envelope.address
+    name = attribute(plan.frame.address)
+    nodes = plan.protocol.bus.nodes
+    return AddressView(
+        name=name,
+        parameter="address" if name in ("payload", "cls", "data", "head", "len", "bytes", "frame") else name,
+        bytes=integers.to_bytes(part.integer, "number") if part else "",
+        default=nodes[0] if nodes else 0,
+    )
+
+
+def _blank_header(envelope: Envelope, start: int, address: AddressView | None) -> str:
+    """A header of which only the address counts; the rest is not looked at once a frame was found."""
+    part = envelope.address
+    if part is None or address is None:
+        return f"bytes({envelope.header_size - start})"
+    before = envelope.offset(part) - start
+    after = envelope.header_size - start - before - part.size
+    pieces = [f"bytes({before})"] if before else []
+    pieces.append(f"_address(cls, {address.parameter})")
+    return " + ".join([*pieces, f"bytes({after})"] if after else pieces)
+
+
+def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> UniqueView:
+    envelope = plan.frame.envelope
+    length, number, check = envelope.length, envelope.id, envelope.check
+    assert length is not None
+    assert number is not None
+    assert check is not None
+    letter = _check_letter(check.check, plan.protocol.byteorder)
+    end = envelope.offset(length) + 1
+    address = _address_view(plan)
+    return UniqueView(
+        title=title,
+        check=_check_view(check.check),
+        address=address,
+        preamble=literal(envelope.preamble),
+        mark=in_hex(receiver.mark),
+        insert=in_hex(receiver.insert),
+        header=envelope.header_size,
+        overhead=envelope.overhead,
+        length_end=end,
+        uncounted=envelope.overhead - length.bias,
+        min_length=length.least,
+        max_length=length.most,
+        body_start=len(envelope.preamble),
+        id_at=envelope.offset(number),
+        blank_header=_blank_header(envelope, end, address),
+        trailer=envelope.trailer_size,
+        whole_sizes=sizes if letter else (),
+        prefix=">" if plan.protocol.byteorder == "big" else "<",
+        check_letter=letter,
+    )
+
+
+def _check_letter(check: Check, byteorder: ByteOrder) -> str:
+    """Format of the check value in the module's byte order, "" where struct has none."""
+    if check.size > 1 and check.regular != byteorder:
+        return ""
+    return {1: "B", 2: "H", 4: "I"}.get(check.size, "")
+
+
+def seal_lines(view: UniqueView, fixed: int | None) -> list[str]:
+    """The last step of an encoder; ``fixed`` is the size of the body where that is always the same."""
+    size = view.check.size
+    parts = [f"crc >> {8 * index}" if index else "crc" for index in range(size)]
+    tests = [
+        f"{part} == _MARK" if index == size - 1 else f"{part} & 0xFF == _MARK"
+        for index, part in enumerate(parts)
+    ]
+    last = f'return _PREAMBLE + body + crc.to_bytes({size}, "{view.check.order}")'
+    if fixed is not None and view.check_letter:
+        last = f"return _WHOLE_{fixed}(_PREAMBLE, body, crc)"
     return [
-        {
-            "function": f"decode_{name}", "words": f"{name} ", "name": name,
-            "classes": f"_{name.upper()}S", "readers": f"_{name.upper()}_READERS",
-        }
-        for name in protocol.directions
-        if name in wanted
-    ]  # fmt: skip
+        "crc = _crc(body, _crc_start)",
+        f"if _MARK in body or {' or '.join(reversed(tests))}:",
+        "    return _stuffed(body, crc)",
+        last,
+    ]
 
 
-def direction_model(names: list[str]) -> dict[str, str]:
-    """Annotation and default of a stream decoder's direction."""
-    quoted = [f'"{name}"' for name in names]
-    default = f" = {quoted[0]}" if len(names) == 1 else ""
-    return {"direction_type": f"Literal[{', '.join(quoted)}]", "direction_default": default}
+# Any other frame of parts
 
 
-def model_of(
-    protocol: Protocol, sizes: list[int], prefix: str, rows: dict[str, list[dict[str, str]]], *, unique: bool
-) -> dict[str, Any]:
-    """Everything that the templates of the protocol's kind of frame need."""
-    if unique:
-        return unique_model(protocol, sizes, prefix)
-    if isinstance(protocol.frame, DelimitedFrame):
-        return delimited_model(protocol)
-    if isinstance(protocol.frame, MarkedFrame):
-        return marked_model(protocol)
-    return packet_model(protocol, rows)
+def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
+    envelope = plan.frame.envelope
+    number, address = envelope.id, _address_view(plan)
+    assert number is not None
+    length = _length_view(plan, envelope)
+    return PartsView(
+        title=title,
+        placed=_placed(envelope),
+        address=address,
+        length=length,
+        stuffing=_stuffing(plan),
+        preamble=literal(envelope.preamble) if envelope.preamble else "",
+        begins_with=envelope.preamble.hex(" "),
+        header=envelope.header_size,
+        trailer=envelope.trailer_size,
+        max_frame=envelope.max_frame,
+        max_payload=envelope.payload.most,
+        blank_header=_blank_header(envelope, 0, address),
+        id_start=envelope.offset(number),
+        id_end=envelope.offset(number) + number.size,
+        id_of=_number_at(envelope, number),
+        address_of=_number_at(envelope, envelope.address) if envelope.address else "",
+        bare=receiver.bare,
+        verified=receiver.verified,
+        head_checks=list(_head_checks(plan, envelope, bare=receiver.bare)),
+        tail_constants=[
+            (str(-envelope.from_end(part)), literal(part.data))
+            for part in envelope.back
+            if isinstance(part, ConstantPart)
+        ],
+    )
+
+
+def _number_at(envelope: Envelope, part: LengthPart | IdPart | AddressPart, source: str = "head") -> str:
+    start = envelope.offset(part)
+    return integers.read(part.integer, source, lambda more: str(start + more))
+
+
+def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
+    if not isinstance(plan.frame.end, ByLength):
+        return None
+    part = plan.frame.end.part
+    start = envelope.offset(part)
+    return LengthView(
+        bias=part.bias,
+        least=part.least,
+        most=part.most,
+        start=start,
+        end=start + part.size,
+        value=_number_at(envelope, part),
+        bytes=integers.to_bytes(part.integer, "number"),
+    )
+
+
+def _stuffing(plan: Plan) -> StuffingView | None:
+    transparency = plan.frame.transparency
+    match transparency:
+        case Plain() | SevenBit():
+            return None
+        case FrameStuffing():
+            whole, front, back = True, transparency.front, transparency.back
+        case PayloadStuffing():
+            whole, front, back = False, 0, 0
+        case _:
+            assert_never(transparency)
+    rule = transparency.rule
+    return StuffingView(whole, literal(rule.after), literal(bytes((rule.insert,))), front, back)
+
+
+def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[HeadCheck]:
+    """What a header must hold, part by part, as far as its bytes are there."""
+    astray = '"astray", start, b""'
+    for part in envelope.front:
+        start, end = envelope.offset(part), envelope.offset(part) + part.size
+        match part:
+            case ConstantPart():
+                yield HeadCheck(f"not {literal(part.data)}.startswith(head[{start}:{end}])", astray)
+            case LengthPart():
+                whole = isinstance(plan.frame.transparency, FrameStuffing)
+                place = f"_take(buf, start, {end})[1]" if whole else f"start + {end}"
+                bounds = f"_MIN_LENGTH <= {_number_at(envelope, part)} <= _MAX_LENGTH"
+                yield HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')
+            case IdPart() | AddressPart() if bare:
+                needed = [each for each in (envelope.id, envelope.address) if each is not None]
+                known = all(envelope.offset(each) < end for each in needed)
+                if isinstance(part, IdPart):
+                    yield HeadCheck(f"len(head) >= {end} and _number(head) not in known", astray)
+                if known and envelope.address is not None:
+                    yield HeadCheck(f"len(head) >= {end} and not _allowed(head, known)", astray)
+            case IdPart() | AddressPart():
+                pass
+            case MarkPart() | PayloadPart() | CheckPart():
+                raise AssertionError(f"{part.name} is not a part of a header")
+            case _:
+                assert_never(part)
+
+
+def _placed(envelope: Envelope) -> PlacedCheck | None:
+    part = envelope.check
+    if part is None:
+        return None
+    start = -envelope.from_end(part)
+    end = start + part.size
+    covered = " + ".join(f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]" for run in envelope.coverage)
+    return PlacedCheck(
+        view=_check_view(part.check),
+        start=str(start),
+        end=str(end) if end else "",
+        last=envelope.parts[-1] is part,
+        covered=covered or 'b""',
+    )
+
+
+def _edge(envelope: Envelope, part: Part, *, after: bool = False) -> str:
+    """Where a part begins or ends in a slice of the frame."""
+    if part is envelope.payload:
+        place = -envelope.trailer_size if after else envelope.header_size
+    elif part in envelope.front:
+        place = envelope.offset(part) + (part.size if after else 0)
+        return str(place) if place else ""
+    else:
+        place = -envelope.from_end(part) + (part.size if after else 0)
+    return str(place) if place else ""
+
+
+# Frames that a bit marks, and packets
+
+
+def _marked(plan: Plan, title: str) -> MarkedView:
+    end = plan.frame.end
+    assert isinstance(end, ByMark)
+    assert end.end.end_id is not None
+    check, address = plan.frame.check, _address_view(plan)
+    assert address is not None
+    return MarkedView(
+        title=title,
+        check=_check_view(check) if check else None,
+        address=address,
+        marker=in_hex(end.header.marker),
+        address_shift=end.header.address.shift,
+        address_mask=in_hex(end.header.address.mask),
+        id_shift=end.header.id.shift,
+        id_mask=in_hex(end.header.id.mask),
+        end=end.end.end_id,
+        most=plan.frame.max_payload + (check.size if check else 0),
+        checked_default=all(message.checked for message in plan.messages),
+    )
+
+
+def _packet(plan: Plan, title: str) -> PacketView:
+    check = plan.frame.check
+    requests = rows_of([message for message in plan.messages if message.direction != "response"])
+    responses = rows_of([message for message in plan.messages if message.direction == "response"])
+    if check is None:
+        return PacketView(title, requests, responses)
+    assert isinstance(check.algorithm, Sum)
+    return PacketView(
+        title=title,
+        requests=requests,
+        responses=responses,
+        check_size=check.size,
+        check_bytes=_check_bytes(check, "check"),
+        check_mask=f"0x{check.algorithm.mask:X}",
+        word=check.word,
+        total="~total" if check.algorithm.complement else "total",
+        rejected="" if check.rejected is None else f"0x{check.rejected:0{check.size * 2}X}",
+    )

@@ -2,155 +2,192 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import textwrap
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import jinja2
 
-from qlinkgen.backends.base import Options, banner, environment
+from qlinkgen.backends import python_text
+from qlinkgen.backends.base import banner, environment
 from qlinkgen.backends.python import frames, tables
-from qlinkgen.backends.python.checks import selectable
-from qlinkgen.backends.python.classes import ClassBuilder, ClassModel, class_name
-from qlinkgen.backends.python.frames_delimited import is_unique, seal_lines
-from qlinkgen.backends.python.imports import PUBLIC, imports
-from qlinkgen.backends.python.place import Place, in_hex, place_of
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame
-from qlinkgen.model.message import Message
-from qlinkgen.model.protocol import Protocol
+from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
+from qlinkgen.backends.python.frames import FrameView, MarkedView, PacketView, PartsView, UniqueView
+from qlinkgen.backends.python.layout import WIDTH
+from qlinkgen.backends.python.names import class_name
+from qlinkgen.backends.python.place import Place, place_of
+from qlinkgen.model.texts import one_line
+from qlinkgen.plan.tree import Plan
+
+#: Names of the support module that every module passes on.
+_PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
+#: Names of struct, of other modules, and of typing; all others are of the support module.
+_STRUCT = ("Struct", "pack", "unpack_from")
+_ELSEWHERE = ("Decimal", "index", *_STRUCT)
 
 
-def render(protocol: Protocol, options: Options) -> str:
+def render(plan: Plan) -> str:
     """The text of a protocol's module."""
-    return Module(protocol, options).text()
+    return Module(plan).text()
+
+
+@functools.cache
+def templates() -> jinja2.Environment:
+    """The templates of this back-end, with the one way for a text into them."""
+    found = environment(__package__)
+    found.filters["docstring"] = lambda text: "\n".join(python_text.docstring([text]))
+    return found
+
+
+@dataclass(frozen=True)
+class MessageRow:
+    """A message of the table by names."""
+
+    message: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Imports:
+    """What a module imports: names of struct, of support, of typing, and whether others are used."""
+
+    struct: Sequence[str]
+    struct_error: bool
+    decimal: bool
+    index: bool
+    support: Sequence[str]
+    callable: bool
+    typing: Sequence[str]
 
 
 class Module:
     """Collects what the templates place."""
 
-    def __init__(self, protocol: Protocol, options: Options) -> None:
-        self.protocol = protocol
-        self.options = options
-        self.templates: jinja2.Environment = environment(__package__)
-        self.messages = kept(protocol, options)
-        names = [class_name(message) for message in self.messages]
-        self.constants = tables.constant_classes(protocol, names)
-        self.unique = is_unique(protocol)
-        self.place: Place = place_of(protocol, self.constants, unique=self.unique)
-        measured = frames.measured(protocol, unique=self.unique)
-        self.builder = ClassBuilder(self.place, protocol, self.messages, measured=measured)
-        self.models: list[ClassModel] = []
-        self.tables = self._tables()
+    def __init__(self, plan: Plan) -> None:
+        """Build what the module's parts share."""
+        self.plan = plan
+        self.place: Place = place_of(plan)
+        self.builder = ClassBuilder(plan, self.place)
 
     def text(self) -> str:
         """The module's text."""
-        self.models = self.builder.build()
-        body = {"classes": self._classes(self.models), "steps": self.builder.steps, **self._frame()}
-        context = {**self._head(), **self.tables, **body}
-        text = "\n".join([*body["steps"], body["classes"], body["frame"], body["decoder"]])
-        context |= imports(text, enums=bool(self.tables["enums"]), flags=bool(self.tables["flags"]))
-        context |= {"public": self._public(text)}
+        plan, models = self.plan, self.builder.build()
+        sizes = sorted({each.body_size for each in models if each.body_size is not None})
+        view = frames.view_of(plan, one_line(plan.protocol.title), sizes)
+        heard = frames.heard(plan)
+        quoted = [f'"{each.direction}"' for each in heard]
+        context: dict[str, object] = {
+            "f": view,
+            "heard": heard,
+            "direction_type": f"Literal[{', '.join(quoted)}]",
+            "direction_default": f" = {quoted[0]}" if len(quoted) == 1 else "",
+            "doc": self._doc(),
+            "enums": [tables.enum_model(each, self.place.classes[each.name]) for each in plan.enums],
+            "flags": [tables.flags_model(each, self.place.classes[each.name]) for each in plan.flags],
+            "messages": [MessageRow(each.name, class_name(each)) for each in plan.messages],
+            "bus": tables.bus(plan.protocol.bus),
+            "commands": tables.command_rows(plan),
+            "scales": self.builder.scales,
+            "classes": self._classes(models, view),
+            "public": self._public(view, heard),
+            "imports": self._imports(view, models),
+        }
+        context |= {
+            "frame": self._place(f"{view.template}.j2", context).strip(),
+            "decoder": self._place(f"{view.template}_decoder.j2", context).strip(),
+        }
         return _tidy(self._place("module.j2", context))
 
-    def _place(self, template: str, context: dict[str, Any]) -> str:
-        return self.templates.get_template(f"templates/{template}").render(context)
+    def _place(self, template: str, context: dict[str, object]) -> str:
+        return templates().get_template(f"templates/{template}").render(context)
 
-    def _head(self) -> dict[str, Any]:
-        doc = " ".join(f"{self.protocol.doc} Source: {self.protocol.source}.".split())
-        return {"banner": banner(self.protocol), "doc": textwrap.wrap(doc, 108), "title": self.protocol.title}
+    def _doc(self) -> list[str]:
+        protocol = self.plan.protocol
+        title, *others = map(one_line, banner(protocol))
+        about = one_line(f"{protocol.doc} Source: {protocol.source}.")
+        opening = textwrap.wrap(f"{title}: messages, frames and transactions.", WIDTH - 4)
+        banner_lines = [line for other in others for line in textwrap.wrap(other, WIDTH)]
+        return python_text.docstring([*opening, "", *textwrap.wrap(about, WIDTH), "", *banner_lines])
 
-    def _tables(self) -> dict[str, Any]:
-        by_name = {message.name: message for message in self.messages}
-        rows = [{"message": message.name, "name": class_name(message)} for message in self.messages]
-        used = self._used_constants()
-        return {
-            "enums": [
-                tables.enum_model(e, self.constants[e.name]) for e in self.protocol.enums if e.name in used
-            ],
-            "flags": [
-                tables.flags_model(f, self.constants[f.name]) for f in self.protocol.flags if f.name in used
-            ],
-            "messages": rows,
-            "bus": tables.bus(self.protocol.bus),
-            "commands": tables.command_rows(self.protocol.commands, by_name),
-        }
-
-    def _used_constants(self) -> set[str]:
-        if not self.options.only:
-            return set(self.constants)
-        return {
-            meaning.name
-            for message in self.messages
-            for value in message.values
-            if (meaning := getattr(value.type, "meaning", None)) and not isinstance(meaning, str)
-        }
-
-    # The frame and its decoder
-
-    def _frame(self) -> dict[str, Any]:
-        names = _received(self.options)
-        context: dict[str, Any] = {
-            "title": self.protocol.title,
-            "verifies": False,
-            "directions": frames.directions(self.protocol, names),
-        }
-        context |= {"known": self._known(context["directions"])}
-        context |= frames.direction_model([each["name"] for each in context["directions"]])
-        sizes = sorted({each.body_size for each in self.models if each.body_size is not None})
-        rows = {name: self._rows(name) for name in ("request", "response")}
-        context |= frames.model_of(self.protocol, sizes, self.place.names.prefix, rows, unique=self.unique)
-        kind = frames.kind_of(self.protocol, unique=self.unique)
-        context["selectable"] = selectable(frames.checksum_of(self.protocol))
-        return {
-            "frame": self._place(f"{kind}.j2", context).strip(),
-            "decoder": self._place(f"{kind}_decoder.j2", context).strip(),
-        }
-
-    def _known(self, directions: Iterable[dict[str, str]]) -> list[dict[str, Any]]:
-        return [{**each, "rows": self._rows(each["name"])} for each in directions]
-
-    def _rows(self, direction: str) -> list[dict[str, str]]:
-        messages = [message for message in self.messages if message.direction in (direction, "message")]
-        return [{"id": in_hex(message.id), "name": class_name(message)} for message in messages]
-
-    def _classes(self, models: list[ClassModel]) -> str:
-        template = self.templates.get_template("templates/class.j2")
-        common = frames.encoder_model(self.protocol, unique=self.unique)
-        texts = []
-        for each in models:
-            seal = self._seal(each) if each.has_codec else []
-            texts.append(template.render(each=each, seal=seal, **common))
+    def _classes(self, models: Sequence[ClassModel], view: FrameView) -> str:
+        template = templates().get_template("templates/class.j2")
+        whole = self.place.envelope is not None
+        kind = "whole frame as it is on the wire" if whole else "payload alone"
+        texts = [
+            template.render(
+                each=each,
+                seal=self._seal(each, view) if each.has_codec else [],
+                encoder="to_frame" if whole else "to_bytes",
+                encoder_doc=f"The {kind}. Raises EncodeError.",
+                data=self.place.data,
+            )
+            for each in models
+        ]
         return "".join(texts).strip("\n")
 
-    def _seal(self, each: ClassModel) -> list[str]:
-        if not isinstance(self.protocol.frame, DelimitedFrame):
-            return []
-        if not self.unique:
-            return ["return _sealed(body)"]
-        return seal_lines(self.protocol.frame, each.body_size, self.place.names.prefix)
+    @staticmethod
+    def _seal(each: ClassModel, view: FrameView) -> list[str]:
+        match view:
+            case UniqueView():
+                return frames.seal_lines(view, each.body_size)
+            case PartsView():
+                return ["return _sealed(body)"]
+            case MarkedView() | PacketView():
+                return []
 
     # Names
 
-    def _public(self, text: str) -> list[str]:
-        names = [class_name(message) for message in self.messages]
-        names += [row.name for group in ("enums", "flags") for row in self.tables[group]]
-        names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *PUBLIC]
-        names += ["MARKING", "Marking"] if isinstance(self.protocol.frame, MarkedFrame) else []
-        names += re.findall(r"^def ([a-z]\w*)", text, re.MULTILINE)
+    def _imports(self, view: FrameView, models: Sequence[ClassModel]) -> Imports:
+        """What the code of the classes has used, and what the templates of the frame use."""
+        plan, used = self.plan, {*self.place.used, *_PUBLIC, "BaseMessage", "as_bytes", "wrong_size"}
+        used |= {"OpenEnum", "named"} if plan.enums else set()
+        used |= {"REFUSALS", "refused"} if any(each.has_codec and each.refusable for each in models) else set()
+        typing = {"ClassVar", "Literal", "Self"}
+        typing |= {"Final"} if plan.flags else set()
+        check = None if isinstance(view, PacketView) else view.check
+        if check is not None:
+            used |= {"Checksum", "wrong_check", check.maker}
+        match view:
+            case UniqueView():
+                used |= {"UNREAD", "UNREADABLE", *(["Struct"] if view.whole_sizes else [])}
+                typing |= {"Any"}
+            case PartsView():
+                pass
+            case MarkedView():
+                used |= {"Marking", "illegal", "index", "refused"}
+            case PacketView():
+                used |= {"short_of"}
+        if isinstance(view, UniqueView | PartsView) and not view.address:
+            typing -= set() if plan.enums else {"ClassVar"}
+        if isinstance(view, PacketView) and not plan.enums:
+            typing -= {"ClassVar"}
+        return Imports(
+            struct=[name for name in _STRUCT if name in used],
+            struct_error=True,
+            decimal="Decimal" in used,
+            index="index" in used,
+            support=sorted(used - set(_ELSEWHERE), key=lambda name: (name.upper() != name, name.lower())),
+            callable=isinstance(view, UniqueView),
+            typing=sorted(typing),
+        )
+
+    def _public(self, view: FrameView, heard: Sequence[frames.Heard]) -> list[str]:
+        names = [class_name(message) for message in self.plan.messages]
+        names += [self.place.classes[each.name] for each in (*self.plan.enums, *self.plan.flags)]
+        names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", "encode", *_PUBLIC]
+        names += [each.function for each in heard]
+        match view:
+            case PacketView():
+                names += ["Request", "Response", "decode_request", "decode_response"]
+            case MarkedView():
+                names += ["MARKING", "Marking"]
+            case UniqueView() | PartsView():
+                pass
+        if not isinstance(view, PacketView) and view.check and view.check.selectable:
+            names.append("Codec")
         return sorted(set(names))
-
-
-def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
-    """The messages that have a class in the module."""
-    only = set(options.only)
-    if not only:
-        return protocol.messages
-    return tuple(m for m in protocol.messages if m.name in only or m.command in only)
-
-
-def _received(options: Options) -> tuple[str, ...]:
-    return {"both": ("request", "response"), "master": ("response",), "slave": ("request",)}[options.role]
 
 
 def _tidy(text: str) -> str:

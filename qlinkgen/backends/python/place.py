@@ -1,157 +1,104 @@
-"""Where a message's code stands: names in the module, and the frame around the payload."""
+"""What surrounds the payload in the bytes that the class of a message encodes and decodes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from qlinkgen.backends.python.scalars import Names
-from qlinkgen.model.frame import DelimitedFrame, Part
-from qlinkgen.model.message import Message
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Length
-
-#: Longest line of generated code.
-WIDTH = 110
+from qlinkgen.backends.python.names import attribute, constant_classes
+from qlinkgen.model.integer import ByteOrder
+from qlinkgen.plan.framing import CheckPart, Envelope, Hunt, InStep, Marks, Part, Rescan
+from qlinkgen.plan.tree import Plan
 
 
 @dataclass(frozen=True)
 class Place:
-    """Everything that the code of a message needs to know of its module.
+    """The module and the frame around a payload.
 
     Attributes:
-        names: byte order and classes of the module.
-        frame: the frame if its codec handles whole frames; None where it handles payloads alone.
+        byteorder: of the structs.
+        classes: class of each enum and flags.
+        envelope: the frame if classes handle whole frames; None where they handle payloads alone.
         address: attribute that holds the address, "" if there is none.
-        unique: the preamble is added by the encoder's last step and checked by the receiver.
+        unique: the preamble is added by an encoder's last step and checked by the receiver.
+        texts: defaults that are text are spelt as text, not as numbers.
+        used: names of imports that the code so far has used.
     """
 
-    names: Names
-    frame: DelimitedFrame | None
-    address: str = ""
-    unique: bool = False
+    byteorder: ByteOrder
+    classes: Mapping[str, str]
+    envelope: Envelope | None
+    address: str
+    unique: bool
+    texts: bool = True
+    used: set[str] = field(default_factory=set, compare=False)
+
+    def use(self, name: str) -> str:
+        """A name that the module has to import."""
+        self.used.add(name)
+        return name
+
+    @property
+    def prefix(self) -> str:
+        """Byte order of the structs as their formats begin."""
+        return ">" if self.byteorder == "big" else "<"
+
+    @property
+    def skipped(self) -> int:
+        """Bytes at the front of the frame that are not in what classes handle."""
+        return len(self.envelope.preamble) if self.envelope and self.unique else 0
 
     @property
     def header(self) -> int:
-        """Bytes in front of the payload in what a decoder reads: the frame, or all behind its preamble."""
-        if self.frame is None:
-            return 0
-        return self.frame.header_size - (len(self.frame.preamble) if self.unique else 0)
+        """Bytes before the payload."""
+        return self.envelope.header_size - self.skipped if self.envelope else 0
 
     @property
     def trailer(self) -> int:
-        """Bytes behind the payload."""
-        return self.frame.overhead - self.frame.header_size if self.frame else 0
+        """Bytes after the payload."""
+        return self.envelope.trailer_size if self.envelope else 0
 
     @property
     def overhead(self) -> int:
-        """Bytes beside the payload in what a decoder reads."""
+        """Bytes beside the payload."""
         return self.header + self.trailer
 
     @property
     def front(self) -> tuple[Part, ...]:
-        """Parts that the encoder packs in front of the payload."""
-        if self.frame is None:
-            return ()
-        names = [part.role for part in self.frame.parts]
-        return self.frame.parts[1 if self.unique else 0 : names.index("payload")]
+        """Parts before the payload."""
+        return self.envelope.front[int(self.unique) :] if self.envelope else ()
 
     @property
     def back(self) -> tuple[Part, ...]:
-        """Parts that the encoder packs behind the payload; a checksum at the very end is added later."""
-        if self.frame is None:
-            return ()
-        names = [part.role for part in self.frame.parts]
-        parts = self.frame.parts[names.index("payload") + 1 :]
-        return parts[:-1] if parts and parts[-1].role == "checksum" else parts
+        """Parts after the payload that an encoder packs; a check value at the very end is added later."""
+        back = self.envelope.back if self.envelope else ()
+        return back[:-1] if back and isinstance(back[-1], CheckPart) else back
 
     @property
     def data(self) -> str:
         """Name of what a decoder reads."""
-        if self.frame is None:
-            return "payload"
-        return "body" if self.unique else "frame"
+        return "payload" if self.envelope is None else "body" if self.unique else "frame"
 
     @property
     def payload(self) -> str:
         """Expression for the payload, for error texts."""
-        return f"_payload({self.data})" if self.frame else "payload"
+        return f"_payload({self.data})" if self.envelope else "payload"
 
 
-def in_ranges(number: str, ranges: Iterable[tuple[int, int]]) -> str:
-    """The condition that a number is in one of several ranges."""
-    terms = [f"{number} == {low}" if low == high else f"{low} <= {number} <= {high}" for low, high in ranges]
-    return f"({' or '.join(terms)})" if len(terms) > 1 else terms[0]
-
-
-def wrapped(head: str, items: Iterable[str], tail: str, indent: int) -> list[str]:
-    """``head item, item tail`` on as many lines as it takes; indent is that of the first one."""
-    listed = list(items)
-    line = f"{head}{', '.join(listed)}{tail}"
-    if indent + len(line) <= WIDTH:
-        return [line]
-    lines, current = [head], "   "
-    for item in listed:
-        if indent + len(current) + len(item) + 2 > WIDTH and current.strip():
-            lines.append(current)
-            current = "   "
-        current += f" {item},"
-    return [*lines, current, tail]
-
-
-def folded(
-    head: str, terms: Sequence[str], operator: str, tail: str = "", *, always: bool = False
-) -> list[str]:
-    """``head term operator term tail``, in parentheses (``always`` or) where it takes several lines."""
-    joined = operator.join(terms)
-    line = f"{head}({joined}){tail}" if always and len(terms) > 1 else f"{head}{joined}{tail}"
-    if len(line) <= WIDTH - 16:
-        return [line]
-    rest = [f"{operator.lstrip()}{term}" for term in terms[1:]]
-    return [f"{head}(", *indented([terms[0], *rest]), f"){tail}"]
-
-
-def indented(lines: Iterable[str], levels: int = 1) -> list[str]:
-    """Lines moved to the right."""
-    return ["    " * levels + line if line else line for line in lines]
-
-
-def in_hex(number: int, size: int = 1) -> str:
-    """A number in hex digits."""
-    return f"0x{number:0{2 * size}X}"
-
-
-def literal(data: bytes) -> str:
-    """Bytes as source text."""
-    text = repr(data)[2:-1].replace('"', r"\x22").replace(r"\'", "'")
-    return f'b"{text}"'
-
-
-def joined_format(codes: Iterable[str]) -> str:
-    """Formats in a row, pad bytes that follow one another as one."""
-    text, pads = "", 0
-    for code in codes:
-        if code.endswith("x"):
-            pads += int(code[:-1] or 1)
-            continue
-        text += (f"{pads}x" if pads else "") + code
-        pads = 0
-    return text + (f"{pads}x" if pads else "")
-
-
-def place_of(protocol: Protocol, enums: Mapping[str, str], *, unique: bool) -> Place:
+def place_of(plan: Plan) -> Place:
     """The place of a protocol's messages."""
-    names = Names(">" if protocol.byteorder == "big" else "<", enums)
-    frame = protocol.frame if isinstance(protocol.frame, DelimitedFrame) else None
-    return Place(names, frame, protocol.address_name or "", unique)
-
-
-def items_span(length: Length) -> str:
-    """The numbers of items that a field may have, as a range."""
-    first = f"{length.minimum}, " if length.minimum else ""
-    return f"range({first}{length.maximum + 1})"
-
-
-def constant_name(message: Message) -> str:
-    """Name of a message in the names of constants."""
-    return message.name.replace(".", "_").upper()
+    match plan.frame.receiver:
+        case Hunt():
+            envelope, unique = plan.frame.envelope, True
+        case Rescan():
+            envelope, unique = plan.frame.envelope, False
+        case Marks() | InStep():
+            envelope, unique = None, False
+    return Place(
+        byteorder=plan.protocol.byteorder,
+        classes=constant_classes(plan),
+        envelope=envelope,
+        address=attribute(plan.frame.address) if plan.frame.address else "",
+        unique=unique,
+        texts=plan.protocol.texts,
+    )

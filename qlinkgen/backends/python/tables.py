@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from qlinkgen.backends.python.classes import class_name
-from qlinkgen.backends.python.place import in_hex, wrapped
-from qlinkgen.model.message import Message
-from qlinkgen.model.naming import pascal
-from qlinkgen.model.protocol import Protocol
+from qlinkgen.backends import python_text
+from qlinkgen.backends.python.layout import WIDTH, in_hex, wrapped
+from qlinkgen.backends.python.names import attribute, class_name
+from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Bus, Command
 from qlinkgen.model.types import Constant, Enum, Flags
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 @dataclass(frozen=True)
@@ -32,17 +32,6 @@ class ConstantsModel:
     name: str
     doc: list[str]
     members: list[Member]
-
-
-def constant_classes(protocol: Protocol, taken: Iterable[str]) -> Mapping[str, str]:
-    """Class of each enum and flags; one whose name a message has is told apart by what it is."""
-    names = set(taken)
-    found = {}
-    for group, suffix in ((protocol.enums, "Enum"), (protocol.flags, "Flags")):
-        for each in group:
-            name = pascal(each.name)
-            found[each.name] = f"{name}{suffix}" if name in names else name
-    return found
 
 
 def enum_model(enum: Enum, name: str) -> ConstantsModel:
@@ -64,37 +53,37 @@ def flags_model(flags: Flags, name: str) -> ConstantsModel:
 
 
 def _comment(constant: Constant) -> list[str]:
-    return textwrap.wrap(constant.doc, 100) if constant.doc else []
+    return python_text.comment(constant.doc, WIDTH - 10)
 
 
 def _doc(doc: str, section: str, more: str) -> list[str]:
     where = f" ({'section ' if section[:1].isdigit() else ''}{section})" if section else ""
-    text = f"{doc.rstrip('.')}{where}." if doc else ""
+    text = one_line(f"{doc.rstrip('.')}{where}.") if doc else ""
     first, _, rest = text.partition(". ")
     lines = [f"{first}.", "", rest, more] if rest else [text, "", more]
     if not text:
-        return [f'"""{more}"""']
-    wrapped = [part for line in lines for part in (textwrap.wrap(line, 102) or [""])]
-    return [f'"""{wrapped[0]}', *wrapped[1:], '"""']
+        return python_text.docstring([more])
+    return python_text.docstring(part for line in lines for part in (textwrap.wrap(line, WIDTH - 8) or [""]))
 
 
-def bus(line: Bus) -> str:
+def bus(line: Bus) -> list[str]:
     """The call that makes the description of the bus; what the schema does not say is left out."""
     facts = [("broadcast", line.broadcast), ("baud", line.baud), ("bits_per_byte", line.bits_per_byte)]
     if line.nodes:
         facts = [("first_node", line.nodes[0]), ("last_node", line.nodes[1]), *facts]
     given = [f"{name}={value}" for name, value in facts if value is not None]
-    return f'Bus("{line.kind}", {", ".join(given)})'
+    return wrapped("BUS = Bus(", [f'"{line.kind}"', *given], ")", 0)
 
 
-def command_rows(commands: Iterable[Command], kept: Mapping[str, Message]) -> list[str]:
-    """The rows of the transaction table, over one line or several."""
-    return [_row(command, kept) for command in commands if command.request.name in kept]
+def command_rows(plan: Plan) -> list[list[str]]:
+    """The rows of the transaction table, each over one line or several."""
+    return [_row(command, plan.by_name) for command in plan.commands]
 
 
-def _row(command: Command, kept: Mapping[str, Message]) -> str:
-    response = class_name(command.response) if command.response and command.response.name in kept else "None"
-    arguments = [f'"{command.name}"', in_hex(command.id), class_name(command.request), response]
+def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
+    answer = kept.get(command.response.name) if command.response else None
+    request, response = class_name(kept[command.request.name]), class_name(answer) if answer else "None"
+    arguments = [f'"{command.name}"', in_hex(command.id), request, response]
     if command.addressing != "none":
         arguments.append(f'addressing="{command.addressing}"')
     within = command.response_within
@@ -106,22 +95,23 @@ def _row(command: Command, kept: Mapping[str, Message]) -> str:
     if command.in_flight != 1:
         arguments.append(f"in_flight={command.in_flight}")
     if command.section:
-        arguments.append(f"section={command.section!r}".replace("'", '"'))
+        arguments.append(f"section={python_text.literal(command.section)}")
     if not command.confirmed:
         arguments.append("confirmed=False")
     if command.attributes:
-        pairs = ", ".join(f'"{key}": {_literal(value)}' for key, value in command.attributes.items())
-        arguments.append(f"attributes={{{pairs}}}")
-    return "\n".join(wrapped(f'"{command.name}": Command(', arguments, "),", 4))
+        pairs = (f"{python_text.literal(key)}: {_literal(value)}" for key, value in command.attributes.items())
+        arguments.append(f"attributes={{{', '.join(pairs)}}}")
+    return wrapped(f'"{command.name}": Command(', arguments, "),", 4)
 
 
 def _repetition(command: Command) -> list[str]:
     """What may be sent again, and what comes back as it was sent."""
-    names = "".join(f'"{name}", ' for name in command.echoes)
+    names = [f'"{attribute(name)}"' for name in command.echoes]
+    echoes = f"{names[0]}," if len(names) == 1 else ", ".join(names)
     facts = {
         "repeat_safe=True": command.repeat.safe,
-        f'repeat_counter="{command.repeat.counter}"': command.repeat.counter,
-        f"echoes=({names.rstrip(' ' if len(command.echoes) == 1 else ', ')})": names,
+        f'repeat_counter="{attribute(command.repeat.counter)}"': command.repeat.counter,
+        f"echoes=({echoes})" if names else "": names,
     }
     return [argument for argument, given in facts.items() if given]
 
@@ -131,4 +121,4 @@ def _number(value: Fraction) -> str:
 
 
 def _literal(value: str | int | bool) -> str:
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+    return python_text.literal(value) if isinstance(value, str) else repr(value)

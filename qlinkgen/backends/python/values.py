@@ -1,128 +1,202 @@
-"""What a field is in Python: its type, default, rule and description."""
+"""What a value is in Python: its type, default, rule and description."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from decimal import Decimal
+from typing import assert_never
 
-from qlinkgen.backends.python.place import Place, literal
-from qlinkgen.model.message import Field, Message, Value
-from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
-from qlinkgen.model.values import default_of
+from qlinkgen.backends import python_text
+from qlinkgen.backends.python.layout import literal
+from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.place import Place
+from qlinkgen.model.message import Value
+from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.model.values import native_from_raw
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    ReservedStep,
+    RunStep,
+    Step,
+    ValueStep,
+)
+from qlinkgen.plan.tree import MessagePlan
+
+Settable = ValueStep | MemberValue | RunStep
 
 
-def annotation(value: Value, place: Place) -> str:
+def is_required(each: Settable) -> bool:
+    """The caller has to choose the value."""
+    match each:
+        case ValueStep() | MemberValue():
+            return each.number.required
+        case BytesStep() | ItemsStep():
+            return each.required
+        case _:
+            assert_never(each)
+
+
+def annotation(each: Settable, place: Place) -> str:
     """Type of the attribute."""
-    kind = value.type
-    if isinstance(kind, Array):
-        return "list[int]"
-    if isinstance(kind, Blob):
-        return "str" if kind.text else "bytes"
-    if isinstance(kind.meaning, Enum):
-        return f"{place.names.enums[kind.meaning.name]} | int"
-    if kind.meaning == "bool":
+    match each:
+        case ItemsStep():
+            return "list[int]"
+        case BytesStep():
+            return "str" if each.text else "bytes"
+        case ValueStep() | MemberValue():
+            return _number_type(each.number, place)
+        case _:
+            assert_never(each)
+
+
+def _number_type(number: Scalar, place: Place) -> str:
+    if isinstance(number.meaning, Enum):
+        return f"{place.classes[number.meaning.name]} | int"
+    if number.meaning == "bool":
         return "bool"
-    return {"int": "int", "float": "float", "decimal": "Decimal"}[kind.number]
+    return place.use("Decimal") if number.number == "decimal" else number.number
 
 
-def argument(value: Value, place: Place) -> str:
+def argument(each: Settable, place: Place) -> str:
     """Parameter of a function that takes the value, with its default where it has one."""
-    kind = annotation(value, place)
-    if value.required:
-        return f"{value.name}: {kind}"
-    if isinstance(value.type, Array):
-        return f"{value.name}: {kind} | None = None"
-    return f"{value.name}: {kind} = {default(value, place)}"
+    kind, name = annotation(each, place), attribute(each.name)
+    if is_required(each):
+        return f"{name}: {kind}"
+    if isinstance(each, ItemsStep):
+        return f"{name}: {kind} | None = None"
+    return f"{name}: {kind} = {default(each, place)}"
 
 
-def default(value: Value, place: Place) -> str:
-    """Expression for the default; that of a list is made anew for each message."""
-    kind, native = value.type, default_of(value)
-    if isinstance(kind, Scalar) and isinstance(kind.meaning, Enum):
-        name = kind.meaning.name_of(kind.default)
-        return f"{place.names.enums[kind.meaning.name]}.{name.upper()}" if name else str(kind.default)
-    if isinstance(kind, Scalar) and isinstance(kind.meaning, Flags) and kind.default:
-        return f"{kind.default:#x}"
-    return _decimal(native) if isinstance(native, Decimal) else _quoted(native)
+def assignment(each: Settable) -> str:
+    """The statement that stores an argument; the default of a list is made anew for each message."""
+    name = attribute(each.name)
+    if isinstance(each, ItemsStep) and not each.required:
+        return f"self.{name} = {list(each.default)} if {name} is None else {name}"
+    return f"self.{name} = {name}"
 
 
-def _decimal(value: Decimal) -> str:
-    return f"Decimal({value})" if value == value.to_integral_value() else f'Decimal("{value}")'
+def required_defaults(message: MessagePlan, place: Place) -> list[str]:
+    """Arguments for what has no default in the class."""
+    return [f"{attribute(e.name)}={default(e, place)}" for e in message.payload.settable if is_required(e)]
 
 
-def _quoted(value: object) -> str:
-    if isinstance(value, bytes):
-        return literal(value)
-    text = repr(value)
-    return text if not isinstance(value, str) or '"' in value else f'"{text[1:-1]}"'
+def default(each: Settable, place: Place) -> str:
+    """Expression for the default."""
+    match each:
+        case ItemsStep():
+            return str(list(each.default))
+        case BytesStep() if each.text and place.texts:
+            return python_text.literal(each.default.decode("ascii"))
+        case BytesStep() if each.text:
+            return f'bytes({list(each.default)}).decode("ascii")' if each.default else '""'
+        case BytesStep():
+            return literal(each.default)
+        case ValueStep() | MemberValue():
+            return _default_number(each.number, place)
+        case _:
+            assert_never(each)
 
 
-def steps_name(scalar: Scalar, name: str) -> str:
-    """Name of the constant that converts a scaled field; equal conversions of one name share it."""
-    assert scalar.scaling is not None
-    scaling = scalar.scaling
-    words = [name, "u" if not scalar.signed else "i", str(scalar.bits)]
-    parts = [scaling.factor, scaling.bias, scaling.divisor, scalar.minimum, scalar.maximum, scalar.unit]
-    return "|".join(map(str, [*words, *parts]))
+def _default_number(number: Scalar, place: Place) -> str:
+    native = native_from_raw(number, number.default)
+    if isinstance(number.meaning, Enum) and (name := number.meaning.name_of(number.default)):
+        return f"{place.classes[number.meaning.name]}.{name.upper()}"
+    if isinstance(number.meaning, Flags) and number.default:
+        return f"{number.default:#x}"
+    if isinstance(native, Decimal):
+        whole = native == native.to_integral_value()
+        return f"Decimal({native})" if whole else f'Decimal("{native}")'
+    return repr(native)
 
 
-def steps_arguments(scalar: Scalar, name: str) -> str:
-    """Class and arguments of the constant that converts a scaled field."""
-    assert scalar.scaling is not None
-    scaling = scalar.scaling
-    kind = "DecimalSteps" if scalar.number == "decimal" else "Steps"
-    numbers = [f"{scalar.minimum}, {scalar.maximum}"]
-    numbers += [f"factor={scaling.factor}"] if scaling.factor != 1 else []
-    numbers += [f"bias={scaling.bias}"] if scaling.bias else []
-    numbers += [f"divisor={scaling.divisor}"] if scaling.divisor != 1 else []
-    return f'{kind}("{name}", {", ".join(numbers)}{_unit(scalar.unit)})'
+# Scales and rules
 
 
-def rules(message: Message, place: Place, steps: dict[str, str]) -> list[str]:
+def scale_arguments(number: Scalar, place: Place) -> str:
+    """Class and arguments of the constant that converts a scaled value."""
+    assert number.scaling is not None
+    scaling = number.scaling
+    kind = "DecimalScale" if number.number == "decimal" else "Scale"
+    settings = {"factor": (scaling.factor, 1), "bias": (scaling.bias, 0), "divisor": (scaling.divisor, 1)}
+    given = [f"{key}={value}" for key, (value, usual) in settings.items() if value != usual]
+    return f"{place.use(kind)}({', '.join([str(number.minimum), str(number.maximum), *given])})"
+
+
+def rules(message: MessagePlan, place: Place, scales: Mapping[str, str]) -> list[str]:
     """Expressions for the rules of a message, the address first."""
-    found = [_address(message, place)] if message.addresses and place.address else []
-    settable = {value.name: value for value in message.values}
-    for each in message.fields:
-        inside = [value for value in message.values if value.field is each]
-        if not inside and isinstance(each.type, Scalar) and not each.type.reserved:
-            found.append(_fixed_rule(each, each.type))
-        found += [_rule(settable[value.name], steps) for value in inside]
+    found: list[str] = []
+    if message.allowed is not None and place.address:
+        bounds = ", ".join(f"{each.low}, {each.high}" for each in message.allowed.ranges)
+        found.append(f'{place.use("Whole")}("{place.address}", {bounds})')
+    for step in message.payload.steps:
+        found += _rules(step, place, scales)
     return found
 
 
-def _address(message: Message, place: Place) -> str:
-    bounds = ", ".join(f"{low}, {high}" for low, high in message.addresses)
-    return f'Whole("{place.address}", {bounds})'
+def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[str]:
+    match step:
+        case ConstantStep():
+            return [f'{place.use("Constant")}("{attribute(step.name)}", {step.value})']
+        case CountStep():
+            return [f'{place.use("Count")}("{attribute(step.name)}", "{step.run}")']
+        case ReservedStep():
+            return []
+        case BitsStep():
+            members = (_member_rule(member, place, scales) for member in step.members)
+            return [rule for rule in members if rule]
+        case BytesStep():
+            kind = "Text" if step.text else "Octets"
+            return [f'{place.use(kind)}("{attribute(step.name)}", {step.length.minimum}, {step.length.maximum})']
+        case ItemsStep():
+            length, item = step.length, step.number
+            bounds = f"{length.minimum}, {length.maximum}, {item.minimum}, {item.maximum}"
+            return [f'{place.use("Items")}("{attribute(step.name)}", {bounds}{_unit(item.unit)})']
+        case ValueStep():
+            return [_number_rule(step.name, step.number, place, scales)]
+        case _:
+            assert_never(step)
 
 
-def _fixed_rule(each: Field, scalar: Scalar) -> str:
-    if scalar.counts:
-        return f'Count("{each.name}", "{scalar.counts}")'
-    return f'Constant("{each.name}", {scalar.default})'
+def _member_rule(
+    member: MemberValue | MemberConstant | MemberReserved, place: Place, scales: Mapping[str, str]
+) -> str:
+    match member:
+        case MemberValue():
+            return _number_rule(member.name, member.number, place, scales)
+        case MemberConstant():
+            return f'{place.use("Constant")}("{attribute(member.name)}", {member.value})'
+        case MemberReserved():
+            return ""
+        case _:
+            assert_never(member)
 
 
-def _rule(value: Value, steps: dict[str, str]) -> str:
-    kind, name = value.type, value.name
-    if isinstance(kind, Blob):
-        return f'{"Text" if kind.text else "Octets"}("{name}", {kind.length.minimum}, {kind.length.maximum})'
-    if isinstance(kind, Array):
-        length, item = kind.length, kind.item
-        bounds = f"{length.minimum}, {length.maximum}, {item.minimum}, {item.maximum}"
-        return f'Items("{name}", {bounds}{_unit(item.unit)})'
-    if kind.scaling is not None:
-        return steps[name]
-    if isinstance(kind.meaning, Flags) and kind.meaning.reserved_zero:
-        return f'Mask("{name}", {kind.meaning.mask:#x})'
-    return f'Whole("{name}", {kind.minimum}, {kind.maximum}{_unit(kind.unit)})'
+def _number_rule(name: str, number: Scalar, place: Place, scales: Mapping[str, str]) -> str:
+    if number.scaling is not None:
+        return f'{place.use("Scaled")}("{attribute(name)}", {scales[name]}{_unit(number.unit)})'
+    if isinstance(number.meaning, Flags) and number.meaning.reserved_zero:
+        return f'{place.use("Mask")}("{attribute(name)}", {number.meaning.mask:#x})'
+    return f'{place.use("Whole")}("{attribute(name)}", {number.minimum}, {number.maximum}{_unit(number.unit)})'
 
 
 def _unit(unit: str) -> str:
-    return f', unit="{unit}"' if unit else ""
+    return f", unit={python_text.literal(unit)}" if unit else ""
 
 
-def description(value: Value, place: Place) -> str:
-    """What the field is, its range and unit, and whether its source is weak; one paragraph."""
+# Descriptions
+
+
+def description(value: Value, each: Settable, place: Place) -> str:
+    """What a value is, its range and unit, and whether its source is weak; one paragraph."""
     text = value.doc.rstrip(".")
-    facts = [_facts(value, place)]
+    facts = [_facts(each, place)]
     if value.field.section:
         facts.append(f"section {value.field.section}")
     if not value.field.confirmed:
@@ -131,26 +205,34 @@ def description(value: Value, place: Place) -> str:
     return f"{text}; {detail}." if text and detail else f"{text or detail}."
 
 
-def _facts(value: Value, place: Place) -> str:
-    kind = value.type
-    if isinstance(kind, Blob):
-        return f"{_span(kind.length.minimum, kind.length.maximum)} {'characters' if kind.text else 'bytes'}"
-    if isinstance(kind, Array):
-        item = kind.item
-        items = _span(kind.length.minimum, kind.length.maximum)
-        return f"{items} items, each {item.minimum}..{item.maximum}{_of(item)}"
-    if isinstance(kind.meaning, Flags):
-        return f"masks of {place.names.enums[kind.meaning.name]}"
-    if kind.meaning == "bool" or isinstance(kind.meaning, Enum):
+def _facts(each: Settable, place: Place) -> str:
+    match each:
+        case BytesStep():
+            kind = "characters" if each.text else "bytes"
+            return f"{span(each.length.minimum, each.length.maximum)} {kind}"
+        case ItemsStep():
+            item, items = each.number, span(each.length.minimum, each.length.maximum)
+            return f"{items} items, each {item.minimum}..{item.maximum}{_of(item)}"
+        case ValueStep() | MemberValue():
+            return _number_facts(each.number, place)
+        case _:
+            assert_never(each)
+
+
+def _number_facts(number: Scalar, place: Place) -> str:
+    if isinstance(number.meaning, Flags):
+        return f"masks of {place.classes[number.meaning.name]}"
+    if number.meaning is not None:
         return ""
-    low, high = sorted((kind.physical(kind.minimum), kind.physical(kind.maximum)))
-    step = f" in steps of {kind.scaling.scale}" if kind.scaling else ""
-    return f"{low}..{high}{_of(kind)}{step}"
+    low, high = sorted((number.physical(number.minimum), number.physical(number.maximum)))
+    step = f" in steps of {number.scaling.scale}" if number.scaling else ""
+    return f"{low}..{high}{_of(number)}{step}"
 
 
-def _of(scalar: Scalar) -> str:
-    return f" {scalar.unit}" if scalar.unit else ""
+def _of(number: Scalar) -> str:
+    return f" {number.unit}" if number.unit else ""
 
 
-def _span(low: int, high: int) -> str:
+def span(low: int, high: int) -> str:
+    """``low..high``, or one number where they are the same."""
     return str(low) if low == high else f"{low}..{high}"

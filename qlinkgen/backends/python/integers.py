@@ -1,0 +1,154 @@
+"""Integers in Python: how they get into a struct and out of it, and how conditions on them are spelt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import assert_never
+
+from qlinkgen.model.integer import ByteOrder, Chunk, Integer
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
+
+#: struct's letters for whole numbers by size; lower case is signed.
+_LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
+
+
+@dataclass(frozen=True)
+class Get:
+    """How an integer is taken from a struct.
+
+    Attributes:
+        code: format of its bytes.
+        targets: what the struct is unpacked into; ``local`` stands for the number itself.
+        terms: the number put together from the targets, () where the only target is the number.
+        stray: conditions that are true where the bytes are not those of an integer.
+    """
+
+    code: str
+    targets: tuple[str, ...]
+    terms: tuple[str, ...] = ()
+    stray: tuple[str, ...] = ()
+
+
+def letter(integer: Integer, byteorder: ByteOrder) -> str:
+    """The format letter, "" where struct has none for this integer in this byte order."""
+    known = _LETTERS.get(integer.size, "")
+    if not known or integer.byteorder is None or (integer.size > 1 and integer.byteorder != byteorder):
+        return ""
+    return known.lower() if integer.signed else known
+
+
+def put(integer: Integer, number: str, byteorder: ByteOrder) -> tuple[str, tuple[str, ...]]:
+    """Format and arguments that pack a number; groups use it once a byte, so it must be a plain name."""
+    if code := letter(integer, byteorder):
+        return code, (number,)
+    if integer.byteorder is not None:
+        return f"{integer.size}s", (to_bytes(integer, number),)
+    return "B" * integer.size, tuple(group_out(number, chunk) for chunk in integer.chunks)
+
+
+def to_bytes(integer: Integer, number: str) -> str:
+    """The bytes of an integer; OverflowError tells that it does not fit. ``number`` must be a primary."""
+    return f'{number}.to_bytes({integer.size}, "{integer.byteorder}"{_signed(integer)})'
+
+
+def from_bytes(integer: Integer, data: str) -> str:
+    """The integer in some bytes."""
+    return f'int.from_bytes({data}, "{integer.byteorder}"{_signed(integer)})'
+
+
+def _signed(integer: Integer) -> str:
+    return ", signed=True" if integer.signed else ""
+
+
+def get(integer: Integer, local: str, byteorder: ByteOrder) -> Get:
+    """How a number is unpacked; ``local`` begins the names of the variables that this takes."""
+    if code := letter(integer, byteorder):
+        return Get(code, (local,))
+    if integer.byteorder is not None:
+        return Get(f"{integer.size}s", (local,), (from_bytes(integer, local),))
+    targets = tuple(f"{local}_{index}" for index in range(integer.size))
+    return Get("B" * integer.size, targets, group_terms(integer, targets), stray(integer, targets))
+
+
+def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
+    """The integer in some bytes; ``at`` spells the index of its first byte and of so many bytes further.
+
+    Too few bytes give another number or an IndexError.
+    """
+    if integer.size == 1:
+        return f"{data}[{at(0)}]"
+    if integer.byteorder is not None:
+        return from_bytes(integer, f"{data}[{at(0)} : {at(integer.size)}]")
+    sources = tuple(f"{data}[{at(index)}]" for index in range(integer.size))
+    return f"({' | '.join(group_terms(integer, sources))})"
+
+
+def stray(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
+    """Conditions that are true where a wire byte has bits that are not the integer's; one for each mask."""
+    by_mask: dict[int, list[str]] = {}
+    for source, chunk in zip(sources, integer.chunks, strict=True):
+        if chunk.bits < 8:
+            by_mask.setdefault(chunk.mask, []).append(source)
+    return tuple(f"{' | '.join(group)} > 0x{mask:02X}" for mask, group in by_mask.items())
+
+
+def group_terms(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
+    """The groups of an integer, each shifted to its place; bits of no chunk are left out by the caller."""
+    pairs = zip(sources, integer.chunks, strict=True)
+    return tuple(f"{source} << {chunk.shift}" if chunk.shift else source for source, chunk in pairs)
+
+
+def sign_extended(number: str, bits: int) -> str:
+    """A number of some bits as two's complement; ``number`` must be a primary."""
+    sign = f"{1 << (bits - 1):#x}"
+    return f"({number} ^ {sign}) - {sign}"
+
+
+def group_out(number: str, chunk: Chunk) -> str:
+    """The bits of a chunk."""
+    shifted = f"{number} >> {chunk.shift}" if chunk.shift else number
+    return f"{shifted} & 0x{chunk.mask:02X}"
+
+
+# Conditions and sizes
+
+
+def holds(condition: Condition, number: str) -> str:
+    """The expression that is true where a condition holds."""
+    match condition:
+        case Within() if condition.low == condition.high:
+            return f"{number} == {condition.low}"
+        case Within():
+            return f"{condition.low} <= {number} <= {condition.high}"
+        case Clear():
+            return f"{number} & {condition.mask:#x} == 0"
+        case OneOf():
+            terms = [holds(each, number) for each in condition.ranges]
+            return f"({' or '.join(terms)})" if len(terms) > 1 else terms[0]
+        case _:
+            assert_never(condition)
+
+
+def broken(condition: Condition, number: str) -> str:
+    """The expression that is true where a condition does not hold."""
+    match condition:
+        case Within() if condition.low == condition.high:
+            return f"{number} != {condition.low}"
+        case Clear():
+            return f"{number} & {condition.mask:#x}"
+        case OneOf(ranges=(only,)):
+            return broken(only, number)
+        case Within() | OneOf():
+            return f"not {holds(condition, number)}"
+        case _:
+            assert_never(condition)
+
+
+def size_text(size: Size, counts: str = "{}_count") -> str:
+    """A number of bytes as an expression on the local variables that hold counts."""
+    terms = [str(size.fixed)] if size.fixed or not size.terms else []
+    for term in size.terms:
+        count = counts.format(term.run)
+        terms.append(f"{term.factor} * {count}" if term.factor > 1 else count)
+    return " + ".join(terms)

@@ -1,0 +1,54 @@
+"""Names in generated modules, chosen so that no name of a schema can hide one that the code itself uses.
+
+Locals made of a schema's names end in ``_raw``, ``_count`` or ``_odd``; nothing else in the generated code does.
+Whatever is private in a class begins with an underscore, which no name of a schema can.
+"""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+from collections.abc import Iterable, Mapping
+
+from qlinkgen.model.naming import pascal
+from qlinkgen.model.types import Enum, Flags
+from qlinkgen.plan.tree import MessagePlan, Plan
+
+#: Attributes of every message, and what its methods call it.
+_METHODS = frozenset({"to_frame", "to_bytes", "from_bytes", "self", "cls"})
+#: Names that a module has for itself.
+_TAKEN = frozenset(
+    """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError Codec
+    Bus OpenEnum BaseMessage Constant Count DecimalScale Items Mask Octets OutOfRange Scale Text Whole Marking
+    Struct Decimal Self Any Callable BytesLike ClassVar Final Literal LayoutError Checksum""".split()  # noqa: SIM905
+)
+
+
+def attribute(name: str) -> str:
+    """The attribute of a field: its name, with an underscore where Python or the class has another use for it."""
+    return f"{name}_" if keyword.iskeyword(name) or name in _METHODS else name
+
+
+def class_name(message: MessagePlan) -> str:
+    """Name of a message's class."""
+    name = pascal(message.name)
+    return f"{name}_" if name in _TAKEN or name in dir(builtins) else name
+
+
+def constant_classes(plan: Plan) -> Mapping[str, str]:
+    """Class of each enum and flags; one whose name a message has is told apart by what it is."""
+    messages = {class_name(message) for message in plan.messages}
+    groups: list[Enum | Flags] = [*plan.protocol.enums, *plan.protocol.flags]
+    return {each.name: _constant_class(each, messages) for each in groups}
+
+
+def _constant_class(each: Enum | Flags, messages: Iterable[str]) -> str:
+    name = pascal(each.name)
+    if name in messages or name in _TAKEN or name in dir(builtins):
+        return f"{name}{'Enum' if isinstance(each, Enum) else 'Flags'}"
+    return name
+
+
+def constant_name(name: str) -> str:
+    """A message or type in the names of constants."""
+    return name.replace(".", "_").upper()
