@@ -13,6 +13,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
+from qlinkgen.model.texts import Text
+
 ByteOrder = Literal["big", "little"]
 Number = int | float | Decimal
 
@@ -63,7 +65,7 @@ class Constant:
 
     name: str
     value: int
-    doc: str = ""
+    doc: Text = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +75,8 @@ class Enum:
     name: str
     bits: int
     members: tuple[Constant, ...]
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
 
     def name_of(self, value: int) -> str | None:
         """The name of a number, or None."""
@@ -90,8 +92,8 @@ class Flags:
     members: tuple[Constant, ...]
     #: True: a reserved bit that is set is a range error. False: reserved bits are kept as they are.
     reserved_zero: bool = False
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
 
     @property
     def mask(self) -> int:
@@ -150,7 +152,7 @@ class Scalar:
     #: The caller has to choose: no default is written, and 0 is not legal.
     required: bool = False
     scaling: Scaling | None = None
-    unit: str = ""
+    unit: Text = ""
     meaning: Enum | Flags | Literal["bool"] | None = None
     #: A constant is always sent as ``default`` and must be received as it.
     constant: bool = False
@@ -220,7 +222,7 @@ class BitField:
     name: str
     shift: int
     type: Scalar
-    doc: str = ""
+    doc: Text = ""
 
     @property
     def mask(self) -> int:

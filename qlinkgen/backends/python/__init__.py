@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 import importlib.resources
 import linecache
+from collections.abc import Mapping
 from types import ModuleType
 
 from qlinkgen.backends.base import Options, Outputs
+from qlinkgen.backends.python._support import BaseMessage, Rule
 from qlinkgen.backends.python.module import render
+from qlinkgen.model.message import Value
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Array, Scalar
 
 __all__ = ["generate", "load", "shared"]
 
@@ -29,11 +34,36 @@ def shared() -> Outputs:
 
 
 def load(protocol: Protocol, options: Options | None = None) -> ModuleType:
-    """The generated module, compiled in memory; no file is written."""
-    text = render(protocol, options or Options())
+    """The generated module, compiled in memory; no file is written.
+
+    It runs in this process, so no text of the schema is in it. The units in its error messages come from the
+    model.
+    """
+    plain = protocol.without_texts()
+    text = render(plain, options or Options())
     module = ModuleType(f"{__package__}.{protocol.name}", None)
     module.__package__ = __package__  # its support module is the one in this folder
-    name = f"<{protocol.name}.py generated from {protocol.schema_file}>"
+    name = f"<{protocol.name}.py generated from {plain.schema_file}>"
     linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)  # for tracebacks
     exec(compile(text, name, "exec"), module.__dict__)  # our own text
+    _tell_units(protocol, module.MESSAGES)
     return module
+
+
+def _tell_units(protocol: Protocol, classes: Mapping[str, type[BaseMessage]]) -> None:
+    """Let the rules of each message name the units of its values."""
+    for name, each in classes.items():
+        units = {value.name: _unit(value) for value in protocol.by_name[name].values}
+        each.RULES = tuple(_in_unit(rule, units.get(rule.name, "")) for rule in each.RULES)
+
+
+def _in_unit(rule: Rule, unit: str) -> Rule:
+    """A copy of a rule, as several messages may share it."""
+    found = copy.copy(rule)
+    found.legal += f" {unit}" if unit else ""
+    return found
+
+
+def _unit(value: Value) -> str:
+    kind = value.type.item if isinstance(value.type, Array) else value.type
+    return kind.unit if isinstance(kind, Scalar) else ""

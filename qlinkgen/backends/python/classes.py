@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from qlinkgen.backends import python_text
 from qlinkgen.backends.python import docstrings, values
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
@@ -102,7 +103,7 @@ class ClassBuilder:
 
     def _shape(self, name: str, message: Message) -> ClassModel:
         kinds = ", ".join(value.name for value in message.values)
-        doc = [f'"""What messages with {kinds or "no data"} have in common."""']
+        doc = python_text.docstring([f"What messages with {kinds or 'no data'} have in common."])
         head = ClassModel(name, self._base(message), doc, self._checked(message))
         return self._with_codec(message, head, _snake_upper(name), "self.ID")
 
@@ -232,7 +233,7 @@ class ClassBuilder:
             for value in message.values:
                 described = f"{value.name}: {values.description(value, self._place)}"
                 lines += docstrings.item(described, WIDTH - 4)
-        return docstrings.quoted(lines)
+        return python_text.docstring(lines)
 
 
 def _span(low: int, high: int) -> str:

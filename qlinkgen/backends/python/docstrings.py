@@ -1,9 +1,10 @@
-"""Docstrings: texts of the schema, wrapped and quoted."""
+"""What docstrings say: texts of the schema in lines. `python_text` quotes them."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
+
+from qlinkgen.model.texts import one_line
 
 UNCONFIRMED = "UNCONFIRMED: the source is weak; check at the device before trusting it."
 
@@ -11,7 +12,7 @@ UNCONFIRMED = "UNCONFIRMED: the source is weak; check at the device before trust
 def opening(text: str, section: str, tail: str = "") -> str:
     """What something is, a tail behind it, and the section that says so."""
     where = f" (section {section})" if section[:1].isdigit() else f" ({section})" if section else ""
-    return f"{text.rstrip('.')}{tail}{where}."
+    return one_line(f"{text.rstrip('.')}{tail}{where}.")
 
 
 def paragraph(text: str, width: int) -> list[str]:
@@ -25,11 +26,3 @@ def paragraph(text: str, width: int) -> list[str]:
 def item(text: str, width: int) -> list[str]:
     """An entry of a list of arguments or attributes."""
     return textwrap.wrap(text, width, initial_indent="    ", subsequent_indent="        ")
-
-
-def quoted(lines: Iterable[str]) -> list[str]:
-    """The lines as a docstring."""
-    safe = [line.replace("\\", "\\\\").replace('"""', "'''") for line in lines]
-    if len(safe) == 1:
-        return [f'"""{safe[0]}"""']
-    return [f'"""{safe[0]}', *safe[1:], '"""']

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import textwrap
 from collections.abc import Iterable
@@ -9,6 +10,7 @@ from typing import Any
 
 import jinja2
 
+from qlinkgen.backends import python_text
 from qlinkgen.backends.base import Options, banner, environment
 from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.checks import selectable
@@ -19,11 +21,20 @@ from qlinkgen.backends.python.place import Place, in_hex, place_of
 from qlinkgen.model.frame import DelimitedFrame, MarkedFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import one_line
 
 
 def render(protocol: Protocol, options: Options) -> str:
     """The text of a protocol's module."""
     return Module(protocol, options).text()
+
+
+@functools.cache
+def templates() -> jinja2.Environment:
+    """The templates of this back-end, with the one way for a text into them."""
+    found = environment(__package__)
+    found.filters["docstring"] = lambda text: "\n".join(python_text.docstring([text]))
+    return found
 
 
 class Module:
@@ -32,7 +43,7 @@ class Module:
     def __init__(self, protocol: Protocol, options: Options) -> None:
         self.protocol = protocol
         self.options = options
-        self.templates: jinja2.Environment = environment(__package__)
+        self.templates = templates()
         self.messages = kept(protocol, options)
         names = [class_name(message) for message in self.messages]
         self.constants = tables.constant_classes(protocol, names)
@@ -48,7 +59,8 @@ class Module:
         self.models = self.builder.build()
         body = {"classes": self._classes(self.models), "steps": self.builder.steps, **self._frame()}
         context = {**self._head(), **self.tables, **body}
-        text = "\n".join([*body["steps"], body["classes"], body["frame"], body["decoder"]])
+        said = "\n".join([*body["steps"], body["classes"], body["frame"], body["decoder"]])
+        text = python_text.bare(said)
         context |= imports(text, enums=bool(self.tables["enums"]), flags=bool(self.tables["flags"]))
         context |= {"public": self._public(text)}
         return _tidy(self._place("module.j2", context))
@@ -57,8 +69,10 @@ class Module:
         return self.templates.get_template(f"templates/{template}").render(context)
 
     def _head(self) -> dict[str, Any]:
-        doc = " ".join(f"{self.protocol.doc} Source: {self.protocol.source}.".split())
-        return {"banner": banner(self.protocol), "doc": textwrap.wrap(doc, 108), "title": self.protocol.title}
+        title, *others = map(one_line, banner(self.protocol))
+        about = one_line(f"{self.protocol.doc} Source: {self.protocol.source}.")
+        lines = [f"{title}: messages, frames and transactions.", "", *textwrap.wrap(about, 108), "", *others]
+        return {"doc": python_text.docstring(lines)}
 
     def _tables(self) -> dict[str, Any]:
         by_name = {message.name: message for message in self.messages}
@@ -91,7 +105,7 @@ class Module:
     def _frame(self) -> dict[str, Any]:
         names = _received(self.options)
         context: dict[str, Any] = {
-            "title": self.protocol.title,
+            "title": one_line(self.protocol.title),
             "verifies": False,
             "directions": frames.directions(self.protocol, names),
         }

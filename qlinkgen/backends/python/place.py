@@ -24,12 +24,14 @@ class Place:
         frame: the frame if its codec handles whole frames; None where it handles payloads alone.
         address: attribute that holds the address, "" if there is none.
         unique: the preamble is added by the encoder's last step and checked by the receiver.
+        texts: defaults that are text are spelt as text, not as numbers.
     """
 
     names: Names
     frame: DelimitedFrame | None
     address: str = ""
     unique: bool = False
+    texts: bool = True
 
     @property
     def header(self) -> int:
@@ -143,7 +145,7 @@ def place_of(protocol: Protocol, enums: Mapping[str, str], *, unique: bool) -> P
     """The place of a protocol's messages."""
     names = Names(">" if protocol.byteorder == "big" else "<", enums)
     frame = protocol.frame if isinstance(protocol.frame, DelimitedFrame) else None
-    return Place(names, frame, protocol.address_name or "", unique)
+    return Place(names, frame, protocol.address_name or "", unique, protocol.texts)
 
 
 def items_span(length: Length) -> str:

@@ -7,11 +7,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+from qlinkgen.backends import python_text
 from qlinkgen.backends.python.classes import class_name
 from qlinkgen.backends.python.place import in_hex, wrapped
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Bus, Command
 from qlinkgen.model.types import Constant, Enum, Flags
 
@@ -64,18 +66,17 @@ def flags_model(flags: Flags, name: str) -> ConstantsModel:
 
 
 def _comment(constant: Constant) -> list[str]:
-    return textwrap.wrap(constant.doc, 100) if constant.doc else []
+    return python_text.comment(constant.doc, 100)
 
 
 def _doc(doc: str, section: str, more: str) -> list[str]:
     where = f" ({'section ' if section[:1].isdigit() else ''}{section})" if section else ""
-    text = f"{doc.rstrip('.')}{where}." if doc else ""
+    text = one_line(f"{doc.rstrip('.')}{where}.") if doc else ""
     first, _, rest = text.partition(". ")
     lines = [f"{first}.", "", rest, more] if rest else [text, "", more]
     if not text:
-        return [f'"""{more}"""']
-    wrapped = [part for line in lines for part in (textwrap.wrap(line, 102) or [""])]
-    return [f'"""{wrapped[0]}', *wrapped[1:], '"""']
+        return python_text.docstring([more])
+    return python_text.docstring(part for line in lines for part in (textwrap.wrap(line, 102) or [""]))
 
 
 def bus(line: Bus) -> str:
@@ -106,7 +107,7 @@ def _row(command: Command, kept: Mapping[str, Message]) -> str:
     if command.in_flight != 1:
         arguments.append(f"in_flight={command.in_flight}")
     if command.section:
-        arguments.append(f"section={command.section!r}".replace("'", '"'))
+        arguments.append(f"section={python_text.literal(command.section)}")
     if not command.confirmed:
         arguments.append("confirmed=False")
     if command.attributes:
@@ -131,4 +132,4 @@ def _number(value: Fraction) -> str:
 
 
 def _literal(value: str | int | bool) -> str:
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+    return python_text.literal(value) if isinstance(value, str) else repr(value)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
+from qlinkgen.backends import python_text
 from qlinkgen.backends.python.place import Place, literal
 from qlinkgen.model.message import Field, Message, Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
@@ -42,18 +43,15 @@ def default(value: Value, place: Place) -> str:
         return f"{place.names.enums[kind.meaning.name]}.{name.upper()}" if name else str(kind.default)
     if isinstance(kind, Scalar) and isinstance(kind.meaning, Flags) and kind.default:
         return f"{kind.default:#x}"
-    return _decimal(native) if isinstance(native, Decimal) else _quoted(native)
+    if isinstance(native, str):
+        return python_text.literal(native) if place.texts else python_text.numbers(native)
+    if isinstance(native, bytes):
+        return literal(native)
+    return _decimal(native) if isinstance(native, Decimal) else repr(native)
 
 
 def _decimal(value: Decimal) -> str:
     return f"Decimal({value})" if value == value.to_integral_value() else f'Decimal("{value}")'
-
-
-def _quoted(value: object) -> str:
-    if isinstance(value, bytes):
-        return literal(value)
-    text = repr(value)
-    return text if not isinstance(value, str) or '"' in value else f'"{text[1:-1]}"'
 
 
 def steps_name(scalar: Scalar, name: str) -> str:
@@ -116,7 +114,7 @@ def _rule(value: Value, steps: dict[str, str]) -> str:
 
 
 def _unit(unit: str) -> str:
-    return f', unit="{unit}"' if unit else ""
+    return f", unit={python_text.literal(unit)}" if unit else ""
 
 
 def description(value: Value, place: Place) -> str:
