@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import importlib.resources
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
 
 import jinja2
 
 import qlinkgen
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan.select import Options
+
+__all__ = ["Options", "Outputs", "banner", "environment"]
 
 #: Path below the output folder to text, of everything that one back-end makes of one protocol.
 Outputs = Mapping[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """What is left out of the output.
-
-    Attributes:
-        role: side that the output is for; what the other side alone needs is left out where a target can.
-        only: commands or messages that are kept, all where it is empty.
-    """
-
-    role: Literal["both", "master", "slave"] = "both"
-    only: tuple[str, ...] = ()
 
 
 def banner(protocol: Protocol) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from qlinkgen.model.frame import MarkedFrame
+from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Bits, Flags
 
 
@@ -72,4 +73,4 @@ def _branch(width: int, run: Run, above: Iterable[Run]) -> str:
 
 
 def _labelled(name: str, doc: str) -> str:
-    return f"{name}: {doc}" if doc else name
+    return one_line(f"{name}: {doc}" if doc else name)

@@ -9,6 +9,7 @@ import sys
 import click
 
 from qlinkgen.errors import QlinkgenError, SchemaError
+from qlinkgen.model.texts import visible
 
 FINE, WRONG, USAGE = 0, 1, 2
 #: What a shell reports of a program that these signals ended.
@@ -51,14 +52,14 @@ def _invoke(cli: click.Command) -> int:
     except click.exceptions.Exit as error:
         return error.exit_code
     except click.UsageError as error:
-        error.show()
+        click.UsageError(visible(error.format_message()), error.ctx).show()
         return USAGE
     except click.ClickException as error:
         return _complain(error.format_message(), error.exit_code)
     except Failure as error:
         return _complain(error.text, error.code)
     except SchemaError as error:
-        click.echo(str(error), err=True)
+        click.echo(visible(str(error)), err=True)
         unreadable = any(fault.rule == "file-unreadable" for fault in error.faults)
         return USAGE if unreadable else WRONG
     except QlinkgenError as error:
@@ -66,7 +67,7 @@ def _invoke(cli: click.Command) -> int:
 
 
 def _complain(text: str, code: int) -> int:
-    click.echo(f"qlinkgen: error: {text}", err=True)
+    click.echo(f"qlinkgen: error: {visible(text)}", err=True)
     return code
 
 

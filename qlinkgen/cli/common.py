@@ -17,6 +17,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.errors import SchemaError
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import visible
 
 
 def find_schema(name: str) -> Path:
@@ -71,7 +72,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 def warn(text: str) -> None:
     """A line on stderr that does not stop anything."""
-    click.echo(f"qlinkgen: warning: {text}", err=True)
+    click.echo(f"qlinkgen: warning: {visible(text)}", err=True)
 
 
 def warn_unconfirmed(protocol: Protocol, message: Message) -> None:

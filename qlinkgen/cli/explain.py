@@ -14,6 +14,7 @@ from qlinkgen.cli.tables import Table, heading, paragraph
 from qlinkgen.model.frame import MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import one_line
 
 
 @click.command("explain")
@@ -68,8 +69,8 @@ def _show(anatomy: Anatomy) -> None:
     paragraph([f"note: {note}" for note in anatomy.notes])
     for finding in anatomy.findings:
         label = click.style("wrong:", fg="red", bold=True) if on_terminal() else "wrong:"
-        click.echo(f"{label} {finding.rule}")
+        click.echo(f"{label} {one_line(finding.rule)}")
         if finding.cause:
-            click.echo(f"likely: {finding.cause}")
+            click.echo(f"likely: {one_line(finding.cause)}")
     if not anatomy.findings:
         click.echo("every rule is kept")

@@ -19,6 +19,7 @@ from qlinkgen.cli.manifest import schema_of
 from qlinkgen.cli.targets import TARGETS, reference_outputs
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import visible
 
 Role = Literal["both", "master", "slave"]
 
@@ -208,8 +209,8 @@ def _report(folder: Folder, change: Change) -> None:
         "changed": "differs",
         "orphan": "is an orphan: no schema makes it any more",
     }[change.kind]
-    click.echo(f"{folder.root / change.path}: {explained}")
-    for line in change.diff:
+    click.echo(visible(f"{folder.root / change.path}: {explained}"))
+    for line in map(visible, change.diff):
         click.echo(_coloured(line) if on_terminal() else line)
 
 

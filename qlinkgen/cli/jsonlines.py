@@ -13,9 +13,10 @@ from qlinkgen.cli.boundary import Failure
 def line(found: Any) -> str:
     """An object on one line; a Decimal becomes a number with all its digits."""
     try:
-        return json.dumps(found)
+        text = json.dumps(found)
     except TypeError:
-        return _exact(found)
+        text = _exact(found)
+    return text.replace("\x7f", "\\u007f")  # the one control character that JSON may hold as it is
 
 
 def _exact(found: Any) -> str:

@@ -10,6 +10,7 @@ import click
 from qlinkgen.cli.boundary import FINE, USAGE, WRONG
 from qlinkgen.cli.common import find_schema, on_terminal
 from qlinkgen.errors import Fault
+from qlinkgen.model.texts import visible
 
 
 @click.command("lint")
@@ -28,7 +29,7 @@ def command(schemas: tuple[str, ...], form: str) -> int:
         click.echo(json.dumps([dataclasses.asdict(fault) for fault in faults], indent=2))
     else:
         for fault in faults:
-            click.echo(_coloured(fault) if on_terminal() else str(fault))
+            click.echo(_coloured(fault) if on_terminal() else visible(str(fault)))
         _summary(len(schemas), faults)
     if any(fault.rule == "file-unreadable" for fault in faults):
         return USAGE
@@ -44,7 +45,7 @@ def _faults(schema: str) -> list[Fault]:
 def _coloured(fault: Fault) -> str:
     colour = "red" if fault.severity == "error" else "yellow"
     mark = f"{fault.severity}[{fault.rule}]"
-    return str(fault).replace(mark, click.style(mark, fg=colour, bold=True), 1)
+    return visible(str(fault)).replace(mark, click.style(mark, fg=colour, bold=True), 1)
 
 
 def _summary(files: int, faults: list[Fault]) -> None:

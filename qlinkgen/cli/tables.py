@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -9,6 +10,9 @@ from typing import Literal
 import click
 
 from qlinkgen.cli.common import on_terminal
+from qlinkgen.model.texts import one_line, visible
+
+_BREAKS = re.compile(r"[\t\n]+")
 
 
 @dataclass
@@ -22,7 +26,9 @@ class Table:
 
     def add(self, *cells: object) -> None:
         """Append a row; None is an empty cell."""
-        self.rows.append(tuple("" if cell is None else str(cell) for cell in cells))
+        self.rows.append(
+            tuple("" if cell is None else _BREAKS.sub(" ", visible(str(cell))) for cell in cells)
+        )
 
     def show(self) -> None:
         """Print it, without the columns in which nothing stands."""
@@ -36,7 +42,7 @@ class Table:
 
     def lines(self) -> list[str]:
         """Plain text, two blanks between columns."""
-        head = [self.title] if self.title else []
+        head = [one_line(self.title)] if self.title else []
         widths = [
             max(len(row[index]) for row in (tuple(self.columns), *self.rows))
             for index in range(len(self.columns))
@@ -57,15 +63,20 @@ class Table:
         return Table([self.columns[index] for index in used], self.title, self.right, rows)
 
 
+def _cell(text: str) -> str:
+    """A text on one line, its indentation kept."""
+    return _BREAKS.sub(" ", visible(text))
+
+
 def _show_rich(table: Table) -> None:
     from rich import box  # noqa: PLC0415  # only a terminal needs it
     from rich.console import Console  # noqa: PLC0415
     from rich.table import Table as RichTable  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
-    shown = RichTable(
-        title=table.title or None, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD
-    )
+    # A plain string as title would be read as markup.
+    title = Text(one_line(table.title)) if table.title else None
+    shown = RichTable(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
     for index, column in enumerate(table.columns):
         style = ("cyan", "green")[index] if index < 2 else None
         side: Literal["left", "right"] = "right" if column in table.right else "left"
@@ -77,11 +88,12 @@ def _show_rich(table: Table) -> None:
 
 def heading(text: str) -> None:
     """A line that stands out on a terminal."""
-    click.echo(click.style(text, bold=True) if on_terminal() else text)
+    line = one_line(text)
+    click.echo(click.style(line, bold=True) if on_terminal() else line)
 
 
 def paragraph(lines: Iterable[str]) -> None:
     """Lines, and an empty one if there were any."""
-    shown = [line for line in lines if line]
+    shown = [visible(line) for line in lines if line]
     if shown:
         click.echo("\n".join((*shown, "")))

@@ -8,6 +8,7 @@ from typing import Literal
 
 from qlinkgen.model.checksum import Algorithm, Sum
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
+from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Scalar
 
 #: What a part of a frame is for.
@@ -51,8 +52,8 @@ class Part:
 
     name: str
     role: Role
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
     confirmed: bool = True
     constant: bytes = b""
     scalar: Scalar | None = None
@@ -81,7 +82,7 @@ class Stuffing:
     #: True: the payload is stuffed first; length and checksum cover what is sent. False: the finished frame
     #: is stuffed, all but the exempt parts.
     before_checksum: bool = False
-    section: str = ""
+    section: Text = ""
 
 
 @dataclass(frozen=True)
@@ -90,8 +91,8 @@ class DelimitedFrame:
 
     parts: tuple[Part, ...]
     stuffing: Stuffing | None = None
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
 
     kind = "delimited"
 
@@ -172,8 +173,8 @@ class MarkedFrame:
     end_id: int
     payload_max: int
     checksum: Checksum | None = None
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
 
     kind = "marked"
 
@@ -191,8 +192,8 @@ class PacketFrame:
     word_size: int = 2
     #: Check value by which the slave says that it does not know the command.
     rejected: int | None = None
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
 
     kind = "packet"
 

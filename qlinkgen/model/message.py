@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Array, BitField, Bits, Blob, FieldType, Scalar
 
 #: "request": master to slave; "response": slave to master; "message": sent by anybody, answered by nobody.
@@ -19,8 +20,8 @@ class Field:
 
     name: str
     type: FieldType
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
     confirmed: bool = True
     #: It repeats the field of the same name of the request.
     echo: bool = False
@@ -51,7 +52,7 @@ class Value:
 
     name: str
     type: Scalar | Blob | Array
-    doc: str
+    doc: Text
     #: The field that carries it, and its place inside where that is an integer of several values.
     field: Field
     bits: BitField | None = None
@@ -75,8 +76,8 @@ class Message:
     direction: Direction
     id: int
     fields: tuple[Field, ...]
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
     confirmed: bool = True
     #: A payload of no bytes at all is taken as the message with every field at its default.
     empty_is_default: bool = False

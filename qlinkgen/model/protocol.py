@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
 from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.texts import Text, without_texts
 from qlinkgen.model.transaction import Bus, Command
 from qlinkgen.model.types import ByteOrder, Enum, Flags
 
@@ -19,10 +20,10 @@ class Protocol:
     """
 
     name: str
-    title: str
-    revision: str
-    source: str
-    doc: str
+    title: Text
+    revision: Text
+    source: Text
+    doc: Text
     byteorder: ByteOrder
     enums: tuple[Enum, ...]
     flags: tuple[Flags, ...]
@@ -33,7 +34,17 @@ class Protocol:
     #: SHA-256 of the schema's text (line ends made uniform), 12 hex digits; stands in every generated banner.
     schema_hash: str
     #: File name of the schema, without its folder.
-    schema_file: str
+    schema_file: Text
+    #: False after `without_texts`.
+    texts: bool = True
+
+    def without_texts(self) -> Protocol:
+        """The protocol with its numbers and checked names alone: code made of it repeats nothing else.
+
+        A back-end spells text on the wire, such as the default of a field, as numbers then.
+        """
+        file = f"{self.name}.yaml"
+        return replace(without_texts(self), title=self.name, schema_file=file, texts=False)
 
     @cached_property
     def by_name(self) -> dict[str, Message]:

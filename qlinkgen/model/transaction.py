@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from types import MappingProxyType
 from typing import Literal
 
 from qlinkgen.model.message import Message
+from qlinkgen.model.texts import Labels, Text
 
 #: "node": one node; "broadcast": all; "either": one or all, an answer comes from one node alone if at all;
 #: "answered_broadcast": one or all, and a broadcast is answered too, so only one node may be there;
@@ -48,11 +48,11 @@ class Command:
     repeat: Repeat
     #: Requests that may be under way at once.
     in_flight: int = 1
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
     confirmed: bool = True
     #: What this protocol alone says of its commands; names and values are declared in the schema.
-    attributes: Mapping[str, str | int | bool] = field(default_factory=lambda: MappingProxyType({}))
+    attributes: Labels = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def echoes(self) -> tuple[str, ...]:
@@ -72,4 +72,4 @@ class Bus:
     baud: int | None
     bits_per_byte: int
     response_within: Allowance
-    section: str = ""
+    section: Text = ""

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Literal
 
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, byte_chunks, group_chunks
+from qlinkgen.model.texts import Text
 
 __all__ = [
     "DOUBLE_BITS",
@@ -51,7 +52,7 @@ class Constant:
 
     name: str
     value: int
-    doc: str = ""
+    doc: Text = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +62,8 @@ class Enum:
     name: str
     bits: int
     members: tuple[Constant, ...]
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
 
     def name_of(self, value: int) -> str | None:
         """The name of a number, or None."""
@@ -78,8 +79,8 @@ class Flags:
     members: tuple[Constant, ...]
     #: True: a reserved bit that is set is a range error. False: reserved bits are kept as they are.
     reserved_zero: bool = False
-    doc: str = ""
-    section: str = ""
+    doc: Text = ""
+    section: Text = ""
 
     @property
     def mask(self) -> int:
@@ -138,7 +139,7 @@ class Scalar:
     #: The caller has to choose: no default is written, and 0 is not legal.
     required: bool = False
     scaling: Scaling | None = None
-    unit: str = ""
+    unit: Text = ""
     meaning: Enum | Flags | Literal["bool"] | None = None
     #: The named type that the field has, "" where its type has no name. Equal layouts may differ in it.
     type_name: str = field(default="", compare=False)
@@ -212,7 +213,7 @@ class BitField:
     name: str
     shift: int
     type: Scalar
-    doc: str = ""
+    doc: Text = ""
 
     @property
     def mask(self) -> int:

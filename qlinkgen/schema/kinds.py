@@ -16,9 +16,11 @@ from pydantic import (
     WithJsonSchema,
 )
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, PydanticCustomError
 
+from qlinkgen.model.texts import CONTROL
 from qlinkgen.schema import notation
+from qlinkgen.schema.characters import CONTROL_CHARACTER, control_character
 from qlinkgen.schema.notation import shown
 
 NAME_PATTERN = r"^[a-z][a-z0-9_]*$"
@@ -27,7 +29,14 @@ MAX_PAYLOAD = 65535
 
 
 def _text(value: object) -> object:
-    return str(value) if isinstance(value, int | Decimal) and not isinstance(value, bool) else value
+    found = str(value) if isinstance(value, int | Decimal) and not isinstance(value, bool) else value
+    return _uncontrolled(found).strip() if isinstance(found, str) else found
+
+
+def _uncontrolled(text: str) -> str:
+    if found := CONTROL.search(text):
+        raise PydanticCustomError(CONTROL_CHARACTER, "{seen}", {"seen": control_character(found[0])})
+    return text
 
 
 def _scalar(value: object) -> object:
@@ -47,7 +56,7 @@ def _label(value: object) -> object:
         raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
             f"{shown(value)} is no label; write a word, a whole number, true or false"
         )
-    return value
+    return _uncontrolled(value) if isinstance(value, str) else value
 
 
 class ShortForm:

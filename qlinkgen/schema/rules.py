@@ -30,6 +30,12 @@ _ALL = (
         "Nothing can be read behind the first fault of notation, so it is reported alone.",
     ),
     Rule(
+        "control-character",
+        "Texts hold no control characters, line separators or marks that reorder text.",
+        "They are commands to a terminal, end lines of generated code, or make a reader see something else than "
+        "a compiler. Line breaks and tabs are allowed.",
+    ),
+    Rule(
         "file-unreadable",
         "The file can be read as UTF-8 text.",
         "The path must name a file with readable text.",

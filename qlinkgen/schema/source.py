@@ -14,6 +14,9 @@ from typing import Any, Final, TypeAlias
 
 import yaml
 
+from qlinkgen.model.texts import CONTROL
+from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT, control_character, written
+
 Path: TypeAlias = tuple[str | int, ...]
 Data: TypeAlias = Any
 
@@ -78,7 +81,17 @@ class Source:
 def parse(text: str) -> Source:
     """Parse YAML text. Faults of notation are collected in the result, not raised."""
     source = Source()
-    fault = _forbidden(text) or _too_deep(text)
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    fault = _forbidden(text)
+    if fault is None:
+        source.faults += [
+            SyntaxFault(CONTROL_CHARACTER, Position(line, column), control_character(character), HINT)
+            for line, column, character in written(text)
+        ]
+        if source.faults:
+            # Reported once; and some of them would end a line for the parser, but not for an editor.
+            text = CONTROL.sub(" ", text)
+        fault = _too_deep(text)
     node = None
     if fault is None:
         try:
@@ -94,7 +107,6 @@ def parse(text: str) -> Source:
 
 def _forbidden(text: str) -> SyntaxFault | None:
     """YAML allows no control characters; the parser's own position of one counts bytes."""
-    # A byte order mark may open a file, nothing else.
     if not (match := yaml.reader.Reader.NON_PRINTABLE.search(text)):
         return None
     at = match.start()

@@ -14,6 +14,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT
 from qlinkgen.schema.file_model import BRANCH, SchemaFile
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -120,6 +121,8 @@ def _explained(kind: str, seen: object, detail: ErrorDetails) -> tuple[str, str,
         allowed = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
         hint = did_you_mean(str(seen), allowed, f"use {listed(allowed, 'or')}")
         return "bad-value", f"{shown(seen)} is not allowed here", hint
+    if kind == CONTROL_CHARACTER:
+        return kind, context["seen"], HINT
     if kind == "value_error":
         what, _, hint = str(context["error"]).partition("; ")
         return "bad-value", what, hint

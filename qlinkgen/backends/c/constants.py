@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from qlinkgen.backends.c.describe import wrapped
+from qlinkgen.backends import c_text
 from qlinkgen.backends.c.names import Names, bracketed, integer_type, literal, unsigned
 from qlinkgen.model import sizes
 from qlinkgen.model.message import Message
@@ -47,18 +47,18 @@ def _view(each: Enum | Flags, names: Names) -> dict[str, Any]:
     signed = is_enum and any(member.value < 0 for member in each.members)
     kind = "Enum" if is_enum else "Flags"
     section = f" (section {each.section})" if each.section else ""
-    doc = " ".join(wrapped(f"{each.doc}"))
+    doc = f": {each.doc}" if each.doc else ""
     return {
         "name": each.name,
         "is_enum": is_enum,
         "type": integer_type(each.bits, signed=signed),
-        "title": f"{kind} {each.name}{section}{': ' + doc if doc else ''}",
+        "title": c_text.comment_line(f"{kind} {each.name}{section}{doc}"),
         "members": [
             {
                 "name": member.name,
                 "constant": f"{names.upper}_{each.name.upper()}_{member.name.upper()}",
                 "value": _number(member, each, signed=signed),
-                "doc": " ".join(wrapped(member.doc)),
+                "doc": c_text.comment_line(member.doc),
             }
             for member in each.members
         ],

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import textwrap
 from fractions import Fraction
 
+from qlinkgen.backends import c_text
 from qlinkgen.model.message import Field, Message, Value
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Array, Bits, Blob, Enum, Flags, Scalar
 
-_WIDTH = 100
-
-
-def wrapped(text: str, width: int = _WIDTH) -> list[str]:
-    """Lines of a comment; what would end the comment is broken up."""
-    return textwrap.wrap(" ".join(text.replace("*/", "* /").replace("/*", "/ *").split()), width)
+#: Characters of a line of a comment.
+WIDTH = 100
 
 
 def message_head(command: Command | None, message: Message) -> list[str]:
@@ -27,7 +23,7 @@ def message_head(command: Command | None, message: Message) -> list[str]:
         lines.append("NOT CONFIRMED: its source is weak; check it at the device.")
     if message.empty_is_default:
         lines.append("A payload of no bytes is decoded as the defaults.")
-    return [piece for line in lines for piece in wrapped(line)]
+    return [piece for line in lines for piece in c_text.comment(line, WIDTH)]
 
 
 def field_rows(message: Message) -> list[str]:
@@ -83,7 +79,7 @@ def member_note(value: Value) -> str:
         parts.append("7-bit characters")
     if not value.field.confirmed:
         parts.append("not confirmed")
-    return " ".join("; ".join(parts).replace("*/", "* /").replace("/*", "/ *").split())
+    return c_text.comment_line("; ".join(parts))
 
 
 def _facts(scalar: Scalar) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from qlinkgen.backends.c.describe import wrapped
 from qlinkgen.backends.c.framing import Address, checks
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.message import Message
@@ -55,7 +54,6 @@ def _entry(names: Names, message: Message, answer: Message | None, command: Comm
         "refuses_broadcast": addressing == "node",
         "broadcast_only": addressing == "broadcast",
         "silent_broadcast": answer is not None and addressing == "either",
-        "doc": wrapped(command.doc if command else message.doc)[:1],
     }
 
 

@@ -6,10 +6,11 @@ from typing import Any
 
 import jinja2
 
+from qlinkgen.backends import c_text
 from qlinkgen.backends.base import Options, banner
 from qlinkgen.backends.c import dispatch, framing
 from qlinkgen.backends.c.constants import enum_views, limits
-from qlinkgen.backends.c.describe import wrapped
+from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
 from qlinkgen.backends.c.extents import extents
 from qlinkgen.backends.c.frames import FrameSection, frame_section
@@ -181,8 +182,8 @@ class Header:
     def _head(self) -> dict[str, Any]:
         protocol = self._protocol
         return {
-            "banner": [piece for line in banner(protocol) for piece in wrapped(line)],
-            "about": wrapped(protocol.doc),
+            "banner": [piece for line in banner(protocol) for piece in c_text.comment(line, WIDTH)],
+            "about": c_text.comment(protocol.doc, WIDTH),
             "options": option_lines(self._names.upper, self._section.check),
             "example": example_lines(protocol, self._names, self._section, self._kept, self._options.role),
             "max_wire_size": sizes.protocol_max_wire_size(protocol),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from qlinkgen.backends import c_text
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.describe import field_rows, member_note, message_head
 from qlinkgen.backends.c.encode import Encoder, count_member, size_terms
@@ -124,13 +125,12 @@ class MessageWriter:
             "function": f"{self._names.function(message)}_{value.name}",
             "type": scalar_type(scalar),
             "helper": scalar_type(scalar).removesuffix("_t"),
-            "text": f"{value.name} = (raw * FACTOR + BIAS) / DIVISOR {scalar.unit}".rstrip(),
+            "text": c_text.comment_line(f"{value.name} = (raw * FACTOR + BIAS) / DIVISOR {scalar.unit}"),
             "factor": _whole(scalar.scaling.factor),
             "bias": _whole(scalar.scaling.bias),
             "divisor": _whole(scalar.scaling.divisor),
             "minimum": scalar_literal(scalar, scalar.minimum),
             "maximum": scalar_literal(scalar, scalar.maximum),
-            "unit": scalar.unit,
         }
 
 

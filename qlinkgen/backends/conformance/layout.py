@@ -5,6 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
+from qlinkgen.backends import c_text
+
 #: Columns, the indentation of a table not counted.
 WIDTH = 112
 
@@ -15,9 +17,8 @@ def numbers(data: Sequence[int]) -> str:
 
 
 def wrapped(text: str) -> list[str]:
-    """Lines of a comment; what would end the comment is broken up."""
-    plain = " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
-    return textwrap.wrap(plain, WIDTH - 6, break_on_hyphens=False)
+    """Lines of a comment."""
+    return c_text.comment(text, WIDTH - 6, break_on_hyphens=False)
 
 
 def comment(text: str) -> list[str]:

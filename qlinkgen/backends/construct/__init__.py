@@ -9,11 +9,13 @@ from __future__ import annotations
 import importlib.resources
 import re
 
+from qlinkgen.backends import python_text
 from qlinkgen.backends.base import Options, Outputs, banner
 from qlinkgen.backends.construct.live import Live, live
 from qlinkgen.backends.construct.module import definitions
 from qlinkgen.backends.construct.tree import WIDTH, Definition, printed, used
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import one_line
 
 __all__ = ["Live", "generate", "live", "shared"]
 
@@ -50,7 +52,8 @@ def shared() -> Outputs:
 
 
 def _head(protocol: Protocol) -> str:
-    return '"""' + "\n".join(banner(protocol)).replace("\n", "\n\n", 1) + '\n"""\n\n'
+    first, *others = map(one_line, banner(protocol))
+    return "\n".join([*python_text.docstring([first, "", *others]), "", ""])
 
 
 def _imports(everything: tuple[Definition, ...]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator
 
 from qlinkgen.backends.base import Options
@@ -65,11 +64,11 @@ def _message(message: Message) -> Call:
 
 
 def _comment(doc: str, section: str, *, confirmed: bool = True) -> str:
-    """Purpose and section, wrapped; what is not confirmed says so."""
+    """Purpose and section; what is not confirmed says so."""
     words = [doc.strip()] if doc else []
     words += [f"({section})"] if section else []
     words += [] if confirmed else ["NOT CONFIRMED by a second source."]
-    return "\n".join(textwrap.wrap(" ".join(words), 106))
+    return " ".join(words)
 
 
 # Frames

@@ -9,6 +9,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from qlinkgen.backends import python_text
+from qlinkgen.model.texts import one_line
+
 #: Characters of a line of source.
 WIDTH = 110
 
@@ -148,7 +151,8 @@ def used(node: Node) -> Iterator[str]:
 
 def printed(definition: Definition) -> str:
     """The source of a definition, its comment above, and an empty line above that."""
-    comment = "".join(f"# {line}\n" for line in definition.comment.splitlines())
+    lines = python_text.comment(definition.comment, WIDTH - 4)
+    comment = "".join(f"# {line}\n" for line in lines)
     gap = "" if definition.attached else "\n"
     return f"{gap}{comment}{definition.name} = {_text(definition.node, len(definition.name) + 3, 0)}\n"
 
@@ -175,11 +179,12 @@ def _text(node: Node, column: int, indent: int) -> str:
 
 def _part(prefix: str, node: Node, indent: int) -> str:
     line = f"{' ' * indent}{prefix}{_text(node, indent + len(prefix), indent)},"
-    if not isinstance(node, Named) or not node.doc:
+    doc = one_line(node.doc) if isinstance(node, Named) else ""
+    if not doc:
         return f"{line}\n"
-    if "\n" not in line and len(line) + len(node.doc) + 4 <= WIDTH:
-        return f"{line}  # {node.doc}\n"
-    return f"{' ' * indent}# {node.doc}\n{line}\n"
+    if "\n" not in line and len(line) + len(doc) + 4 <= WIDTH:
+        return f"{line}  # {doc}\n"
+    return f"{' ' * indent}# {doc}\n{line}\n"
 
 
 def _documented(node: Node) -> bool:
@@ -209,7 +214,9 @@ def _literal(value: Any) -> str:
     """As `repr`, in double quotes."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_literal, value))}{',' if len(value) == 1 else ''})"
+    if isinstance(value, str):
+        return python_text.literal(value)
     text = repr(value)
-    if isinstance(value, str | bytes) and '"' not in text and text.endswith("'"):
+    if isinstance(value, bytes) and '"' not in text and text.endswith("'"):
         text = text.replace("'", '"', 1)[:-1] + '"'
     return text

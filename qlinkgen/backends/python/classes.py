@@ -10,9 +10,9 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python import docstrings, values
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
-from qlinkgen.backends.python.layout import WIDTH, in_hex, indented, listing, wrapped
+from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, listing, wrapped
 from qlinkgen.backends.python.measure import measure_lines
-from qlinkgen.backends.python.names import attribute, class_name, constant_name
+from qlinkgen.backends.python.names import attribute, class_name, constant_name, natural
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.message import Value
 from qlinkgen.model.naming import pascal
@@ -145,14 +145,14 @@ class ClassBuilder:
         scales = self._scales_of(message)
         encoder = Encoder(message, self._place, title, number, scales)
         decoder = Decoder(message, self._place, title, scales)
-        before = "return " if self._place.envelope is None else "body = "
-        names = [f'"{attribute(each.name)}"' for each in message.payload.settable]
+        name = "" if self._place.envelope is None else "body"
+        names = sorted((attribute(each.name) for each in message.payload.settable), key=natural)
         return replace(
             head,
-            slots=listing("__slots__ = (", names, ")", 4),
+            slots=listing("__slots__ = (", [f'"{name}"' for name in names], ")", 4),
             facts=[*head.facts, *self._facts(message, scales)],
             init=self._init(message),
-            encode=encoder.statements(before),
+            encode=encoder.statements(name),
             decode=decoder.statements(),
             measure=measure_lines(message.payload) if self._measured else [],
             constants=[*encoder.constants, *decoder.constants],
@@ -216,7 +216,7 @@ class ClassBuilder:
         names = [f'"{attribute(each.name)}"' for each in payload.settable]
         facts += listing("FIELDS = (", names, ")", 4) if names else []
         rules = values.rules(message, self._place, scales)
-        return [*facts, "RULES = (", *(f"    {rule}," for rule in rules), ")"] if rules else facts
+        return [*facts, *calls("RULES = (", rules, ")", 4)] if rules else facts
 
     def _init(self, message: MessagePlan) -> list[str]:
         place, address = self._place, self._place.address if message.allowed is not None else ""

@@ -7,14 +7,23 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, values
-from qlinkgen.backends.python.layout import WIDTH, comprehension, indented, joined, wrapped
+from qlinkgen.backends.python.layout import WIDTH, comprehension, indented, joined, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Enum, Flags, Scalar
 from qlinkgen.plan.expr import Size, Within
-from qlinkgen.plan.framing import AddressPart, CheckPart, ConstantPart, IdPart, LengthPart, MarkPart, Part, PayloadPart
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
+)
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -107,6 +116,15 @@ class Decoder:
         """A place in the payload as an index of what is read."""
         return integers.size_text(size + self.place.header)
 
+    def _start(self, size: Size) -> list[str]:
+        """The statement that binds a place, where it is not always the same."""
+        terms = integers.size_terms(size + self.place.header)
+        return joined("start = ", terms, "+", _INDENT) if size.terms else []
+
+    def _from(self, size: Size) -> str:
+        """A place that has been bound, as an index."""
+        return "start" if size.terms else self._at(size)
+
     # A payload of no bytes
 
     def _empty(self) -> list[str]:
@@ -180,8 +198,12 @@ class Decoder:
         taken = integers.get(integer, local, self.place.byteorder)
         if not taken.terms:
             return
-        if taken.stray:
-            self._refuse(" or ".join(taken.stray), name, taken.targets[0], offset)
+        for sources, mask in taken.stray:
+            seen = sources[0]
+            if len(sources) > 1:
+                self._values += joined("stray = ", sources, "|", _INDENT)
+                seen = "stray"
+            self._refuse(f"{seen} > 0x{mask:02X}", name, seen, offset)
         self._values += joined(f"{local} = ", taken.terms, "|", _INDENT)
         if integer.byteorder is None and integer.signed:
             self._values.append(f"{local} = {integers.sign_extended(local, integer.bits)}")
@@ -199,8 +221,10 @@ class Decoder:
                 continue
             while row.codes[-1].endswith("x"):
                 row.codes.pop()
-            self.constants.append(f'{name} = {place.use("Struct")}("{place.prefix}{format_of(row.codes)}").unpack_from')
-            lines += _assigned(row.targets, f"{name}({place.data}, {self._at(row.start)})")
+            self.constants.append(
+                f'{name} = {place.use("Struct")}("{place.prefix}{format_of(row.codes)}").unpack_from'
+            )
+            lines += [*self._start(row.start), *_assigned(row.targets, f"{name}({place.data}, {self._from(row.start)})")]
         if payload.fixed and not (alone and rows):
             size = payload.most + place.overhead
             wrong = f"len({place.data}) != {size}" if size else place.data
@@ -243,14 +267,24 @@ class Decoder:
                 return _divided(sizing.run, left, sizing.run.item_size, self._bad_layout)
             case Learn():
                 run = self.message.payload.run(sizing.count.run)
-                return _divided(run, self._count(sizing.count), sizing.count.scale, self._bad_layout)
+                start, number = self._count(sizing.count)
+                return [*start, *_divided(run, number, sizing.count.scale, self._bad_layout)]
             case Compare():
-                return [f"if {self._count(sizing.count)} != {_expected(sizing.count)}:", self._bad_layout]
+                start, number = self._count(sizing.count)
+                return [*start, f"if {number} != {_expected(sizing.count)}:", self._bad_layout]
             case _:
                 assert_never(sizing)
 
-    def _count(self, count: CountStep) -> str:
-        return integers.read(count.integer, self.place.data, lambda more: self._at(count.place.front + more))
+    def _count(self, count: CountStep) -> tuple[list[str], str]:
+        """Statements that find a count, and its expression."""
+        front = count.place.front
+
+        def at(more: int) -> str:
+            if front.terms:
+                return f"start + {more}" if more else "start"
+            return self._at(front + more)
+
+        return self._start(front), integers.read(count.integer, self.place.data, at)
 
     # Steps
 
@@ -279,22 +313,23 @@ class Decoder:
 
     def _refuse(self, test: str, name: str, seen: str, offset: str) -> None:
         call = wrapped(
-            f"raise {self.place.use('illegal')}(", ["cls", f'"{name}"', seen, offset, self.place.payload], ")", _INDENT + 4
+            f"raise {self.place.use('illegal')}(",
+            ["cls", f'"{name}"', seen, offset, self.place.payload],
+            ")",
+            _INDENT + 4,
         )
         self._values += [f"if {test}:", *indented(call)]
 
     def _value(self, step: ValueStep, at: Size) -> None:
         raw, target = f"{step.name}_raw", f"message.{attribute(step.name)}"
-        result = converted(step.number, raw, self.scales.get(step.name, ""), self.place)
-        direct = result == raw and not step.conditions
-        if direct and integers.letter(step.integer, self.place.byteorder):
+        if _is_plain(step.number) and not step.conditions and integers.letter(step.integer, self.place.byteorder):
             self._get(step.integer, raw, at, target)
             return
         self._get(step.integer, raw, at)
         self._put_together(step.integer, raw, step.name, _offset(step))
         for rule in step.conditions:
             self._refuse(integers.broken(rule, raw), step.name, raw, _offset(step))
-        self._values.append(f"{target} = {result}")
+        self._values += assigned(target, step.number, raw, self.scales.get(step.name, ""), self.place)
 
     def _count_step(self, step: CountStep, at: Size) -> None:
         """A count has been read with the sizes, but for a payload that one struct holds."""
@@ -316,7 +351,7 @@ class Decoder:
         self._put_together(step.integer, whole, step.name, _offset(step))
         for member in step.members:
             mask = (1 << member.bits) - 1
-            taken = f"{whole} >> {member.shift} & {mask:#x}" if member.shift else f"{whole} & {mask:#x}"
+            taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
             match member:
                 case MemberValue():
                     self._member(member, taken, _offset(step))
@@ -331,14 +366,13 @@ class Decoder:
         raw, target = f"{member.name}_raw", f"message.{attribute(member.name)}"
         if member.number.signed:
             taken = integers.sign_extended(f"({taken})", member.bits)
-        result = converted(member.number, raw, self.scales.get(member.name, ""), self.place)
-        if result == raw and not member.conditions:
+        if _is_plain(member.number) and not member.conditions:
             self._values.append(f"{target} = {taken}")
             return
         self._values.append(f"{raw} = {taken}")
         for rule in member.conditions:
             self._refuse(integers.broken(rule, raw), member.name, raw, offset)
-        self._values.append(f"{target} = {result}")
+        self._values += assigned(target, member.number, raw, self.scales.get(member.name, ""), self.place)
 
     # Runs
 
@@ -357,10 +391,13 @@ class Decoder:
 
     def _slice(self, step: RunStep, target: str) -> None:
         """Take the bytes of a run of variable size."""
-        first, front = self._at(step.place.front), step.place.front
-        taken = f"{self.place.data}[{first} : {self._at(front.plus(step.name, step.item_size))}]"
+        front, size, data = step.place.front, step.item_size, self.place.data
+        count = f"{size} * {step.name}_count" if size > 1 else f"{step.name}_count"
+        start = self._from(front)
+        taken = slice_of(data, start, f"{start} + {count}" if start != "0" else count)
         # What a caller hands in may be a memoryview.
-        self._slices.append(f"{target} = bytes({taken})" if self.place.unique else f"{target} = {taken}")
+        value = f"bytes({taken})" if self.place.unique else taken
+        self._slices += [*self._start(front), f"{target} = {value}"]
         self._open = False
 
     def _items(self, step: ItemsStep, at: Size) -> None:
@@ -375,7 +412,8 @@ class Decoder:
             row.targets.append(f"*{target}")
         elif code:
             text = f'f"{self.place.prefix}{{{step.name}_count}}{code}"'
-            self._slices.append(f"{target} = list({self.place.use('unpack_from')}({text}, {self.place.data}, {self._at(at)}))")
+            taken = f"{self.place.use('unpack_from')}({text}, {self.place.data}, {self._from(at)})"
+            self._slices += [*self._start(at), f"{target} = list({taken})"]
             self._open = False
         else:
             self._odd_items(step, target, at)
@@ -397,35 +435,43 @@ class Decoder:
             number = integers.from_bytes(item, f"{raw}[index : index + {size}]")
         else:
             sources = [f"{raw}[index + {index}]" if index else f"{raw}[index]" for index in range(size)]
-            if stray := " or ".join(integers.stray(item, sources)):
-                self._refuse(f"any({stray} {places})", step.name, raw, _offset(step))
+            for index, chunk in enumerate(item.chunks):
+                if chunk.bits < 8:
+                    seen = f"max({raw}[{index}::{size}], default=0)"
+                    self._refuse(f"{seen} > 0x{chunk.mask:02X}", step.name, raw, _offset(step))
             number = " | ".join(integers.group_terms(item, sources))
             if item.signed:
                 number = integers.sign_extended(f"({number})", item.bits)
         self._values += comprehension(f"{target} = [", number, places, "]", _INDENT)
 
 
-def converted(number: Scalar, raw: str, scale: str, place: Place) -> str:
-    """From the number on the wire to the value of the attribute."""
+def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) -> list[str]:
+    """The attribute's value from the number on the wire."""
     meaning, scaling = number.meaning, number.scaling
     match meaning:
         case Enum():
-            return f"{place.classes[meaning.name]}.members.get({raw}, {raw})"
+            members = f"{place.classes[meaning.name]}.members.get("
+            return wrapped(f"{target} = {members}", [raw, raw], ")", _INDENT)
         case "bool":
-            return f"{raw} == 1"
+            return [f"{target} = {raw} == 1"]
         case Flags() | None:
             pass
         case _:
             assert_never(meaning)
     if scaling is None:
-        return raw
+        return [f"{target} = {raw}"]
     if number.number == "decimal":
-        return f"{scale}.value({raw})"
+        return [f"{target} = {scale}.value({raw})"]
     product = raw if scaling.factor == 1 else f"{raw} * {scaling.factor}"
     total = f"{product} {'+' if scaling.bias > 0 else '-'} {abs(scaling.bias)}" if scaling.bias else product
     if scaling.divisor == 1:
-        return total
-    return f"({total}) / {scaling.divisor}" if scaling.bias else f"{total} / {scaling.divisor}"
+        return [f"{target} = {total}"]
+    return joined(f"{target} = ", [f"({total})" if scaling.bias else total, str(scaling.divisor)], "/", _INDENT)
+
+
+def _is_plain(number: Scalar) -> bool:
+    """The attribute holds the number on the wire."""
+    return number.scaling is None and (number.meaning is None or isinstance(number.meaning, Flags))
 
 
 def _expected(count: CountStep) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.python import integers
-from qlinkgen.backends.python.layout import WIDTH, condition, indented, joined, literal, wrapped
+from qlinkgen.backends.python.layout import WIDTH, comprehension, condition, indented, joined, literal, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
@@ -73,10 +73,11 @@ class Encoder:
     constants: list[str] = field(default_factory=list)
     _lines: list[str] = field(default_factory=list)
     _terms: list[str] = field(default_factory=list)
+    _late: list[str] = field(default_factory=list)
     _pieces: list[Row | str] = field(default_factory=list)
 
-    def statements(self, before: str) -> list[str]:
-        """Lines that compute the bytes; ``before`` precedes the expression, like ``return``."""
+    def statements(self, name: str) -> list[str]:
+        """Lines that compute the bytes as the local ``name``, or return them where it is empty."""
         self._tabled = tabled(self.message.payload, self.place.byteorder)
         self._measure()
         for part in self.place.front:
@@ -85,8 +86,12 @@ class Encoder:
             self._step(step)
         for part in self.place.back:
             self._part(part)
-        guard = [*condition(self._terms, _INDENT), f"    raise {self.place.use('OutOfRange')}"] if self._terms else []
-        return [*self._lines, *guard, *self._expression(before)]
+        guard = (
+            [*condition(self._terms, _INDENT), f"    raise {self.place.use('OutOfRange')}"]
+            if self._terms
+            else []
+        )
+        return [*self._lines, *guard, *self._late, *self._expression(name)]
 
     def _require(self, number: str, *rules: Condition) -> None:
         self._terms += [integers.holds(rule, number) for rule in rules]
@@ -159,7 +164,9 @@ class Encoder:
                 self._number(step.integer, step.value)
             case CountStep():
                 count = f"{step.run}_count"
-                self._computed(step.name, step.integer, f"{step.scale} * {count}" if step.scale > 1 else count)
+                self._computed(
+                    step.name, step.integer, f"{step.scale} * {count}" if step.scale > 1 else count
+                )
             case BitsStep():
                 self._bits(step)
             case BytesStep():
@@ -223,11 +230,11 @@ class Encoder:
                 else:
                     self._indexed(member.name, member.number)
                 if member.number.signed:
-                    number = f"({number} & {(1 << member.bits) - 1:#x})"
+                    number = f"({number} & 0x{(1 << member.bits) - 1:X})"
             case MemberConstant() | MemberReserved():
                 if not member.value:
                     return ""
-                number = f"{member.value:#x}"
+                number = f"0x{member.value:X}"
             case _:
                 assert_never(member)
         return f"{number} << {member.shift}" if member.shift else number
@@ -261,43 +268,51 @@ class Encoder:
     def _odd_items(self, step: ItemsStep, source: str) -> None:
         """Items that struct does not know, not in this byte order, or not all of their values."""
         local = f"{step.name}_raw"
-        self._lines.append(f"{local} = [{self.place.use('index')}(item) for item in {source}]")
+        self._lines += comprehension(
+            f"{local} = [", f"{self.place.use('index')}(item)", f"for item in {source}", "]", _INDENT
+        )
         rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
         for rule in rules:
             self._terms.append(f"all({integers.holds(rule, 'item')} for item in {local})")
         if step.item.byteorder is None:
-            groups = ", ".join(integers.group_out("item", chunk) for chunk in step.item.chunks)
-            self._pieces.append(f"bytes([byte for item in {local} for byte in ({groups},)])")
+            groups = [integers.group_out("item", chunk) for chunk in step.item.chunks]
+            flat = f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
+            lines = comprehension(f"{local} = [", flat, f"for item in {local}", "]", _INDENT)
+            if _INDENT + 4 + len(flat) > WIDTH:
+                element = ["bytes(", "    (", *(f"        {each}," for each in groups), "    )", ")"]
+                lines = [lines[0], *indented(element), *lines[-2:]]
+            self._late += lines
         else:
-            self._pieces.append(f'b"".join([{integers.to_bytes(step.item, "item")} for item in {local}])')
+            self._late += comprehension(
+                f"{local} = [", integers.to_bytes(step.item, "item"), f"for item in {local}", "]", _INDENT
+            )
+        self._pieces.append(f'b"".join({local})')
 
     # The expression
 
-    def _expression(self, before: str) -> list[str]:
+    def _expression(self, name: str) -> list[str]:
+        """Statements that put the pieces together as ``name``, or return them where it is empty."""
         rows = [piece for piece in self._pieces if isinstance(piece, Row)]
-        pieces = [
-            [piece] if isinstance(piece, str) else self._call(piece, rows, len(before))
-            for piece in self._pieces
-        ]
-        if not pieces:
-            return [f'{before}b""']
-        if len(pieces) == 1:
-            return [before + pieces[0][0], *pieces[0][1:]]
-        flat = before + " + ".join(piece[0] for piece in pieces)
-        if all(len(piece) == 1 for piece in pieces) and _INDENT + len(flat) <= WIDTH:
-            return [flat]
-        lines = [f"{before}("]
-        for index, piece in enumerate(pieces):
-            lines += indented([("+ " if index else "") + piece[0], *piece[1:]])
-        return [*lines, ")"]
+        if not self._pieces:
+            return [f'{name} = b""' if name else 'return b""']
+        if len(self._pieces) == 1:
+            return self._piece(self._pieces[0], rows, f"{name} = " if name else "return ")
+        local = name or "data"
+        lines = self._piece(self._pieces[0], rows, f"{local} = ")
+        for piece in self._pieces[1:]:
+            lines += self._piece(piece, rows, f"{local} += ")
+        return lines if name else [*lines, f"return {local}"]
 
-    def _call(self, row: Row, rows: list[Row], before: int) -> list[str]:
+    def _piece(self, piece: Row | str, rows: list[Row], before: str) -> list[str]:
+        return [before + piece] if isinstance(piece, str) else self._call(piece, rows, before)
+
+    def _call(self, row: Row, rows: list[Row], before: str) -> list[str]:
         name = f"_PACK_{self.title}" + (f"_{rows.index(row) + 1}" if len(rows) > 1 else "")
         text = self.place.prefix + format_of(row.codes)
-        indent = _INDENT + before
         if row.items is None:
             self.constants.append(f'{name} = {self.place.use("Struct")}("{text}").pack')
-            return wrapped(f"{name}(", row.arguments, ")", indent)
+            return wrapped(f"{before}{name}(", row.arguments, ")", _INDENT)
         self.place.use("Struct")
         self.constants += table(name, text, "pack", row.items, "n")
-        return wrapped(f"{name}[{row.items.name}_count](", row.arguments, ")", indent)
+        return wrapped(f"{before}{name}[{row.items.name}_count](", row.arguments, ")", _INDENT)
+

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.python import integers
-from qlinkgen.backends.python.layout import in_hex, literal, wrapped
+from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.checksum import Algorithm, Sum
 from qlinkgen.model.integer import ByteOrder
@@ -109,6 +109,7 @@ class UniqueView:
     min_length: int
     max_length: int
     body_start: int
+    payload_of_body: str
     id_at: int
     blank_header: str
     trailer: int
@@ -363,6 +364,9 @@ def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> Uni
         min_length=length.least,
         max_length=length.most,
         body_start=len(envelope.preamble),
+        payload_of_body=slice_of(
+            "body", str(envelope.header_size - len(envelope.preamble)), str(-envelope.trailer_size)
+        ),
         id_at=envelope.offset(number),
         blank_header=_blank_header(envelope, end, address),
         trailer=envelope.trailer_size,
@@ -481,7 +485,7 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
             case LengthPart():
                 whole = isinstance(plan.frame.transparency, FrameStuffing)
                 place = f"_take(buf, start, {end})[1]" if whole else f"start + {end}"
-                bounds = f"_MIN_LENGTH <= {_number_at(envelope, part)} <= _MAX_LENGTH"
+                bounds = "_MIN_LENGTH <= _length(head) <= _MAX_LENGTH"
                 yield HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')
             case IdPart() | AddressPart() if bare:
                 needed = [each for each in (envelope.id, envelope.address) if each is not None]
@@ -504,7 +508,10 @@ def _placed(envelope: Envelope) -> PlacedCheck | None:
         return None
     start = -envelope.from_end(part)
     end = start + part.size
-    covered = " + ".join(f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]" for run in envelope.coverage)
+    covered = " + ".join(
+        f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
+        for run in envelope.coverage
+    )
     return PlacedCheck(
         view=_check_view(part.check),
         start=str(start),

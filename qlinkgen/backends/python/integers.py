@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
 
@@ -21,13 +22,13 @@ class Get:
         code: format of its bytes.
         targets: what the struct is unpacked into; ``local`` stands for the number itself.
         terms: the number put together from the targets, () where the only target is the number.
-        stray: conditions that are true where the bytes are not those of an integer.
+        stray: targets that must not be greater than a mask.
     """
 
     code: str
     targets: tuple[str, ...]
     terms: tuple[str, ...] = ()
-    stray: tuple[str, ...] = ()
+    stray: tuple[tuple[tuple[str, ...], int], ...] = ()
 
 
 def letter(integer: Integer, byteorder: ByteOrder) -> str:
@@ -79,18 +80,18 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
     if integer.size == 1:
         return f"{data}[{at(0)}]"
     if integer.byteorder is not None:
-        return from_bytes(integer, f"{data}[{at(0)} : {at(integer.size)}]")
+        return from_bytes(integer, slice_of(data, at(0), at(integer.size)))
     sources = tuple(f"{data}[{at(index)}]" for index in range(integer.size))
     return f"({' | '.join(group_terms(integer, sources))})"
 
 
-def stray(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
-    """Conditions that are true where a wire byte has bits that are not the integer's; one for each mask."""
+def stray(integer: Integer, sources: Sequence[str]) -> tuple[tuple[tuple[str, ...], int], ...]:
+    """Sources whose bytes have bits that are not the integer's where they are greater than a mask, by mask."""
     by_mask: dict[int, list[str]] = {}
     for source, chunk in zip(sources, integer.chunks, strict=True):
         if chunk.bits < 8:
             by_mask.setdefault(chunk.mask, []).append(source)
-    return tuple(f"{' | '.join(group)} > 0x{mask:02X}" for mask, group in by_mask.items())
+    return tuple((tuple(group), mask) for mask, group in by_mask.items())
 
 
 def group_terms(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
@@ -101,7 +102,7 @@ def group_terms(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
 
 def sign_extended(number: str, bits: int) -> str:
     """A number of some bits as two's complement; ``number`` must be a primary."""
-    sign = f"{1 << (bits - 1):#x}"
+    sign = f"0x{1 << (bits - 1):X}"
     return f"({number} ^ {sign}) - {sign}"
 
 
@@ -122,7 +123,7 @@ def holds(condition: Condition, number: str) -> str:
         case Within():
             return f"{condition.low} <= {number} <= {condition.high}"
         case Clear():
-            return f"{number} & {condition.mask:#x} == 0"
+            return f"{number} & 0x{condition.mask:X} == 0"
         case OneOf():
             terms = [holds(each, number) for each in condition.ranges]
             return f"({' or '.join(terms)})" if len(terms) > 1 else terms[0]
@@ -136,7 +137,7 @@ def broken(condition: Condition, number: str) -> str:
         case Within() if condition.low == condition.high:
             return f"{number} != {condition.low}"
         case Clear():
-            return f"{number} & {condition.mask:#x}"
+            return f"{number} & 0x{condition.mask:X}"
         case OneOf(ranges=(only,)):
             return broken(only, number)
         case Within() | OneOf():
@@ -145,10 +146,15 @@ def broken(condition: Condition, number: str) -> str:
             assert_never(condition)
 
 
-def size_text(size: Size, counts: str = "{}_count") -> str:
-    """A number of bytes as an expression on the local variables that hold counts."""
+def size_terms(size: Size) -> list[str]:
+    """The terms of a number of bytes, on the local variables that hold counts."""
     terms = [str(size.fixed)] if size.fixed or not size.terms else []
     for term in size.terms:
-        count = counts.format(term.run)
+        count = f"{term.run}_count"
         terms.append(f"{term.factor} * {count}" if term.factor > 1 else count)
-    return " + ".join(terms)
+    return terms
+
+
+def size_text(size: Size) -> str:
+    """A number of bytes as an expression."""
+    return " + ".join(size_terms(size))

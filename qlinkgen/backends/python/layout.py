@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 #: Longest line of generated code.
 WIDTH = 88
@@ -22,26 +23,61 @@ def wrapped(head: str, items: Iterable[str], tail: str, indent: int) -> list[str
     return [head, *(f"    {item}," for item in listed), tail]
 
 
+@dataclass(frozen=True)
+class Call:
+    """A call as an expression."""
+
+    name: str
+    arguments: Sequence[str]
+
+    @property
+    def flat(self) -> str:
+        """The call on one line."""
+        return f"{self.name}({', '.join(self.arguments)})"
+
+    def item(self, indent: int) -> list[str]:
+        """The call as an item of a display that has a line for each."""
+        return [*wrapped(f"{self.name}(", self.arguments, "),", indent)]
+
+
+def calls(head: str, items: Sequence[Call], tail: str, indent: int) -> list[str]:
+    """A tuple display of calls."""
+    flat = ", ".join(item.flat for item in items) + ("," if len(items) == 1 else "")
+    line = f"{head}{flat}{tail}"
+    if indent + len(line) <= WIDTH:
+        return [line]
+    return [head, *indented(piece for item in items for piece in item.item(indent + 4)), tail]
+
+
 def listing(head: str, items: Iterable[str], tail: str, indent: int) -> list[str]:
     """The same for a tuple display: a single item has its comma."""
     listed = list(items)
     return [f"{head}{listed[0]},{tail}"] if len(listed) == 1 else wrapped(head, listed, tail, indent)
 
 
-def joined(head: str, terms: Sequence[str], operator: str, indent: int, *, always: bool = False) -> list[str]:
-    """``head term operator term``; in parentheses where it takes several lines, or ``always``."""
+def joined(head: str, terms: Sequence[str], operator: str, indent: int, tail: str = "") -> list[str]:
+    """``head term operator term tail``, in parentheses where it takes several lines."""
     flat = f" {operator} ".join(terms)
-    line = f"{head}({flat})" if always and len(terms) > 1 else f"{head}{flat}"
+    line = f"{head}{flat}{tail}"
     if indent + len(line) <= WIDTH:
         return [line]
+    if indent + 4 + len(flat) <= WIDTH:
+        return [f"{head}(", f"    {flat}", f"){tail}"]
     first, *others = terms
-    return [f"{head}(", f"    {first}", *(f"    {operator} {term}" for term in others), ")"]
+    return [f"{head}(", f"    {first}", *(f"    {operator} {term}" for term in others), f"){tail}"]
 
 
 def condition(terms: Sequence[str], indent: int) -> list[str]:
     """``if not all of the terms:``."""
-    lines = joined("if not ", terms, "and", indent + 1, always=True)
-    return [*lines[:-1], f"{lines[-1]}:"]
+    if len(terms) == 1:
+        return joined("if not ", terms, "and", indent, ":")
+    flat = " and ".join(terms)
+    if indent + len(flat) + 10 <= WIDTH:
+        return [f"if not ({flat}):"]
+    if indent + 4 + len(flat) <= WIDTH:
+        return ["if not (", f"    {flat}", "):"]
+    first, *others = terms
+    return ["if not (", f"    {first}", *(f"    and {term}" for term in others), "):"]
 
 
 def comprehension(head: str, element: str, clause: str, tail: str, indent: int) -> list[str]:
@@ -52,6 +88,12 @@ def comprehension(head: str, element: str, clause: str, tail: str, indent: int) 
     if indent + 4 + len(element) + 1 + len(clause) <= WIDTH:
         return [head, f"    {element} {clause}", tail]
     return [head, f"    {element}", f"    {clause}", tail]
+
+
+def slice_of(data: str, start: str, end: str) -> str:
+    """``data[start:end]``, with blanks around the colon where an index is an expression."""
+    simple = all(each.lstrip("-").isdecimal() or each.isidentifier() for each in (start, end) if each)
+    return f"{data}[{start}:{end}]" if simple else f"{data}[{start} : {end}]"
 
 
 def in_hex(number: int, size: int = 1) -> str:

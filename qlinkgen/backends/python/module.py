@@ -16,7 +16,7 @@ from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
 from qlinkgen.backends.python.frames import FrameView, MarkedView, PacketView, PartsView, UniqueView
 from qlinkgen.backends.python.layout import WIDTH
-from qlinkgen.backends.python.names import class_name
+from qlinkgen.backends.python.names import by_kind, class_name
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.model.texts import one_line
 from qlinkgen.plan.tree import Plan
@@ -83,6 +83,7 @@ class Module:
             "heard": heard,
             "direction_type": f"Literal[{', '.join(quoted)}]",
             "direction_default": f" = {quoted[0]}" if len(quoted) == 1 else "",
+            "stream_decoder": _stream_decoder(quoted),
             "doc": self._doc(),
             "enums": [tables.enum_model(each, self.place.classes[each.name]) for each in plan.enums],
             "flags": [tables.flags_model(each, self.place.classes[each.name]) for each in plan.flags],
@@ -143,7 +144,9 @@ class Module:
         """What the code of the classes has used, and what the templates of the frame use."""
         plan, used = self.plan, {*self.place.used, *_PUBLIC, "BaseMessage", "as_bytes", "wrong_size"}
         used |= {"OpenEnum", "named"} if plan.enums else set()
-        used |= {"REFUSALS", "refused"} if any(each.has_codec and each.refusable for each in models) else set()
+        used |= (
+            {"REFUSALS", "refused"} if any(each.has_codec and each.refusable for each in models) else set()
+        )
         typing = {"ClassVar", "Literal", "Self"}
         typing |= {"Final"} if plan.flags else set()
         check = None if isinstance(view, PacketView) else view.check
@@ -168,7 +171,7 @@ class Module:
             struct_error=True,
             decimal="Decimal" in used,
             index="index" in used,
-            support=sorted(used - set(_ELSEWHERE), key=lambda name: (name.upper() != name, name.lower())),
+            support=sorted(used - set(_ELSEWHERE), key=by_kind),
             callable=isinstance(view, UniqueView),
             typing=sorted(typing),
         )
@@ -176,7 +179,7 @@ class Module:
     def _public(self, view: FrameView, heard: Sequence[frames.Heard]) -> list[str]:
         names = [class_name(message) for message in self.plan.messages]
         names += [self.place.classes[each.name] for each in (*self.plan.enums, *self.plan.flags)]
-        names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", "encode", *_PUBLIC]
+        names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
         names += [each.function for each in heard]
         match view:
             case PacketView():
@@ -185,9 +188,19 @@ class Module:
                 names += ["MARKING", "Marking"]
             case UniqueView() | PartsView():
                 pass
-        if not isinstance(view, PacketView) and view.check and view.check.selectable:
-            names.append("Codec")
-        return sorted(set(names))
+        if not isinstance(view, PacketView):
+            names += ["encode", *(["Codec"] if view.check and view.check.selectable else [])]
+        return sorted(set(names), key=by_kind)
+
+
+def _stream_decoder(directions: Sequence[str]) -> list[str]:
+    """The head of a method that makes a stream decoder."""
+    default = f" = {directions[0]}" if len(directions) == 1 else ""
+    argument = f"direction: Literal[{', '.join(directions)}]{default}"
+    line = f"def StreamDecoder(self, {argument}) -> StreamDecoder:"
+    if len(line) + 4 <= WIDTH:
+        return [line]
+    return ["def StreamDecoder(", f"    self, {argument}", ") -> StreamDecoder:"]
 
 
 def _tidy(text: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import keyword
+import re
 from collections.abc import Iterable, Mapping
 
 from qlinkgen.model.naming import pascal
@@ -52,3 +53,16 @@ def _constant_class(each: Enum | Flags, messages: Iterable[str]) -> str:
 def constant_name(name: str) -> str:
     """A message or type in the names of constants."""
     return name.replace(".", "_").upper()
+
+
+def natural(name: str) -> tuple[tuple[str, int], ...]:
+    """Sorts names as people do, digits by their number; the order that ``ruff`` asks of slots."""
+    parts = re.findall(r"([^0-9]*)([0-9]*)", name)
+    return tuple((text, int(digits or -1)) for text, digits in parts)
+
+
+def by_kind(name: str) -> tuple[int, tuple[tuple[str, int], ...]]:
+    """Sorts names in the order that ``ruff`` asks of imports and of ``__all__``: constants, classes, functions."""
+    bare = name.lstrip("_")
+    kind = 0 if bare.isupper() and len(bare) > 1 else 1 if bare[:1].isupper() else 2
+    return kind, natural(name)

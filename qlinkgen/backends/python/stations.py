@@ -11,14 +11,16 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from qlinkgen.backends.base import Options, Outputs, banner, environment
+from qlinkgen.backends import python_text
+from qlinkgen.backends.base import Options, Outputs, banner
 from qlinkgen.backends.python import docstrings, tables, values
 from qlinkgen.backends.python.classes import class_name
 from qlinkgen.backends.python.frames_delimited import is_unique
-from qlinkgen.backends.python.module import kept
+from qlinkgen.backends.python.module import kept, templates
 from qlinkgen.backends.python.place import WIDTH, Place, place_of, wrapped
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Command
 
 __all__ = ["generate", "render", "shared"]
@@ -99,15 +101,15 @@ class Stations:
         handlers = self._handlers() if options.role != "master" and not host else []
         lines = [line for each in callers for method in each.methods for line in (*method.head, *method.body)]
         lines += [line for method in handlers for line in method.head]
-        words = set(re.findall(r"\w+", "\n".join(lines)))
+        words = set(re.findall(r"\w+", python_text.bare("\n".join(lines))))
         imported = sorted(self._importable & {*words, "Message"})
         asker = "host" if host else "master"
         parts = {f"what a {asker} asks": callers, "what a slave does": handlers}
         title = " and ".join(title for title, part in parts.items() if part)
         first, *others = banner(self._protocol)
+        head = one_line(f"{first}: {title}, a method for each command.")
         context = {
-            "title": textwrap.wrap(f"{first}: {title}, a method for each command.", WIDTH - 8),
-            "banner": others,
+            "doc": python_text.docstring([*textwrap.wrap(head, WIDTH - 8), "", *map(one_line, others)]),
             "imports": wrapped(f"from qlinkgen_codecs.{self._protocol.name} import (", imported, ")", 0),
             "decimals": "Decimal" in words,
             "public": [*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])],
@@ -116,7 +118,7 @@ class Stations:
             "nodes": f", {self._nodes()}" if self._nodes() else "",
             "table": [f'{class_name(c.request)}: "{_method_name(c)}"' for c in self._commands],
         }
-        template = environment(__package__).get_template("templates/stations.j2")
+        template = templates().get_template("templates/stations.j2")
         return template.render(context).rstrip("\n") + "\n"
 
     # The side that asks
@@ -147,7 +149,7 @@ class Stations:
         entry = f"{address}: Address of the node, {self._nodes()}{self._all(command)}." if address else ""
         doc = _summary(command) if asynchronous else [*_summary(command), *self._arguments(command, entry)]
         body = self._body(command, "await " if asynchronous else "", address=address, node=node)
-        return Method(head, docstrings.quoted(doc), body)
+        return Method(head, python_text.docstring(doc), body)
 
     def _head(self, command: Command, where: str, answer: str, *, asynchronous: bool) -> list[str]:
         """The line that begins a method; ``where`` is the argument for an address or axis."""
@@ -234,11 +236,13 @@ class Stations:
         request, chosen = f"{class_name(command.request)}(", f", {axis}" if axis else ""
         if command.response is None:
             return Method(
-                head, docstrings.quoted(doc), wrapped(f"{wait}self.tell({request}", given, f"){chosen})", 8)
+                head,
+                python_text.docstring(doc),
+                wrapped(f"{wait}self.tell({request}", given, f"){chosen})", 8),
             )
         end = f"), {class_name(command.response)}{chosen})"
         return Method(
-            head, docstrings.quoted(doc), wrapped(f"return {wait}self.ask({request}", given, end, 8)
+            head, python_text.docstring(doc), wrapped(f"return {wait}self.ask({request}", given, end, 8)
         )
 
     # The slave's side
@@ -254,7 +258,7 @@ class Stations:
             doc += ["", f"The answer repeats {' and '.join(command.echoes)} of the request."]
         if command.response and command.addressing == "either":
             doc += ["", "Nobody answers a broadcast: return None then."]
-        return Method(head, docstrings.quoted(doc), [])
+        return Method(head, python_text.docstring(doc), [])
 
 
 def _method_name(command: Command) -> str:
@@ -292,7 +296,7 @@ def _caller_doc(name: str, what: str, more: Sequence[str], *, asynchronous: bool
     if asynchronous:
         doc += [f"The arguments are those of {name}.", ""]
     supplied = "A subclass supplies `ask` and `tell`; what they raise, every method raises."
-    return docstrings.quoted([*doc, *textwrap.wrap(supplied, WIDTH - 8), *more])
+    return python_text.docstring([*doc, *textwrap.wrap(supplied, WIDTH - 8), *more])
 
 
 def _make_caller(

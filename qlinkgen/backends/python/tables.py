@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -99,7 +99,9 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     if not command.confirmed:
         arguments.append("confirmed=False")
     if command.attributes:
-        pairs = (f"{python_text.literal(key)}: {_literal(value)}" for key, value in command.attributes.items())
+        pairs = (
+            f"{python_text.literal(key)}: {_literal(value)}" for key, value in command.attributes.items()
+        )
         arguments.append(f"attributes={{{', '.join(pairs)}}}")
     return wrapped(f'"{command.name}": Command(', arguments, "),", 4)
 

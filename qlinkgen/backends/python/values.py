@@ -7,7 +7,7 @@ from decimal import Decimal
 from typing import assert_never
 
 from qlinkgen.backends import python_text
-from qlinkgen.backends.python.layout import literal
+from qlinkgen.backends.python.layout import Call, literal
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.message import Value
@@ -19,6 +19,7 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
+    Member,
     MemberConstant,
     MemberReserved,
     MemberValue,
@@ -109,7 +110,7 @@ def _default_number(number: Scalar, place: Place) -> str:
     if isinstance(number.meaning, Enum) and (name := number.meaning.name_of(number.default)):
         return f"{place.classes[number.meaning.name]}.{name.upper()}"
     if isinstance(number.meaning, Flags) and number.default:
-        return f"{number.default:#x}"
+        return f"0x{number.default:X}"
     if isinstance(native, Decimal):
         whole = native == native.to_integral_value()
         return f"Decimal({native})" if whole else f'Decimal("{native}")'
@@ -129,65 +130,65 @@ def scale_arguments(number: Scalar, place: Place) -> str:
     return f"{place.use(kind)}({', '.join([str(number.minimum), str(number.maximum), *given])})"
 
 
-def rules(message: MessagePlan, place: Place, scales: Mapping[str, str]) -> list[str]:
-    """Expressions for the rules of a message, the address first."""
-    found: list[str] = []
+def rules(message: MessagePlan, place: Place, scales: Mapping[str, str]) -> list[Call]:
+    """The rules of a message, the address first."""
+    found: list[Call] = []
     if message.allowed is not None and place.address:
-        bounds = ", ".join(f"{each.low}, {each.high}" for each in message.allowed.ranges)
-        found.append(f'{place.use("Whole")}("{place.address}", {bounds})')
+        bounds = [str(bound) for each in message.allowed.ranges for bound in (each.low, each.high)]
+        found.append(_rule(place, "Whole", place.address, *bounds))
     for step in message.payload.steps:
         found += _rules(step, place, scales)
     return found
 
 
-def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[str]:
+def _rule(place: Place, kind: str, name: str, *arguments: object, unit: str = "") -> Call:
+    given = [f'"{name}"', *map(str, arguments), *([f"unit={python_text.literal(unit)}"] if unit else [])]
+    return Call(place.use(kind), given)
+
+
+def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
+    name = attribute(step.name)
     match step:
         case ConstantStep():
-            return [f'{place.use("Constant")}("{attribute(step.name)}", {step.value})']
+            return [_rule(place, "Constant", name, step.value)]
         case CountStep():
-            return [f'{place.use("Count")}("{attribute(step.name)}", "{step.run}")']
+            return [_rule(place, "Count", name, f'"{step.run}"')]
         case ReservedStep():
             return []
         case BitsStep():
-            members = (_member_rule(member, place, scales) for member in step.members)
-            return [rule for rule in members if rule]
+            return [rule for member in step.members for rule in _member_rules(member, place, scales)]
         case BytesStep():
             kind = "Text" if step.text else "Octets"
-            return [f'{place.use(kind)}("{attribute(step.name)}", {step.length.minimum}, {step.length.maximum})']
+            return [_rule(place, kind, name, step.length.minimum, step.length.maximum)]
         case ItemsStep():
             length, item = step.length, step.number
-            bounds = f"{length.minimum}, {length.maximum}, {item.minimum}, {item.maximum}"
-            return [f'{place.use("Items")}("{attribute(step.name)}", {bounds}{_unit(item.unit)})']
+            bounds = (length.minimum, length.maximum, item.minimum, item.maximum)
+            return [_rule(place, "Items", name, *bounds, unit=item.unit)]
         case ValueStep():
             return [_number_rule(step.name, step.number, place, scales)]
         case _:
             assert_never(step)
 
 
-def _member_rule(
-    member: MemberValue | MemberConstant | MemberReserved, place: Place, scales: Mapping[str, str]
-) -> str:
+def _member_rules(member: Member, place: Place, scales: Mapping[str, str]) -> list[Call]:
     match member:
         case MemberValue():
-            return _number_rule(member.name, member.number, place, scales)
+            return [_number_rule(member.name, member.number, place, scales)]
         case MemberConstant():
-            return f'{place.use("Constant")}("{attribute(member.name)}", {member.value})'
+            return [_rule(place, "Constant", attribute(member.name), member.value)]
         case MemberReserved():
-            return ""
+            return []
         case _:
             assert_never(member)
 
 
-def _number_rule(name: str, number: Scalar, place: Place, scales: Mapping[str, str]) -> str:
+def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, str]) -> Call:
+    name = attribute(field)
     if number.scaling is not None:
-        return f'{place.use("Scaled")}("{attribute(name)}", {scales[name]}{_unit(number.unit)})'
+        return _rule(place, "Scaled", name, scales[field], unit=number.unit)
     if isinstance(number.meaning, Flags) and number.meaning.reserved_zero:
-        return f'{place.use("Mask")}("{attribute(name)}", {number.meaning.mask:#x})'
-    return f'{place.use("Whole")}("{attribute(name)}", {number.minimum}, {number.maximum}{_unit(number.unit)})'
-
-
-def _unit(unit: str) -> str:
-    return f", unit={python_text.literal(unit)}" if unit else ""
+        return _rule(place, "Mask", name, f"0x{number.meaning.mask:X}")
+    return _rule(place, "Whole", name, number.minimum, number.maximum, unit=number.unit)
 
 
 # Descriptions

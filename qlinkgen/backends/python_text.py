@@ -1,0 +1,57 @@
+"""Text in Python source: every text of a schema is quoted here, for the targets `python` and `construct`.
+
+Nothing else may place free text in Python: what is returned is a literal, a docstring or comments, whatever
+the text holds. A literal and a docstring have the value of the text.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable
+
+from qlinkgen.model.texts import escaped, one_line, visible
+
+_QUOTES = re.compile('"{3,}|"$')
+#: Strings of generated code and its comments; f-strings are kept, for the names in them.
+_SAID = re.compile(
+    r'(?P<kept>\bf"(?:[^"\\\n]|\\.)*")|"""(?:[^"\\]|\\.|"(?!""))*"""|b?"(?:[^"\\\n]|\\.)*"|#[^\n]*', re.DOTALL
+)
+
+
+def literal(text: str) -> str:
+    """A string literal in double quotes."""
+    return '"' + "".join(map(_in_literal, text)) + '"'
+
+
+def _in_literal(character: str) -> str:
+    if character in '"\\':
+        return f"\\{character}"
+    return character if character.isprintable() else repr(character)[1:-1]
+
+
+def numbers(text: str) -> str:
+    """A string literal of seven-bit text that spells each character as its number."""
+    return '"' + "".join(map(escaped, text)) + '"'
+
+
+def docstring(lines: Iterable[str]) -> list[str]:
+    """Lines as a docstring; where there are several, the closing quotes get a line of their own."""
+    first, *others = map(_in_docstring, lines)
+    return [f'"""{first}', *others, '"""'] if others else [f'"""{first}"""']
+
+
+def _in_docstring(line: str) -> str:
+    # Backslashes come first: those of the escapes below have a meaning.
+    doubled = visible(line.replace("\\", "\\\\"))
+    return _QUOTES.sub(lambda found: found[0].replace('"', '\\"'), doubled)
+
+
+def comment(text: str, width: int) -> list[str]:
+    """The text of comments of at most ``width`` characters each, without their marks."""
+    return textwrap.wrap(one_line(text), width)
+
+
+def bare(code: str) -> str:
+    """Generated code without its strings and comments: the names that it uses are in it, and no text."""
+    return _SAID.sub(lambda found: found["kept"] or '""', code)

@@ -1,0 +1,198 @@
+"""Every place of a schema that takes free text, found by walking the classes of the file model.
+
+A new key that is declared as `Text` or `Label` has slots here without a change, and fails
+`test_every_text_of_the_file_model_has_a_slot` until a schema beside this file has the mapping that holds it.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+import typing
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel
+
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.schema import kinds, loads
+from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.source import parse
+
+FOLDER = Path(__file__).parent
+SCHEMAS = ("delimited", "marked", "packet")
+#: Mapping and key that a text belongs to, such as ("FieldSpec", "unit").
+Kind = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A place for a text: its path in the file, and the mapping and key that it is declared in."""
+
+    path: tuple[str | int, ...]
+    kind: Kind
+
+
+def kinds_of_slots() -> set[Kind]:
+    """Every text that the file model declares."""
+    found: set[Kind] = set()
+    seen: set[type[BaseModel]] = set()
+
+    def visit(model: type[BaseModel]) -> None:
+        if model in seen:
+            return
+        seen.add(model)
+        for key, hint in typing.get_type_hints(model, include_extras=True).items():
+            if key in model.model_fields:
+                found.update((model.__name__, key) for part in _parts(hint) if _is_text(part))
+                for part in _parts(hint):
+                    if isinstance(part, type) and issubclass(part, BaseModel):
+                        visit(part)
+
+    visit(SchemaFile)
+    return found
+
+
+def _parts(hint: Any) -> Iterator[Any]:
+    """An annotation and everything in it."""
+    yield hint
+    for part in typing.get_args(hint):
+        yield from _parts(part)
+
+
+def _is_text(hint: Any) -> bool:
+    return hint in (kinds.Text, kinds.Label)
+
+
+@functools.cache
+def document(name: str) -> Any:
+    """A schema's data, with short forms written out."""
+    data = yaml.safe_load((FOLDER / f"{name}.yaml").read_text("utf-8"))
+    _write_out(data, SchemaFile)
+    return data
+
+
+def _write_out(data: Any, hint: Any) -> Any:
+    short = next((part for part in getattr(hint, "__metadata__", ()) if isinstance(part, kinds.ShortForm)), None)
+    if short is not None and not isinstance(data, dict):
+        data = {short.key: data}
+    if isinstance(data, dict):
+        for key, inner in _members(data, hint):
+            data[key] = _write_out(data[key], inner)
+    return data
+
+
+def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
+    """Keys of a mapping with the annotation of what they hold."""
+    model = _first(hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False)
+    if model is not None:
+        hints = typing.get_type_hints(model, include_extras=True)
+        yield from ((key, hints[key]) for key in data if key in hints)
+        return
+    table = _first(hint, lambda part: typing.get_origin(part) is dict)
+    if table is not None:
+        yield from ((key, typing.get_args(table)[1]) for key in data)
+
+
+def _first(hint: Any, wanted: Any, *, through_dicts: bool = True) -> Any:
+    if wanted(hint):
+        return hint
+    if typing.get_origin(hint) is dict and not through_dicts:
+        return None
+    inner = (_first(part, wanted, through_dicts=through_dicts) for part in typing.get_args(hint))
+    return next((part for part in inner if part is not None), None)
+
+
+@functools.cache
+def slots(name: str) -> tuple[Slot, ...]:
+    """The slots of a schema that it may use: a unit, say, means nothing for a constant."""
+    found = list(_slots(document(name), SchemaFile, (), ("", "")))
+    for _ in found:
+        text = text_of(put(name, found, "x"))
+        source, (_, faults) = parse(text), loads(text, name)
+        places = {(fault.line, fault.column) for fault in faults}
+        refused = {
+            path
+            for where in (source.keys, source.values)
+            for path, position in where.items()
+            if (position.line, position.column) in places
+        }
+        if not refused:
+            break
+        found = [slot for slot in found if slot.path not in refused]
+    return tuple(found)
+
+
+def _slots(data: Any, hint: Any, path: tuple[str | int, ...], kind: Kind) -> Iterator[Slot]:
+    if any(map(_is_text, [hint, *typing.get_args(hint)])) and not isinstance(data, dict | list):
+        yield Slot(path, kind)
+    elif isinstance(data, list):
+        if any(map(_is_text, _parts(hint))):
+            yield from (Slot((*path, index), kind) for index in range(len(data)))
+    elif isinstance(data, dict):
+        model = _first(hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False)
+        members = dict(_members(data, hint))
+        if model is not None:
+            texts = typing.get_type_hints(model, include_extras=True)
+            absent = {key: texts[key] for key in model.model_fields if key not in data}
+            members |= {key: part for key, part in absent.items() if _may_be_text(part)}
+        for key, inner in members.items():
+            named = (model.__name__, key) if model is not None else kind
+            yield from _slots(data.get(key), inner, (*path, key), named)
+
+
+def _may_be_text(hint: Any) -> bool:
+    return any(map(_is_text, [hint, *typing.get_args(hint)])) and typing.get_origin(hint) not in (dict, list)
+
+
+def put(name: str, places: Iterable[Slot], texts: str | Sequence[str]) -> Any:
+    """A schema's data with texts in some of its slots, in turn where there are several.
+
+    A label is the same everywhere, as it is declared once.
+    """
+    data = copy.deepcopy(document(name))
+    turn = [texts] if isinstance(texts, str) else texts
+    for index, slot in enumerate(places):
+        parent = data
+        for step in slot.path[:-1]:
+            parent = parent[step]
+        parent[slot.path[-1]] = turn[0] if "attributes" in slot.path and is_label(slot) else turn[index % len(turn)]
+    return data
+
+
+def is_label(slot: Slot) -> bool:
+    """Its text is a label: declared in one slot, used in others."""
+    return slot.kind in {("AttributeSpec", "values"), ("DefaultsSpec", "attributes"), ("CommandSpec", "attributes")}
+
+
+def text_of(data: Any) -> str:
+    """The YAML of plain data."""
+    return yaml.safe_dump(data, allow_unicode=True, sort_keys=False, width=1000)
+
+
+def protocol_of(
+    name: str,
+    texts: str | Sequence[str],
+    places: Iterable[Slot] | None = None,
+    *,
+    default: str | None = None,
+    file: str = "",
+) -> Protocol:
+    """The protocol of a schema with texts in some or all of its slots.
+
+    Args:
+        name: One of `SCHEMAS`.
+        texts: One text, or several in turn.
+        places: Slots that get one, or all.
+        default: Default of the field that is text on the wire, where the schema has one.
+        file: Name of the schema's file.
+    """
+    data = put(name, slots(name) if places is None else places, texts)
+    if default is not None and name == "delimited":
+        data["commands"]["measure"]["response"]["note"]["default"] = default
+    protocol, faults = loads(text_of(data), file or f"{name}.yaml")
+    assert protocol is not None, [str(fault) for fault in faults]
+    return protocol

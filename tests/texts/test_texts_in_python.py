@@ -1,0 +1,166 @@
+"""Texts of a schema are data in everything that is Python: codecs, stations, construct structures."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import importlib
+import linecache
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from qlinkgen.backends import construct, python
+from qlinkgen.backends.base import Options
+from qlinkgen.backends.python import load, stations
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import one_line
+from tests.texts.samples import HARMLESS, HOSTILE, TEXTS
+from tests.texts.slots import SCHEMAS, Slot, is_label, protocol_of, slots
+
+TARGETS = {"python": python.generate, "stations": stations.generate, "construct": construct.generate}
+
+
+def sources(protocol: Protocol) -> dict[str, str]:
+    """Every Python module of a protocol, by its target."""
+    return {
+        name: text for name, generate in TARGETS.items() for text in generate(protocol, Options()).values()
+    }
+
+
+class _Bare(ast.NodeTransformer):
+    """Leaves the structure of a module: no docstring, and every other string empty."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:  # noqa: N802
+        return ast.Constant("") if isinstance(node.value, str) else node
+
+
+def structure(source: str) -> str:
+    return ast.dump(_Bare().visit(ast.parse(source)))
+
+
+@functools.cache
+def structures(name: str, places: tuple[Slot, ...] | None = None) -> Mapping[str, str]:
+    """What modules look like whose texts are harmless."""
+    found = sources(protocol_of(name, HARMLESS, places))
+    return {target: structure(source) for target, source in found.items()}
+
+
+def docstrings(source: str) -> list[str]:
+    """Docstrings of a module, each on one line."""
+    owners = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    found = (ast.get_docstring(node) for node in ast.walk(ast.parse(source)) if isinstance(node, owners))
+    return [one_line(doc) for doc in found if doc]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_code_is_that_of_harmless_texts_and_the_docstrings_say_the_text(name: str, text: str) -> None:
+    # Docstrings are wrapped, words that are longer than a line too.
+    wanted = re.sub(r"\s", "", text).rstrip(".")
+    for target, source in sources(protocol_of(name, text)).items():
+        assert structure(source) == structures(name)[target], target
+        said = [re.sub(r"\s", "", doc) for doc in docstrings(source)]
+        assert wanted in said[0], target
+        assert target != "python" or sum(wanted in doc for doc in said) > len(slots(name)) / 20
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_the_code_is_that_of_harmless_texts_in_each_slot_alone(name: str) -> None:
+    text = f"'\"\"\"\\ {{{{ x }}}} */ ??/ {HOSTILE[0]} {HOSTILE[3]}"
+    first = {slot.kind: slot for slot in slots(name)}
+    for slot in first.values():
+        places = tuple(each for each in slots(name) if is_label(each)) if is_label(slot) else (slot,)
+        for target, source in sources(protocol_of(name, text, places)).items():
+            assert structure(source) == structures(name, places)[target], (target, slot)
+
+
+def modules(folder: Path, protocol: Protocol) -> Iterator[ModuleType]:
+    """The generated modules, written and imported as users have them."""
+    files = {**TARGETS["python"](protocol, Options()), **python.shared()}
+    files |= {**TARGETS["stations"](protocol, Options()), **stations.shared()}
+    files |= {**TARGETS["construct"](protocol, Options()), **construct.shared()}
+    for path, text in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, "utf-8")
+    for path in files:
+        if path.endswith(f"/{protocol.name}.py"):
+            yield importlib.import_module(".".join(Path(path).with_suffix("").parts[1:]))
+
+
+@pytest.fixture
+def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder from which generated packages are imported, and nothing of them afterwards."""
+    packages = [Path(target.FOLDER).name for target in (python, stations, construct)]
+    kept = {name: module for name, module in sys.modules.items() if name.split(".")[0] in packages}
+    for name in kept:
+        monkeypatch.delitem(sys.modules, name)
+    for folder in ("python", "construct"):
+        monkeypatch.syspath_prepend(tmp_path / folder)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    for name in [name for name in sys.modules if name.split(".")[0] in packages]:
+        del sys.modules[name]
+    sys.modules.update(kept)
+
+
+@pytest.mark.parametrize("number", range(len(TEXTS)))
+def test_written_modules_run_nothing_and_hold_the_texts(number: int, alone: Path) -> None:
+    name, texts = SCHEMAS[number % len(SCHEMAS)], [*TEXTS[number:], *TEXTS[:number]]
+    protocol = protocol_of(name, texts)
+    codec, *_ = modules(alone, protocol)
+    assert not (alone / "canary").exists()
+    for command in protocol.commands:
+        row = codec.COMMANDS[command.name]
+        assert row.section == command.section
+        assert row.attributes == command.attributes
+    for message in protocol.messages:
+        found = codec.MESSAGES[message.name]
+        legal = {rule.name: rule.legal for rule in found.RULES}
+        units = {value.name: getattr(value.type, "unit", "") for value in message.values}
+        assert all(legal[field].endswith(unit) for field, unit in units.items())
+
+
+@pytest.mark.parametrize("text", [text for text in TEXTS if text.isascii() and len(text) <= 60])
+def test_a_default_that_is_text_is_one(text: str) -> None:
+    protocol = protocol_of("delimited", HARMLESS, default=text)
+    codec = load(protocol)
+    assert codec.MESSAGES["measure.response"](node=1).note == text
+    space: dict[str, Any] = {}
+    (argument,) = [line for line in sources(protocol)["python"].splitlines() if "note: str = " in line][:1]
+    exec("default = " + re.sub(r".*note: str = |,?$|\) -> None:.*", "", argument), space)
+    assert space["default"] == text
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_code_that_runs_here_has_no_text_of_the_schema(name: str) -> None:
+    def executed(text: str, file: str) -> str:
+        protocol = protocol_of(name, text, default=text, file=file)
+        codec = load(protocol)
+        decode = getattr(codec, "decode", None) or codec.decode_request
+        return "".join(linecache.getlines(decode.__code__.co_filename))
+
+    source = executed("Zebra", "zebra.yaml")
+    assert "def " in source
+    assert "zebra" not in source.lower()
+    default = re.compile("default = .*|note: str = .*") if name == "delimited" else re.compile("(?!)")
+    assert default.sub("", executed(HOSTILE[0][:60], '"""canary.yaml')) == default.sub("", source)
+
+
+def test_errors_of_code_that_runs_here_name_the_units() -> None:
+    codec = load(protocol_of("delimited", 'mm"'))
+    with pytest.raises(codec.EncodeError, match=r'speed: 1001 cannot be sent; .* 0\.\.1000 mm"$'):
+        codec.MESSAGES["measure.request"](node=1, speed=1001).to_frame()
+
+
+def test_units_of_one_message_are_not_those_of_another() -> None:
+    places = [slot for slot in slots("packet") if slot.kind == ("FieldSpec", "unit")]
+    protocol = protocol_of("packet", [f"unit {index}" for index in range(len(places))], places)
+    codec = load(protocol)
+    legal = [each.RULES[0].legal.rpartition(" ")[2] for each in codec.MESSAGES.values() if each.RULES]
+    assert sorted(legal) == sorted(map(str, range(len(places))))
