@@ -16,11 +16,11 @@ from benchmarks import ROOT, measure
 from benchmarks.peer import PeerMissing, load
 from benchmarks.report import Goal, Section, number
 from benchmarks.wire_responder import MODBUS_REQUEST, NODES, motion_answers
+from qlinkgen.codecs import qlink
 from qlinkgen.link.timing import QUIET_BYTES, Timing
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import qlink
 
 TIMING = Timing.of(qlink, host_slack=0.0)
 WORDS = list(range(0x1000, 0x100C))

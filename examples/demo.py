@@ -122,7 +122,7 @@ def _by_construct(case: Case, protocol: Protocol, message: Message) -> Shown:
 
 
 def _by_python(case: Case, protocol: Protocol, message: Message) -> Shown:
-    codec: ModuleType = importlib.import_module(f"qlinkgen_codecs.{protocol.name}")
+    codec: ModuleType = importlib.import_module(f"qlinkgen.codecs.{protocol.name}")
     sent = codec.MESSAGES[case.message](**case.address, **case.values)
     if case.request:
         asked = codec.MESSAGES[case.request]()

@@ -15,18 +15,24 @@ from qlinkgen.model.protocol import Protocol
 #: Path below the output folder to text, of everything that one back-end makes of one protocol.
 Outputs = Mapping[str, str]
 
+#: Packages of the shipped protocols, imported as `qlinkgen.codecs`, and of other schemas. The second is
+#: imported by its last name, which cannot be `codecs`: Python has a module of that name.
+SHIPPED, OWN = "python/codecs", "python/wire"
+
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What is left out of the output.
+    """What is left out of the output, and where the Python package goes.
 
     Attributes:
         role: side that the output is for; what the other side alone needs is left out where a target can.
         only: commands or messages that are kept, all where it is empty.
+        package: folder of the Python package, below the output folder.
     """
 
     role: Literal["both", "master", "slave"] = "both"
     only: tuple[str, ...] = ()
+    package: str = SHIPPED
 
 
 def banner(protocol: Protocol) -> tuple[str, ...]:

@@ -13,13 +13,13 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.slave import SlaveEngine, Station
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.sim import FaultPlan, Wire
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import open_pty
-from qlinkgen_codecs import qlink
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "qlinkgen"]

@@ -94,7 +94,7 @@ class TestAnswers:
     @staticmethod
     def frames() -> tuple[bytes, bytes]:
         """Two answers, the second with a checksum that ends in A5."""
-        from qlinkgen_codecs import qlink
+        from qlinkgen.codecs import qlink
 
         odd = next(
             frame

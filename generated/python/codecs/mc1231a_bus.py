@@ -6,7 +6,7 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from __future__ import annotations
 
-from qlinkgen_codecs.mc1231a import (
+from .mc1231a import (
     AxisOffRequest, AxisOffResponse, AxisOnRequest, AxisOnResponse, ClrStatusRequest, ClrStatusResponse,
     GetAccRequest, GetAccResponse, GetActlPosErrRequest, GetActlPosErrResponse, GetActlPosRequest,
     GetActlPosResponse, GetBrkPntRequest, GetBrkPntResponse, GetBufMtrCmdRequest, GetBufMtrCmdResponse,

@@ -6,7 +6,7 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from __future__ import annotations
 
-from qlinkgen_codecs.qlink import (
+from .qlink import (
     ClearFifoRequest, ClearFifoResponse, ClearOutputsRequest, ClearOutputsResponse, LoopBackRequest,
     LoopBackResponse, Message, MotionRequest, MotionResponse, MotorPositionRequest, MotorPositionResponse,
     MotorRequestRequest, MotorRequestResponse, MotorResponsePollRequest, MotorResponsePollResponse,
