@@ -123,11 +123,10 @@ def responder(kind: str) -> Iterator[int]:
     """A process at a pty; gives the descriptor of our end."""
     master, slave = os.openpty()
     tty.setraw(slave)
-    path = [str(ROOT), str(ROOT / "generated" / "python")]
     process = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.ring_responder", kind],
         stdin=slave,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     try:
         start(master)

@@ -44,11 +44,10 @@ def responder(kind: str) -> Iterator[str]:
     """A process that answers on a pty; gives the name of the client's side."""
     master, slave = os.openpty()
     tty.setraw(slave)
-    path = [str(ROOT), str(ROOT / "generated" / "python")]
     process = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.wire_responder", kind],
         stdin=master,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     os.close(master)
     try:

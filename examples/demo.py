@@ -85,7 +85,6 @@ def _generate(folder: Path) -> None:
     command = [sys.executable, "-m", "qlinkgen", "generate", "--output", str(folder)]
     print("$ qlinkgen generate --output DIR")
     print(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    sys.path.insert(0, str(folder / "python"))
 
 
 def _show(case: Case, folder: Path, compiler: str) -> bool:

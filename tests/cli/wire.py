@@ -25,7 +25,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "qlinkgen"]
 ENVIRONMENT = {
     **{name: value for name, value in os.environ.items() if name not in {"FORCE_COLOR", "NO_COLOR"}},
-    "PYTHONPATH": f"{REPOSITORY}{os.pathsep}{REPOSITORY / 'generated' / 'python'}",
+    "PYTHONPATH": str(REPOSITORY),
     "PYTHONUNBUFFERED": "",
 }
 #: Seconds that nothing here needs; a wait that long has failed.
