@@ -11,7 +11,7 @@ from typing import cast
 from benchmarks.firmware_build import AVR, Workshop, clock, run
 from benchmarks.firmware_cycles import build_simulator
 from benchmarks.firmware_slave import program
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 BAUD = cast(int, qlink.BUS.baud)  # the schema has one
 TICK = 1000  # interrupts of the slave's clock in a second

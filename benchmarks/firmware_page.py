@@ -16,7 +16,7 @@ from benchmarks.firmware_peers import Footprint
 from benchmarks.firmware_size import ANSWER, PAYLOAD, Core, Costs
 from benchmarks.firmware_slave import PORTS
 from benchmarks.report import Goal, as_markdown, number
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 PAGE = ROOT / "docs" / "firmware.md"
 DEVIATIONS = ROOT / "tests" / "c" / "deviations.yaml"

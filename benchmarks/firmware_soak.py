@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def main(arguments: list[str] | None = None) -> int:
     """Run the soak on each port; 1 where something is wrong, 2 where a tool is missing."""
     # Works in a bare checkout too: this package, the runtime and the generated code are found from here.
-    sys.path[:0] = [str(ROOT), str(ROOT / "generated" / "python")]
+    sys.path.insert(0, str(ROOT))
     firmware = importlib.import_module("tests.firmware.firmware")
     page = importlib.import_module("benchmarks.firmware_soak_page")
     options = _options(arguments, list(firmware.TARGETS))

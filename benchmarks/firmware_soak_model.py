@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.protocols.qlink.hex_image import BrokenRecord, HexReader
 from qlinkgen.protocols.qlink.program_store import ProgramStore
-from qlinkgen_codecs import qlink
 from tests.firmware.diagnostics import Counters, Diagnostics, ProgramState
 
 #: Seconds that pass for the model where the firmware is given the time to come to rest.

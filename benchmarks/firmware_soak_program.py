@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 RECORD = 16
 DATA, END, SEGMENT, SEGMENT_ENTRY, LINEAR, LINEAR_ENTRY = range(6)

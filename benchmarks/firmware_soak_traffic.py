@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from benchmarks.firmware_soak_program import Loader
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import VirtualNode
-from qlinkgen_codecs import qlink
 
 Kind = Literal["request", "corrupted", "malformed", "stray", "noise"]
 

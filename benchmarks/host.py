@@ -31,11 +31,10 @@ def responder() -> Iterator[str]:
     """A process that answers on a pty; gives the name of the host's side."""
     master, slave = os.openpty()
     tty.setraw(slave)
-    path = [str(ROOT), str(ROOT / "generated" / "python")]
     process = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.host_responder"],
         stdin=master,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     os.close(master)
     try:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 
 from benchmarks.wire_responder import serve
-from qlinkgen_codecs import mc1231a
+from qlinkgen.codecs import mc1231a
 
 POSITION = -123456
 VELOCITY = 2.75

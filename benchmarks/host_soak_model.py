@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from qlinkgen_codecs import mc1231a
+from qlinkgen.codecs import mc1231a
 
 AXES = (1, 2)
 _VALUES = {

@@ -12,7 +12,7 @@ from benchmarks import ROOT
 from benchmarks.processes import Run, interleave
 from benchmarks.report import Goal, Section
 
-GENERATED = ROOT / "generated" / "python" / "qlinkgen_codecs"
+CODECS = "qlinkgen.codecs"
 BARE = "bare interpreter"
 LIMITS_MS = {"qlink": 10.0, "trio": 10.0, "mc1231a": 30.0}
 GOALS = ("qlink", "mc1231a")
@@ -42,11 +42,10 @@ def section(rounds: int) -> Section:
     others = [name for name in OTHERS if importlib.util.find_spec(name.partition(".")[0])]
     result.missing = [f"{name} (not installed)" for name in OTHERS if name not in others]
     with tempfile.TemporaryDirectory() as folder:  # a copy: the bytecode is left there
-        shutil.copytree(GENERATED, Path(folder, GENERATED.name))
+        shutil.copytree(ROOT / "qlinkgen" / "codecs", Path(folder, "qlinkgen", "codecs"))
+        shutil.copy(ROOT / "qlinkgen" / "__init__.py", Path(folder, "qlinkgen"))
         commands = {BARE: _command("")}
-        commands |= {
-            f"{GENERATED.name}.{name}": _command(f"{GENERATED.name}.{name}", folder) for name in LIMITS_MS
-        }
+        commands |= {f"{CODECS}.{name}": _command(f"{CODECS}.{name}", folder) for name in LIMITS_MS}
         commands |= {name: _command(name) for name in others}
         runs = interleave(commands, rounds)
     result.rows = [_row(name, runs) for name in commands]
@@ -67,5 +66,5 @@ def _figures(run: Run) -> tuple[float, float, float]:
 
 
 def _goal(name: str, runs: dict[str, Run]) -> Goal:
-    cost = runs[f"{GENERATED.name}.{name}"].wall.best - runs[BARE].wall.best
+    cost = runs[f"{CODECS}.{name}"].wall.best - runs[BARE].wall.best
     return Goal(f"import of {name}", cost * 1e3, LIMITS_MS[name], "ms over bare")

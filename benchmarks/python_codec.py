@@ -7,7 +7,7 @@ from benchmarks.measure import Case, Timing, measure
 from benchmarks.peer import KEYWORDS, READ_FIELDS, Peer
 from benchmarks.peers import available
 from benchmarks.report import Goal, Section, number
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 WORK = ("encode", "build", "decode", "read")
 PACK, UNPACK = "raw pack", "raw unpack"

@@ -20,12 +20,12 @@ from statistics import median
 
 from benchmarks import ROOT, measure
 from benchmarks.report import Goal, Section, number
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.protocols.trio import CoordinatorNode, MotionCoordinator
 from qlinkgen.sim.virtual_ring import VirtualRing
 from qlinkgen.transport import memory_ring
 from qlinkgen.transport.ring import NodeIo
-from qlinkgen_codecs import trio
 
 BAUD = 38400
 NODES = 15
@@ -123,11 +123,10 @@ def responder(kind: str) -> Iterator[int]:
     """A process at a pty; gives the descriptor of our end."""
     master, slave = os.openpty()
     tty.setraw(slave)
-    path = [str(ROOT), str(ROOT / "generated" / "python")]
     process = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.ring_responder", kind],
         stdin=slave,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     try:
         start(master)

@@ -19,12 +19,12 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring_events import Broken, NetStat, Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
 from qlinkgen.protocols.trio.face import Node, engine_of
 from qlinkgen.sim import FaultPlan
 from qlinkgen.sim.ring import RingWire
-from qlinkgen_codecs import trio
 
 RING = ("coordinator", "coordinator", "keypad", "coordinator", "coordinator") * 3
 #: 2 % of all transmissions over a hop.

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import SlaveEngine
 from qlinkgen.link.codec import Codec
 from qlinkgen.protocols.qlink import VirtualNode
-from qlinkgen_codecs import qlink
 
 #: Requests that are remembered: a copy of one arrives within a few of them, or never.
 _SENT = 64

@@ -7,7 +7,7 @@ are possible, until the next call that ends well says more.
 from __future__ import annotations
 
 from benchmarks.soak_ledger import WitnessNode
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 Settings = tuple[float, float, int]
 

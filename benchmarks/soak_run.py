@@ -11,6 +11,7 @@ from benchmarks.soak_account import Account, Equation
 from benchmarks.soak_ledger import Ledger, Station, WitnessNode
 from benchmarks.soak_model import Held, Mismatch
 from benchmarks.soak_traffic import NOBODY, NUMBERS, UNSUPPORTED, Traffic
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link import LinkCounters
 from qlinkgen.link.transaction import Reply
@@ -20,7 +21,6 @@ from qlinkgen.sim.fault_kinds import KINDS, RateLike
 from qlinkgen.sim.faults import FaultCounts
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import Port, open_port
-from qlinkgen_codecs import qlink
 
 #: Numbers of the nodes at the beginning.
 NODES = (1, 2, 3, 4, 5)

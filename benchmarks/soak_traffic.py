@@ -9,10 +9,10 @@ from contextlib import contextmanager
 
 from benchmarks.soak_ledger import Station
 from benchmarks.soak_model import Held, Mismatch
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError, LoadError
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.transport import Ability
-from qlinkgen_codecs import qlink
 
 #: Numbers that the nodes take in turn, and one that stays free for a node to move to; nobody has the others.
 NUMBERS = range(1, 9)

@@ -12,7 +12,7 @@ from benchmarks.peer import PeerMissing
 from benchmarks.peers_generated import mavlink_dialect
 from benchmarks.python_codec import UNPACK, raw_cases
 from benchmarks.report import Goal, Section, number
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 FRAMES = 300
 LIMIT_MB_PER_SECOND = 15.0

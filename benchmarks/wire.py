@@ -16,11 +16,11 @@ from benchmarks import ROOT, measure
 from benchmarks.peer import PeerMissing, load
 from benchmarks.report import Goal, Section, number
 from benchmarks.wire_responder import MODBUS_REQUEST, NODES, motion_answers
+from qlinkgen.codecs import qlink
 from qlinkgen.link.timing import QUIET_BYTES, Timing
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import qlink
 
 TIMING = Timing.of(qlink, host_slack=0.0)
 WORDS = list(range(0x1000, 0x100C))
@@ -44,11 +44,10 @@ def responder(kind: str) -> Iterator[str]:
     """A process that answers on a pty; gives the name of the client's side."""
     master, slave = os.openpty()
     tty.setraw(slave)
-    path = [str(ROOT), str(ROOT / "generated" / "python")]
     process = subprocess.Popen(
         [sys.executable, "-m", "benchmarks.wire_responder", kind],
         stdin=master,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
     os.close(master)
     try:

@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable
 
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 NODES = (1, 2, 3, 4)
 #: Offsets of node and counter in a motion's frame; nothing before them is ever stuffed with these nodes.

@@ -9,12 +9,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import Monitor, SlaveEngine, Timing
 from qlinkgen.link.monitor import Asked, Heard, Replied
 from qlinkgen.protocols.qlink import Bus, VirtualNode
 from qlinkgen.sim import Wire
 from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen_codecs import qlink
 
 BAUD = 115200
 #: Far more than a pty needs: the demo has to work on a machine that is busy with something else.

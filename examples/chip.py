@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import sys
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.errors import CommandError
 from qlinkgen.protocols.mc1231a import ChipSet, Host
 from qlinkgen.sim import OUTSIDE
 from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import AxisStatus
 
 BAUD = 57600
 #: Far more than a pty needs: the demo has to work on a machine that is busy with something else.

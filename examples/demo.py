@@ -85,7 +85,6 @@ def _generate(folder: Path) -> None:
     command = [sys.executable, "-m", "qlinkgen", "generate", "--output", str(folder)]
     print("$ qlinkgen generate --output DIR")
     print(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-    sys.path.insert(0, str(folder / "python"))
 
 
 def _show(case: Case, folder: Path, compiler: str) -> bool:
@@ -122,7 +121,7 @@ def _by_construct(case: Case, protocol: Protocol, message: Message) -> Shown:
 
 
 def _by_python(case: Case, protocol: Protocol, message: Message) -> Shown:
-    codec: ModuleType = importlib.import_module(f"qlinkgen_codecs.{protocol.name}")
+    codec: ModuleType = importlib.import_module(f"qlinkgen.codecs.{protocol.name}")
     sent = codec.MESSAGES[case.message](**case.address, **case.values)
     if case.request:
         asked = codec.MESSAGES[case.request]()

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import sys
 
+from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio import CHR, VALUE, CoordinatorNode, KeypadNode, MotionCoordinator
 from qlinkgen.sim.port_ring import RingBus, ring_bus
-from qlinkgen_codecs import trio
 
 BAUD = 38400
 KEYPAD, OTHER, SELF = 10, 11, 12

@@ -16,6 +16,10 @@ __all__ = ["Options", "Outputs", "banner", "environment"]
 #: Path below the output folder to text, of everything that one back-end makes of one protocol.
 Outputs = Mapping[str, str]
 
+#: Packages of the shipped protocols, imported as `qlinkgen.codecs`, and of other schemas. The second is
+#: imported by its last name, which cannot be `codecs`: Python has a module of that name.
+SHIPPED, OWN = Options().package, "python/wire"
+
 
 def banner(protocol: Protocol) -> tuple[str, ...]:
     """Lines for the head of a generated file; no date, path or user, so equal input gives equal output."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from qlinkgen.codecs import qlink
 from qlinkgen.transport.conversation import host_slack, timing_of
 from qlinkgen.transport.port import Ability, Port
-from qlinkgen_codecs import qlink
 
 #: What is reckoned with: the request that a motion program sends all day long.
 COMMAND = qlink.COMMANDS["motion"]

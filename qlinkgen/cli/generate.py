@@ -5,15 +5,16 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import click
 
 from qlinkgen._resources import schemas_dir
-from qlinkgen.backends.base import Options
+from qlinkgen.backends.base import OWN, SHIPPED, Options
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, did_you_mean, load_protocol, on_terminal, warn
+from qlinkgen.cli.common import crc_option, did_you_mean, find_schema, load_protocol, on_terminal, warn
 from qlinkgen.cli.drift import Change, Folder
 from qlinkgen.cli.manifest import schema_of
 from qlinkgen.cli.targets import TARGETS, reference_outputs
@@ -124,18 +125,19 @@ def _fill(
 ) -> None:
     with _progress(len(targets) * len(protocols)) as step:
         for target in dict.fromkeys(targets):
-            generate, shared = TARGETS[target].load()
-            made = False
+            generate = TARGETS[target].load()
             for schema, protocol in protocols.items():
                 if not _keeps(protocol, options):
                     continue
                 step(f"{target} {protocol.name}")
                 source = schema_of(protocol, schema, folder.root)
-                outputs = dict(generate(protocol, options))
-                folder.want(protocol.name, source, target, outputs)
-                made = made or bool(outputs)
-            if made:  # there may be nothing that a package could stand around
-                folder.want("", "", target, dict(shared))
+                chosen = replace(options, package=SHIPPED if _ships(schema) else OWN)
+                folder.want(protocol.name, source, target, dict(generate(protocol, chosen)))
+
+
+def _ships(schema: str) -> bool:
+    """The SCHEMA is one that comes with qlinkgen, by its name or its path."""
+    return find_schema(schema).resolve().parent == schemas_dir().resolve()
 
 
 def _keeps(protocol: Protocol, options: Options) -> bool:

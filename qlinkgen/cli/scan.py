@@ -21,11 +21,11 @@ from qlinkgen.cli.wire_options import (
     select_crc,
     slack_option,
 )
+from qlinkgen.codecs.qlink import PositionType
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Sent
 from qlinkgen.protocols.qlink import Bus, Found
 from qlinkgen.protocols.qlink.facts import BAUD, NODES
-from qlinkgen_codecs.qlink import PositionType
 
 
 @click.command("scan")

@@ -155,6 +155,6 @@ def _own_codec(name: str, kind: Kind) -> ModuleType | None:
             f"{name} has one host and one device; of those `qlinkgen send` knows mc1231a alone, "
             "since no schema says how to get back in step"
         )
-    from qlinkgen_codecs import mc1231a  # noqa: PLC0415  # for a chip set alone
+    from qlinkgen.codecs import mc1231a  # noqa: PLC0415  # for a chip set alone
 
     return mc1231a

@@ -47,7 +47,7 @@ def simulate_bus(
 
 def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[Station]]:
     if is_shipped(name, "qlink"):
-        from qlinkgen_codecs import qlink  # noqa: PLC0415  # other protocols do without
+        from qlinkgen.codecs import qlink  # noqa: PLC0415  # other protocols do without
 
         select_crc(crc)
         return qlink, _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
@@ -66,8 +66,8 @@ def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, lis
 
 
 def _qlink_nodes(numbers: Iterable[int]) -> list[Station]:
+    from qlinkgen.codecs.qlink import PositionType  # noqa: PLC0415
     from qlinkgen.protocols.qlink import VirtualNode  # noqa: PLC0415  # other protocols do without
-    from qlinkgen_codecs.qlink import PositionType  # noqa: PLC0415
 
     kind = PositionType.JVL_MACTALK  # a node without one tells no position
     return [VirtualNode(number, position_type=kind, serial_number=1000 + number) for number in numbers]

@@ -18,8 +18,8 @@ def simulate_ring(
     ring: str | None, *, link: str | None, baud: int | None, plan: FaultPlan | None, crc: str | None
 ) -> None:
     """Put the ring behind a pty, until a signal comes."""
+    from qlinkgen.codecs import trio  # noqa: PLC0415  # as the others import theirs
     from qlinkgen.sim.port_ring import ring_bus  # noqa: PLC0415  # needs a system that has ptys
-    from qlinkgen_codecs import trio  # noqa: PLC0415  # as the others import theirs
 
     if plan is not None and plan.to != "both":
         raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; leave out to={plan.to}")

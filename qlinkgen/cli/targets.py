@@ -21,21 +21,21 @@ class Target:
     Attributes:
         name: word behind ``--target``.
         summary: what it is, for help texts.
-        load: imports the back-end, and hands over `generate` and the files that all protocols share.
+        load: imports the back-end and returns its `generate`.
     """
 
     name: str
     summary: str
-    load: Callable[[], tuple[Generate, Outputs]]
+    load: Callable[[], Generate]
 
 
 def _backend(name: str) -> Any:
     return importlib.import_module(f"qlinkgen.backends.{name}")
 
 
-def _plain(name: str) -> tuple[Generate, Outputs]:
-    module = _backend(name)
-    return module.generate, module.shared()
+def _plain(name: str) -> Generate:
+    generate: Generate = _backend(name).generate
+    return generate
 
 
 def _vectors_of(protocol: Protocol, options: Options) -> Outputs:
@@ -44,14 +44,14 @@ def _vectors_of(protocol: Protocol, options: Options) -> Outputs:
     return outputs
 
 
-def _vectors() -> tuple[Generate, Outputs]:
-    return _vectors_of, _backend("vectors").shared()
+def _vectors() -> Generate:
+    return _vectors_of
 
 
-def _conformance() -> tuple[Generate, Outputs]:
+def _conformance() -> Generate:
     """A kit holds the vectors, and is written against the header."""
     kits = importlib.import_module("qlinkgen.cli.kits")
-    return partial(kits.generate, vectors=_vectors_of), _backend("conformance").shared()
+    return partial(kits.generate, vectors=_vectors_of)
 
 
 def _target(name: str, summary: str, backend: str = "") -> Target:
@@ -62,7 +62,7 @@ TARGETS = {
     target.name: target
     for target in (
         _target("python", "typed module, standard library only"),
-        _target("stations", "typed calls of masters and handlers of slaves", "python.stations"),
+        _target("bus", "typed calls of masters and handlers of slaves", "python.bus"),
         _target("c", "self-contained C99 header"),
         _target("construct", "structures for the construct library"),
         Target("vectors", "test vectors as JSON", _vectors),

@@ -153,7 +153,7 @@ def select_crc(crc: str | None, codec: Any = None) -> None:
     if crc is None:
         return
     if codec is None:
-        from qlinkgen_codecs import qlink  # noqa: PLC0415  # not every command on a port is for Q.link
+        from qlinkgen.codecs import qlink  # noqa: PLC0415  # not every command on a port is for Q.link
 
         codec = qlink
     try:

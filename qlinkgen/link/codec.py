@@ -21,7 +21,7 @@ class Message(Protocol):
 
 
 class Codec(Protocol):
-    """A generated module, such as `qlinkgen_codecs.qlink`."""
+    """A generated module, such as `qlinkgen.codecs.qlink`."""
 
     @property
     def COMMANDS(self) -> Mapping[str, Any]:  # noqa: N802  # as the generated module has it

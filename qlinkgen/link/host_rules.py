@@ -23,7 +23,7 @@ class State:
 
 
 class HostCodec(Codec, Protocol):
-    """A generated module of a protocol of the host kind, such as `qlinkgen_codecs.mc1231a`."""
+    """A generated module of a protocol of the host kind, such as `qlinkgen.codecs.mc1231a`."""
 
     @property
     def decode_response(self) -> Any:

@@ -70,7 +70,7 @@ _OPEN = frozenset({TAKING, PASSING, BLOCKING})
 
 
 class RingCodec(Protocol):
-    """A generated module with marked frames, such as `qlinkgen_codecs.trio`."""
+    """A generated module with marked frames, such as `qlinkgen.codecs.trio`."""
 
     @property
     def BUS(self) -> Any:  # noqa: N802  # as the generated module has it

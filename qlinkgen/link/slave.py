@@ -9,7 +9,7 @@ from qlinkgen.link.echo import EchoCanceller
 
 
 class Station(Protocol):
-    """What a node does; see `qlinkgen_stations` for a class with a method for each command."""
+    """What a node does; `SlaveHandlers` of a generated bus module has a method for each command."""
 
     #: Address that the node answers to. A request may change it.
     number: int

@@ -17,15 +17,17 @@ _SENDERS: dict[Direction, str] = {"request": "master", "response": "slave", "mes
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What is left out of the output.
+    """What is left out of the output, and where the Python package goes.
 
     Attributes:
         role: side that the output is for; what the other side alone needs is left out where a target can.
         only: commands or messages that are kept, all where it is empty.
+        package: folder of the Python package, below the output folder.
     """
 
     role: Role = "both"
     only: tuple[str, ...] = ()
+    package: str = "python/codecs"
 
 
 def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:

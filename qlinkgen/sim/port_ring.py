@@ -13,6 +13,7 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import Any, Self
 
+from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio.face import Node, engine_of
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.pty_bus import PtyBus, make_looker
@@ -21,7 +22,6 @@ from qlinkgen.sim.traffic import Engine
 from qlinkgen.sim.virtual_ring import make_nodes
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.pty import PtyPort, open_pty
-from qlinkgen_codecs import trio
 
 
 class PortPlace:

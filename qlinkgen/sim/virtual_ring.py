@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
@@ -18,7 +19,6 @@ from qlinkgen.sim.programs import Programs
 from qlinkgen.sim.ring import Faults, RingWire
 from qlinkgen.transport.ring_aio import AsyncRingDriver
 from qlinkgen.transport.ring_driver import GIVE_WAY, RingDriver
-from qlinkgen_codecs import trio
 
 T = TypeVar("T")
 #: Makes a node of each kind that a ring can be described with; options are those of `RingNode`.

@@ -19,7 +19,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "qlinkgen"]
 ENVIRONMENT = {
     **os.environ,
-    "PYTHONPATH": os.pathsep.join([str(REPOSITORY), str(REPOSITORY / "generated" / "python")]),
+    "PYTHONPATH": str(REPOSITORY),
 }
 
 

@@ -31,12 +31,12 @@ def test_everything_of_all_protocols(qlinkgen: Run, out: Path) -> None:
         "c/qlink.h",
         "c/trio.h",
         "c/mc1231a.h",
-        "python/qlinkgen_codecs/trio.py",
+        "python/codecs/trio.py",
         "vectors/qlink.json",
     } <= files(out)
     assert {
         "construct/qlinkgen_construct/mc1231a.py",
-        "python/qlinkgen_codecs/py.typed",
+        "python/codecs/py.typed",
         "manifest.json",
     } <= files(out)
     assert len(result.lines) == 1
@@ -124,24 +124,24 @@ def test_a_deleted_schema_leaves_no_orphan(qlinkgen: Run, out: Path, thermo: Pat
 
 
 def test_a_target_may_have_nothing_for_a_protocol(qlinkgen: Run, out: Path) -> None:
-    result = qlinkgen("generate", "trio", "--target", "stations", "-o", out)
+    result = qlinkgen("generate", "trio", "--target", "bus", "-o", out)
     assert (result.code, result.err) == (0, "")
     assert files(out) == {"manifest.json"}
 
 
-def test_stations_stand_in_a_package_of_their_own(qlinkgen: Run, out: Path) -> None:
+def test_bus_modules_are_in_the_package_of_the_codecs(qlinkgen: Run, out: Path) -> None:
     assert qlinkgen("generate", "qlink", "-o", out).code == 0
     assert qlinkgen("generate", "trio", "-o", out).code == 0
-    folder = out / "python/qlinkgen_stations"
-    assert files(folder) == {"__init__.py", "py.typed", "qlink.py"}
-    (folder / "qlink.py").write_text("spoilt")
+    folder = out / "python/codecs"
+    assert files(folder) == {"__init__.py", "_support.py", "py.typed", "qlink.py", "qlink_bus.py", "trio.py"}
+    (folder / "qlink_bus.py").write_text("spoilt")
     result = qlinkgen("generate", "qlink", "-o", out, "--check")
-    assert (result.code, "qlinkgen_stations/qlink.py: differs" in result.out) == (1, True)
+    assert (result.code, "codecs/qlink_bus.py: differs" in result.out) == (1, True)
 
 
-def test_a_bus_that_loses_its_master_leaves_no_stations(qlinkgen: Run, out: Path, thermo: Path) -> None:
+def test_a_bus_that_loses_its_master_leaves_no_bus_module(qlinkgen: Run, out: Path, thermo: Path) -> None:
     assert qlinkgen("generate", thermo, "-o", out).code == 0
-    made = out / "python/qlinkgen_stations/thermo.py"
+    made = out / "python/wire/thermo_bus.py"
     assert made.exists()
     thermo.write_text(thermo.read_text().replace("kind: master_slave", "kind: ring"))
     assert qlinkgen("generate", thermo, "-o", out).code == 0

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.protocols.qlink.hexfile import read_hex
 from qlinkgen.sim import FaultPlan
-from qlinkgen_codecs import qlink
 from tests.cli.conftest import Run
 from tests.cli.wire import CALM, PATIENCE, bus, call, end, on_terminal, started, wait_for
 

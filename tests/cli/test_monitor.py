@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 
 from qlinkgen.backends.python import load
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.schema import load as load_schema
 from qlinkgen.sim import FaultPlan
 from qlinkgen.transport import PtyPort, SerialPort, open_pty
-from qlinkgen_codecs import qlink
 from tests.cli.conftest import Run
 from tests.cli.full_disk import FULL_DISK
 from tests.cli.wire import (

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode, MotionCoordinator
 from qlinkgen.sim.port_ring import RingBus, ring_bus
 from qlinkgen.transport import open_port, open_pty
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import trio
 from tests.cli.conftest import Run
 from tests.cli.wire import end, objects, read_until, records, simulated, started
 

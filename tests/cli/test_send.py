@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from qlinkgen.backends.python import load
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.schema import load as load_schema
 from qlinkgen.sim import Wire
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import PtyPort, open_port, open_pty
-from qlinkgen_codecs import qlink
 from tests.cli.conftest import Run
 from tests.cli.full_disk import FULL_DISK
 from tests.cli.wire import CALM, PATIENCE, REPOSITORY, bus, call, objects, simulated

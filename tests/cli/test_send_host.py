@@ -7,11 +7,11 @@ import json
 import signal
 from collections.abc import Iterator
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
 from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import AxisStatus
 from tests.cli.conftest import Result, Run
 from tests.cli.wire import SLACK, call, end, objects, simulated
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.transport import open_port
-from qlinkgen_codecs import qlink
 from tests.cli.conftest import Run
 from tests.cli.full_disk import FULL_DISK
 from tests.cli.wire import (

@@ -13,19 +13,19 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.slave import SlaveEngine, Station
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.sim import FaultPlan, Wire
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import open_pty
-from qlinkgen_codecs import qlink
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-m", "qlinkgen"]
 ENVIRONMENT = {
     **{name: value for name, value in os.environ.items() if name not in {"FORCE_COLOR", "NO_COLOR"}},
-    "PYTHONPATH": f"{REPOSITORY}{os.pathsep}{REPOSITORY / 'generated' / 'python'}",
+    "PYTHONPATH": str(REPOSITORY),
     "PYTHONUNBUFFERED": "",
 }
 #: Seconds that nothing here needs; a wait that long has failed.

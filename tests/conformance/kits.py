@@ -22,7 +22,7 @@ _LINE = re.compile(r"(?P<result>ok|not ok) (?P<number>[0-9]+) - (?P<name>.+)")
 def write(name: str, folder: Path, options: Options | None = None) -> Path:
     """Write header and kit of a protocol side by side; returns the kit."""
     for target in ("c", "conformance"):
-        generate, _ = TARGETS[target].load()
+        generate = TARGETS[target].load()
         for path, text in generate(protocol(name), options or Options()).items():
             (folder / Path(path).name).write_text(text, "utf-8")
     return folder / f"{name}_conformance.c"

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from enum import IntEnum
 from typing import NamedTuple
 
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 MARK = b"\x7e\xd1"
 #: An answer that begins so refuses the operation in its second byte.

@@ -6,8 +6,8 @@ import time
 from collections import deque
 from typing import TypeVar
 
+from qlinkgen.codecs import qlink
 from qlinkgen.transport import Port
-from qlinkgen_codecs import qlink
 from tests.firmware.diagnostics import MARK, Diagnostics, Op
 from tests.firmware.firmware import HANGS
 

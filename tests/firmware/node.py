@@ -13,10 +13,10 @@ from binascii import crc_hqx
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink.motor import MOST_DATA, echo
 from qlinkgen.sim import VirtualPort
-from qlinkgen_codecs import qlink
 from tests.firmware.diagnostics import Counters, ProgramState
 from tests.firmware.line import SILENCE, FirmwareLine, Garbage
 

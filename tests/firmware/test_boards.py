@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import Timing
 from qlinkgen.transport import open_pty
-from qlinkgen_codecs import qlink
 from tests.firmware.firmware import HANGS, SOURCES, TARGETS
 from tests.firmware.fixtures import BuildFirmware
 from tests.firmware.line import UP, FirmwareLine

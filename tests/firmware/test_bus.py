@@ -10,12 +10,12 @@ from typing import Any, cast
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import NoReply
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import AsyncBus, Bus, VirtualNode
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.transport import Port
-from qlinkgen_codecs import qlink
 from tests.firmware.firmware import TARGETS
 from tests.firmware.fixtures import FirmwareLines
 from tests.firmware.node import FirmwareNode

@@ -12,9 +12,9 @@ from typing import NoReturn
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.transport import Port, open_port
-from qlinkgen_codecs import qlink
 from tests.firmware.firmware import HANGS
 from tests.firmware.test_build import PORTS, copied, run, sure
 

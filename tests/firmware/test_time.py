@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import pytest
 
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 from tests.firmware.diagnostics import State
 from tests.firmware.firmware import FIFO, HANGS, TARGETS
 from tests.firmware.fixtures import FirmwareLines

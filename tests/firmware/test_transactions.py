@@ -12,7 +12,7 @@ from benchmarks.firmware_soak_model import Model
 from benchmarks.firmware_soak_page import TITLE, as_text, put_into
 from benchmarks.firmware_soak_run import Result, Soak, WrongAnswer
 from benchmarks.firmware_soak_traffic import REQUESTS, Traffic, Unit
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 from tests.firmware.firmware import PROGRAM_SIZE, TARGETS
 from tests.firmware.fixtures import BuildFirmware, FirmwareLines
 from tests.firmware.line import FirmwareLine

@@ -16,6 +16,7 @@ from decimal import Decimal
 import pytest
 
 from examples.trio_two_keypads import FIRST, LENGTH, SECOND, Machine
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import PATIENCE
 from qlinkgen.protocols.trio import CURSOR, MotionCoordinator
 from qlinkgen.protocols.trio.display import COLUMNS, ROWS, Display
@@ -23,7 +24,6 @@ from qlinkgen.protocols.trio.facts import KEY_UP, LAST_VARIABLE, MOST_NODES
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.sim.port_ring import PortRing
 from qlinkgen.transport import Port, open_port
-from qlinkgen_codecs import trio
 from tests.firmware.firmware import HANGS, Firmware
 from tests.firmware.fixtures import BuildFirmware
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import PATIENCE
 from qlinkgen.protocols.trio.display import COLUMNS, ROWS
 from qlinkgen.protocols.trio.facts import KEY_UP
-from qlinkgen_codecs import trio
 from tests.firmware.firmware import SOURCES
 
 #: Looks at keys when it is told to: <inputs> <milliseconds>, a line each.

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link import EchoMode, HealthPolicy, MasterEngine, Reply, SlaveEngine, Timing
 from qlinkgen.link.events import Event
 from qlinkgen.protocols.qlink.matching import ACCEPTS
 from qlinkgen.sim import VirtualPort, Wire
-from qlinkgen_codecs import qlink
 
 #: Host slack of most tests here, in seconds.
 SLACK = 0.002

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link import HealthPolicy, LinkCounters
 from qlinkgen.link.events import (
@@ -26,7 +27,6 @@ from qlinkgen.link.events import (
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.sim import Echo, FaultPlan
 from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen_codecs import qlink
 from tests.link.line import Arrivals, bus, changed, drive, make, request_of, taken
 
 ASK = qlink.MotorPositionRequest(node=3)

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import Collision, LinkError, NoReply
 from qlinkgen.link import MasterEngine
 from qlinkgen.link.echo import OUTSTANDING, PROBE
 from qlinkgen.link.events import Damaged, EchoBroken, EchoFound, Stray
-from qlinkgen_codecs import qlink
 from tests.link.line import BYTE, SLACK, Run, changed, drive, ends_in_mark, make, pieces, taken
 
 ASK = qlink.MotorPositionRequest(node=3)

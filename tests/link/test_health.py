@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError, NoReply
 from qlinkgen.link import HealthPolicy, MasterEngine
 from qlinkgen.link.events import HealthChanged, Refused
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.transport.blocking import BlockingMaster
-from qlinkgen_codecs import qlink
 from tests.link.line import BYTE, SLACK, drive, make, taken
 
 ASK = qlink.MotorPositionRequest(node=3)

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import BadReply, LinkError, NoReply
 from qlinkgen.link import MasterEngine, Reply
 from qlinkgen.link.events import Answered, Damaged, Failed, Sent, Stray, TimedOut
-from qlinkgen_codecs import qlink
 from tests.link.line import (
     BYTE,
     EPSILON,

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import MasterEngine, Timing
 from qlinkgen.link.events import Stray
-from qlinkgen_codecs import qlink
 from tests.link.line import BYTE, Node, drive, make, request_of, taken
 from tests.python.protocols import module
 

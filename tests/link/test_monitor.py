@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import Monitor, Timing
 from qlinkgen.link.events import Damaged, Stray
 from qlinkgen.link.monitor import Asked, Replied, Unanswered, _same_frames
 from qlinkgen.protocols.qlink.matching import ACCEPTS
 from qlinkgen.sim import FaultPlan
-from qlinkgen_codecs import qlink
 from tests.link.line import BYTE, Node, bus, changed, request_of, timing
 from tests.python.protocols import build, module, protocol
 

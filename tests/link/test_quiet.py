@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import BadReply, NoReply
 from qlinkgen.link.events import Stray, TimedOut
-from qlinkgen_codecs import qlink
 from tests.link.line import BYTE, EPSILON, SLACK, drive, make, taken
 
 ASK = qlink.MotorPositionRequest(node=3)

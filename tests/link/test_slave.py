@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import VirtualNode
-from qlinkgen_codecs import qlink
 from tests.link.line import BYTE, Node, bus, changed, ends_in_mark, pieces, request_of
 from tests.python.protocols import module
 

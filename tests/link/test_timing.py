@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import mc1231a, qlink, trio
 from qlinkgen.link import Timing
-from qlinkgen_codecs import mc1231a, qlink, trio
 from tests.link.line import timing
 from tests.python.protocols import module
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import BadReply, LinkError
 from qlinkgen.link import HealthPolicy, MasterEngine, Timing
 from qlinkgen.protocols.qlink.matching import ACCEPTS
-from qlinkgen_codecs import qlink
 from tests.link.line import EPSILON, drive, make, pieces
 from tests.python.protocols import build, module, protocol
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from qlinkgen.codecs import mc1231a
 from qlinkgen.errors import LinkError
 from qlinkgen.link.host import HostEngine
 from qlinkgen.link.host_rules import Packet
@@ -12,7 +13,6 @@ from qlinkgen.link.host_timing import HostTiming
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.mc1231a import ChipEngine
 from qlinkgen.protocols.mc1231a.facts import RULES, SELECT
-from qlinkgen_codecs import mc1231a
 
 SLACK = 0.002
 BAUD = 115200

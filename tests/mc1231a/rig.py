@@ -15,13 +15,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.errors import PortLost
 from qlinkgen.protocols.mc1231a import AsyncAxis, AsyncHost, ChipEngine, ChipSet, Host
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import MemoryPort, Port, memory_pair, open_port
-from qlinkgen_codecs.mc1231a import AxisStatus
 
 BAUD = 115200
 #: Seconds of host slack; in real time what a busy machine needs.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import Axes, AxisStatus, EventMask, LimitSwitches, OutputMode
 from qlinkgen.errors import BadReply, CommandError, IllegalCommand, NoReply
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import Axes, AxisStatus, EventMask, LimitSwitches, OutputMode
 from tests.mc1231a.conftest import MakeRig
 from tests.mc1231a.rig import Rig, flip, lose
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
 from qlinkgen.protocols.mc1231a.chip import SAMPLE_TIME
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import AxisStatus
 
 COMMANDS: dict[str, Any] = dict(mc1231a.COMMANDS)
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import mc1231a
 from qlinkgen.protocols.mc1231a import AsyncHost, ChipSet, Host, UnconfirmedCommand
 from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
 from qlinkgen.protocols.mc1231a.registers import BUFFERED, IMMEDIATE, READABLE
 from qlinkgen.sim import VirtualPort
 from qlinkgen.sim.chip_bus import chip_wire
-from qlinkgen_codecs import mc1231a
 from tests.mc1231a.line import sample
 from tests.mc1231a.rig import virtual
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
 from qlinkgen.link.events import Damaged, Failed, Sent, TimedOut
 from qlinkgen.link.host_events import Filled, InStep, OutOfStep
@@ -16,8 +18,6 @@ from qlinkgen.link.host_rules import Packet
 from qlinkgen.link.host_timing import HostTiming
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
 from qlinkgen.protocols.mc1231a.facts import SELECT
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import AxisStatus
 from tests.mc1231a.line import BAUD, BYTE, SLACK, Device, Line, chip_device, make, on_axis, sample
 
 GET_KP = mc1231a.GetKpRequest()

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import mc1231a
 from qlinkgen.errors import PortLost, PortMissing
 from qlinkgen.link.host_events import InStep, OutOfStep
 from qlinkgen.link.host_rules import Packet
@@ -18,7 +19,6 @@ from qlinkgen.sim import VirtualPort
 from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import open_port
-from qlinkgen_codecs import mc1231a
 from tests.mc1231a.conftest import MakeRig
 from tests.mc1231a.rig import Rig, Setting, lose, make_rig, virtual
 

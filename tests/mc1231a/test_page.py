@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.errors import BadReply, CommandError, IllegalCommand
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import AxisStatus
 from tests.mc1231a.line import sample
 from tests.mc1231a.rig import Rig, become, virtual
 

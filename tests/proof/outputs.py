@@ -160,7 +160,7 @@ def construct_live(name: str) -> Output:
 
 def construct_source(name: str) -> Output:
     """The generated source, imported from a package as a user would."""
-    outputs = {**construct.shared(), **construct.generate(cases.protocol(name), Options())}
+    outputs = construct.generate(cases.protocol(name), Options())
     with tempfile.TemporaryDirectory() as folder:
         package = Path(folder) / f"construct_of_{name}"
         package.mkdir()

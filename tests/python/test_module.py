@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from qlinkgen_codecs import mc1231a, qlink
 
-from qlinkgen.backends.base import Options
-from qlinkgen.backends.python import generate, load, shared
+from qlinkgen.backends.base import OWN, Options
+from qlinkgen.backends.python import generate, load
 from qlinkgen.schema import loads
 from tests.python.protocols import EVERY, defaults, module, protocol, text_of
 
@@ -22,9 +22,9 @@ ROOT = Path(__file__).parents[2]
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the package of every protocol."""
     folder = tmp_path_factory.mktemp("generated")
-    outputs = dict(shared())
+    outputs: dict[str, str] = {}
     for name in EVERY:
-        outputs.update(generate(protocol(name), Options()))
+        outputs.update(generate(protocol(name), Options(package=OWN)))
     for path, text in outputs.items():
         file = folder / path
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -41,20 +41,18 @@ def run(*command: str, cwd: Path) -> str:
 def test_mypy_strict_is_content(written: Path) -> None:
     config = written / "mypy.ini"
     config.write_text("[mypy]\nstrict = True\nwarn_unreachable = True\n")
-    run(sys.executable, "-m", "mypy", "--config-file", str(config), "qlinkgen_codecs", cwd=written)
+    run(sys.executable, "-m", "mypy", "--config-file", str(config), "wire", cwd=written)
 
 
 def test_pyright_strict_is_content(written: Path) -> None:
     pytest.importorskip("pyright", reason="needs pyright (pip install pyright[nodejs])")
-    (written / "pyrightconfig.json").write_text(
-        '{"typeCheckingMode": "strict", "include": ["qlinkgen_codecs"]}'
-    )
+    (written / "pyrightconfig.json").write_text('{"typeCheckingMode": "strict", "include": ["wire"]}')
     run(sys.executable, "-m", "pyright", "--pythonversion", "3.11", cwd=written)
 
 
 def test_the_text_does_not_depend_on_the_hash_seed() -> None:
     code = (
-        "from tests.python.protocols import *; from qlinkgen.backends.python import generate, shared;"
+        "from tests.python.protocols import *; from qlinkgen.backends.python import generate;"
         "from qlinkgen.backends.base import Options; import hashlib;"
         "texts = [t for n in EVERY for t in generate(protocol(n), Options()).values()];"
         "print(hashlib.sha256(''.join(texts).encode()).hexdigest())"
@@ -69,21 +67,19 @@ def test_the_text_does_not_depend_on_the_hash_seed() -> None:
 
 def test_a_module_needs_nothing_but_cheap_parts_of_the_standard_library(written: Path) -> None:
     for name in ("qlink", "mc1231a"):
-        code = f"old = set(sys.modules); import qlinkgen_codecs.{name}; print(*set(sys.modules) - old)"
+        code = f"old = set(sys.modules); import wire.{name}; print(*set(sys.modules) - old)"
         loaded = set(
             run(
                 sys.executable, "-S", "-E", "-c", f"import sys; sys.path.insert(0, '.'); {code}", cwd=written
             ).split()
         )
-        own = {each for each in loaded if each.startswith("qlinkgen_codecs")}
+        own = {each for each in loaded if each.startswith("wire")}
         assert loaded - own <= {"__future__", "struct", "_struct", "binascii"}
 
 
 def test_lines_are_not_too_long_and_nothing_trails(written: Path) -> None:
     for name in EVERY:
-        for number, line in enumerate(
-            (written / f"qlinkgen_codecs/{name}.py").read_text("utf-8").splitlines(), 1
-        ):
+        for number, line in enumerate((written / f"wire/{name}.py").read_text("utf-8").splitlines(), 1):
             assert line == line.rstrip(), f"{name}:{number}"
             assert len(line) <= 140, f"{name}:{number}: {line}"
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar, cast
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link import EchoMode, Event, SlaveEngine
 from qlinkgen.protocols.qlink import AsyncBus, Bus, VirtualNode
@@ -21,7 +22,6 @@ from qlinkgen.sim import Echo, FaultPlan, VirtualPort, Wire
 from qlinkgen.sim.fault_kinds import RateLike
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import Port, memory_pair, open_port
-from qlinkgen_codecs import qlink
 from tests.firmware.firmware import TARGETS
 from tests.firmware.node import FirmwareNode, RealPauses
 from tests.qlink.behaviour_drivers import AsyncFace, Pump

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import BadReply, LinkError
 from qlinkgen.link import EchoMode, SlaveEngine
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.sim import VirtualPort, Wire
-from qlinkgen_codecs import qlink
 from tests.qlink.behaviour_rig import Probe
 
 SLACK = 0.003

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import HexFileError, PortLost
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.transport import memory_pair
-from qlinkgen_codecs import qlink
 from tests.qlink.behaviour_rig import CLEAN, Probe, Rig, Setting, make_rig
 from tests.qlink.test_behaviour_node import hex_text
 

@@ -7,9 +7,9 @@ from itertools import count, pairwise
 
 import pytest
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink import MotorStatus, PositionType
 from qlinkgen.errors import LinkError, NoReply
-from qlinkgen_codecs import qlink
-from qlinkgen_codecs.qlink import MotorStatus, PositionType
 from tests.qlink.behaviour_rig import Probe, Rig, Slave
 from tests.qlink.conftest import MakeRig
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink import PositionType
 from qlinkgen.errors import LinkError, LoadError, NoReply
 from qlinkgen.link import HealthPolicy
 from qlinkgen.protocols.qlink import Found, LoadProgress
-from qlinkgen_codecs import qlink
-from qlinkgen_codecs.qlink import PositionType
 from tests.firmware.node import backwards
 from tests.qlink.behaviour_rig import Rig, Slave
 from tests.qlink.conftest import MakeRig

@@ -6,11 +6,11 @@ import contextlib
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.sim import FaultPlan, VirtualPort, Wire
-from qlinkgen_codecs import qlink
 from tests.qlink.behaviour_rig import Probe
 from tests.qlink.test_behaviour_node import hex_text
 

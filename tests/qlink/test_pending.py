@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import NoReply
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import Bus, VirtualNode
 from qlinkgen.sim import FaultPlan, VirtualPort, Wire
-from qlinkgen_codecs import qlink
 
 
 def test_the_error_says_what_is_pending() -> None:

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink import PositionType
+from qlinkgen.codecs.qlink_bus import SlaveHandlers
 from qlinkgen.protocols.qlink.virtual_node import VirtualNode
-from qlinkgen_codecs import qlink
-from qlinkgen_codecs.qlink import PositionType
-from qlinkgen_stations.qlink import SlaveHandlers
 
 
 def ask(node: VirtualNode, request: qlink.Message, now: float = 0.0) -> qlink.Message | None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink.io_image import IoImage
 from qlinkgen.protocols.qlink.virtual_node import VirtualNode
-from qlinkgen_codecs import qlink
 
 
 def ask(node: VirtualNode, request: qlink.Message, now: float = 0.0) -> qlink.Message | None:

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink import MotorStatus, PositionType
 from qlinkgen.protocols.qlink.path_fifo import PathFifo, signed_word, wrapped
 from qlinkgen.protocols.qlink.virtual_node import VirtualNode
-from qlinkgen_codecs import qlink
-from qlinkgen_codecs.qlink import MotorStatus, PositionType
 
 RUNNING, VALID = MotorStatus.RUNNING, MotorStatus.POSITION_VALID
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link.slave import SlaveEngine
 from qlinkgen.sim import FaultPlan, VirtualPort, Wire
 from qlinkgen.sim.wire import Chunks
-from qlinkgen_codecs import qlink
 
 
 class Repeater:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError, NoReply, PortLost
 from qlinkgen.link import Ask, MasterEngine, Pause, Procedure, Reply, SlaveEngine, Tell
 from qlinkgen.link.events import Answered, Event, Sent, Stray, TimedOut
@@ -23,7 +24,6 @@ from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.conversation import ASSUMED_LATENCY, OTHER_PROGRAM, WAKE_UP, host_slack, timing_of
 from qlinkgen.transport.port import Ability, Capabilities
 from qlinkgen.transport.serving import serve
-from qlinkgen_codecs import qlink
 from tests.link.line import Node, bus
 from tests.transport.conftest import PATIENCE
 

@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 import pytest
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import NoReply, PortLost
 from qlinkgen.link import SlaveEngine
 from qlinkgen.protocols.qlink import AsyncBus, Bus, VirtualNode
 from qlinkgen.transport.memory import memory_pair
 from qlinkgen.transport.serving import serve, serve_async
-from qlinkgen_codecs import qlink
 
 SLACK = 5.0
 

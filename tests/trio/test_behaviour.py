@@ -6,8 +6,8 @@ from decimal import Decimal
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio import CHR, CURSOR, VALUE, NetStat, NothingCame
-from qlinkgen_codecs import trio
 from tests.trio.behaviour_rig import PATIENCE
 from tests.trio.conftest import MakeRig
 

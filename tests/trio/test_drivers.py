@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.errors import LinkError, PortLost
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
@@ -27,7 +28,6 @@ from qlinkgen.sim.ring import RingWire
 from qlinkgen.transport import MemoryPort, PtyPort, memory_pair, memory_ring, open_port, open_pty
 from qlinkgen.transport.port import Ability, Capabilities
 from qlinkgen.transport.ring import NodeThread, PumpedNode, drive
-from qlinkgen_codecs import trio
 
 PATIENCE = 20.0
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring_events import Dropped
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode, MotionCoordinator
 from qlinkgen.protocols.trio.face import engine_of
 from qlinkgen.transport import open_pty
-from qlinkgen_codecs import trio
 
 
 def hear(node: CoordinatorNode | KeypadNode, *messages: trio.Message, now: float = 0.0) -> list[str]:

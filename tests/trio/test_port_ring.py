@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio import (
     CHR,
     CoordinatorNode,
@@ -21,7 +22,6 @@ from qlinkgen.protocols.trio import (
 from qlinkgen.sim import FaultPlan, SimulationError
 from qlinkgen.sim.port_ring import PortRing, ring_bus
 from qlinkgen.transport import memory_pair, open_port, open_pty
-from qlinkgen_codecs import trio
 
 PATIENCE = 20.0
 

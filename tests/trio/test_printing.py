@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio import CHR, CURSOR, VALUE, CoordinatorNode
 from qlinkgen.protocols.trio.coordinator_node import send_message
 from qlinkgen.protocols.trio.facts import wire_address
@@ -15,7 +16,6 @@ from qlinkgen.protocols.trio.keypad_node import check_key
 from qlinkgen.protocols.trio.printing import printed
 from qlinkgen.protocols.trio.variables import KeyTable, Variables
 from qlinkgen.sim.virtual_ring import VirtualRing
-from qlinkgen_codecs import trio
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import PATIENCE, RingNode
 from qlinkgen.link.ring_events import Blocked, Broken, NetStat, Passed, Queued, StatusRaised, Taken
-from qlinkgen_codecs import trio
 
 #: Ends a message that was found broken after its head had gone: an end byte with the address 0.
 CUT = b"\x80"

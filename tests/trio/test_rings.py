@@ -9,6 +9,7 @@ from decimal import Decimal
 
 import pytest
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
@@ -17,7 +18,6 @@ from qlinkgen.sim import SimulationError
 from qlinkgen.sim.virtual_ring import VirtualRing
 from qlinkgen.transport import memory_ring
 from qlinkgen.transport.ring import NodeIo
-from qlinkgen_codecs import trio
 
 #: Made for an address; the address apart, one of each type.
 MESSAGES: dict[str, Callable[[int], trio.Message]] = {

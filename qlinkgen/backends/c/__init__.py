@@ -10,17 +10,12 @@ from qlinkgen.backends.base import Options, Outputs, environment
 from qlinkgen.backends.c.header import Header
 from qlinkgen.model.protocol import Protocol
 
-__all__ = ["generate", "shared"]
+__all__ = ["generate"]
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The header of a protocol."""
     return {f"c/{protocol.name}.h": Header(protocol, options, _templates()).text()}
-
-
-def shared() -> Outputs:
-    """Nothing: a header needs no other file."""
-    return {}
 
 
 @functools.cache

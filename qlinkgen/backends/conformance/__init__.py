@@ -15,18 +15,13 @@ from qlinkgen.backends.conformance.kit import Kit
 from qlinkgen.backends.conformance.sources import Header, Heard, Listener, Sources
 from qlinkgen.model.protocol import Protocol
 
-__all__ = ["Header", "Heard", "Listener", "Sources", "generate", "shared"]
+__all__ = ["Header", "Heard", "Listener", "Sources", "generate"]
 
 
 def generate(protocol: Protocol, options: Options, sources: Sources) -> Outputs:
     """The kit of a protocol: path below the output folder to text."""
     text = _template().render(Kit(protocol, options, sources).view())
     return {f"conformance/{protocol.name}_conformance.c": text}
-
-
-def shared() -> Outputs:
-    """Nothing: a kit needs no other file but the header."""
-    return {}
 
 
 @functools.cache

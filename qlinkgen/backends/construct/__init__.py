@@ -17,7 +17,7 @@ from qlinkgen.backends.construct.tree import WIDTH, Definition, printed, used
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
 
-__all__ = ["Live", "generate", "live", "shared"]
+__all__ = ["Live", "generate", "live"]
 
 #: A name of its own: a folder called `construct` would hide the library from whoever puts it on the path.
 FOLDER = "construct/qlinkgen_construct"
@@ -38,17 +38,12 @@ _ORIGINS = {"Decimal": "decimal"} | {
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
-    """The module of a protocol: path below the output folder to text."""
+    """The module of a protocol and those beside it: path below the output folder to text."""
     everything = definitions(protocol, options)
     text = "".join([_head(protocol), _imports(everything), *map(printed, everything)])
-    return {f"{FOLDER}/{protocol.name}.py": text}
-
-
-def shared() -> Outputs:
-    """The modules that every generated one needs beside it."""
     folder = importlib.resources.files(__name__)
     support = {f"{FOLDER}/{name}.py": folder.joinpath(f"{name}.py").read_text("utf-8") for name in _SUPPORT}
-    return {f"{FOLDER}/__init__.py": _PACKAGE_DOC, **support}
+    return {f"{FOLDER}/{protocol.name}.py": text, f"{FOLDER}/__init__.py": _PACKAGE_DOC, **support}
 
 
 def _head(protocol: Protocol) -> str:

@@ -1,4 +1,4 @@
-"""The statements that turn bytes into a message: sizes first, a struct for each row of steps, then every value."""
+"""The statements that turn bytes into a message: sizes, a struct for each row of steps, then every value."""
 
 from __future__ import annotations
 
@@ -224,7 +224,10 @@ class Decoder:
             self.constants.append(
                 f'{name} = {place.use("Struct")}("{place.prefix}{format_of(row.codes)}").unpack_from'
             )
-            lines += [*self._start(row.start), *_assigned(row.targets, f"{name}({place.data}, {self._from(row.start)})")]
+            lines += [
+                *self._start(row.start),
+                *_assigned(row.targets, f"{name}({place.data}, {self._from(row.start)})"),
+            ]
         if payload.fixed and not (alone and rows):
             size = payload.most + place.overhead
             wrong = f"len({place.data}) != {size}" if size else place.data
@@ -322,7 +325,11 @@ class Decoder:
 
     def _value(self, step: ValueStep, at: Size) -> None:
         raw, target = f"{step.name}_raw", f"message.{attribute(step.name)}"
-        if _is_plain(step.number) and not step.conditions and integers.letter(step.integer, self.place.byteorder):
+        if (
+            _is_plain(step.number)
+            and not step.conditions
+            and integers.letter(step.integer, self.place.byteorder)
+        ):
             self._get(step.integer, raw, at, target)
             return
         self._get(step.integer, raw, at)
@@ -466,7 +473,9 @@ def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) ->
     total = f"{product} {'+' if scaling.bias > 0 else '-'} {abs(scaling.bias)}" if scaling.bias else product
     if scaling.divisor == 1:
         return [f"{target} = {total}"]
-    return joined(f"{target} = ", [f"({total})" if scaling.bias else total, str(scaling.divisor)], "/", _INDENT)
+    return joined(
+        f"{target} = ", [f"({total})" if scaling.bias else total, str(scaling.divisor)], "/", _INDENT
+    )
 
 
 def _is_plain(number: Scalar) -> bool:

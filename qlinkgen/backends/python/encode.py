@@ -6,7 +6,15 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.python import integers
-from qlinkgen.backends.python.layout import WIDTH, comprehension, condition, indented, joined, literal, wrapped
+from qlinkgen.backends.python.layout import (
+    WIDTH,
+    comprehension,
+    condition,
+    indented,
+    joined,
+    literal,
+    wrapped,
+)
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
@@ -315,4 +323,3 @@ class Encoder:
         self.place.use("Struct")
         self.constants += table(name, text, "pack", row.items, "n")
         return wrapped(f"{before}{name}[{row.items.name}_count](", row.arguments, ")", _INDENT)
-

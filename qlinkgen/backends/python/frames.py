@@ -130,7 +130,7 @@ class HeadCheck:
 
 @dataclass(frozen=True)
 class LengthView:
-    """The length of a frame: bounds, place, and expressions for its value in ``head`` and the bytes of ``number``."""
+    """The length of a frame: bounds, place, its value in ``head`` and the bytes of ``number``."""
 
     bias: int
     least: int

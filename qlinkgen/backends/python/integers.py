@@ -86,7 +86,7 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
 
 
 def stray(integer: Integer, sources: Sequence[str]) -> tuple[tuple[tuple[str, ...], int], ...]:
-    """Sources whose bytes have bits that are not the integer's where they are greater than a mask, by mask."""
+    """Sources that hold bits of no chunk where they are greater than a mask, by mask."""
     by_mask: dict[int, list[str]] = {}
     for source, chunk in zip(sources, integer.chunks, strict=True):
         if chunk.bits < 8:

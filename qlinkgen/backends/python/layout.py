@@ -1,4 +1,4 @@
-"""Lines of Python as ``ruff format`` leaves them: one line where it fits, else an item a line and a last comma."""
+"""Lines of Python as ``ruff format`` leaves them: one where it fits, else a line for each item."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan
 def measure_lines(payload: PayloadPlan) -> list[str]:
     """Body of the method that finds the size of a payload from its beginning; empty where it never varies.
 
-    The method is given the bytes, and where the payload begins in them. It returns the size as far as the counts are
+    The method takes the bytes and the index of the payload. It returns the size as far as the counts are
     there to tell, -1 where one is not allowed.
     """
     if payload.fixed:

@@ -19,6 +19,7 @@ from qlinkgen.backends.python.layout import WIDTH
 from qlinkgen.backends.python.names import by_kind, class_name
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.model.texts import one_line
+from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.tree import Plan
 
 #: Names of the support module that every module passes on.
@@ -178,7 +179,8 @@ class Module:
 
     def _public(self, view: FrameView, heard: Sequence[frames.Heard]) -> list[str]:
         names = [class_name(message) for message in self.plan.messages]
-        names += [self.place.classes[each.name] for each in (*self.plan.enums, *self.plan.flags)]
+        constants: list[Enum | Flags] = [*self.plan.enums, *self.plan.flags]
+        names += [self.place.classes[each.name] for each in constants]
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
         names += [each.function for each in heard]
         match view:

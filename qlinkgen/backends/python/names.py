@@ -1,6 +1,6 @@
 """Names in generated modules, chosen so that no name of a schema can hide one that the code itself uses.
 
-Locals made of a schema's names end in ``_raw``, ``_count`` or ``_odd``; nothing else in the generated code does.
+Locals made of a schema's names end in ``_raw``, ``_count``, ``_odd`` or ``_whole``; no others do.
 Whatever is private in a class begins with an underscore, which no name of a schema can.
 """
 
@@ -26,7 +26,7 @@ _TAKEN = frozenset(
 
 
 def attribute(name: str) -> str:
-    """The attribute of a field: its name, with an underscore where Python or the class has another use for it."""
+    """The attribute of a field: its name, with an underscore where that has another meaning."""
     return f"{name}_" if keyword.iskeyword(name) or name in _METHODS else name
 
 
@@ -62,7 +62,7 @@ def natural(name: str) -> tuple[tuple[str, int], ...]:
 
 
 def by_kind(name: str) -> tuple[int, tuple[tuple[str, int], ...]]:
-    """Sorts names in the order that ``ruff`` asks of imports and of ``__all__``: constants, classes, functions."""
+    """Sorts names as ``ruff`` wants imports and ``__all__``: constants, classes, functions."""
     bare = name.lstrip("_")
     kind = 0 if bare.isupper() and len(bare) > 1 else 1 if bare[:1].isupper() else 2
     return kind, natural(name)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import assert_never
 
 from qlinkgen.backends.python.names import attribute, constant_classes
 from qlinkgen.model.integer import ByteOrder
@@ -89,11 +90,14 @@ def place_of(plan: Plan) -> Place:
     """The place of a protocol's messages."""
     match plan.frame.receiver:
         case Hunt():
-            envelope, unique = plan.frame.envelope, True
+            envelope: Envelope | None = plan.frame.envelope
+            unique = True
         case Rescan():
             envelope, unique = plan.frame.envelope, False
         case Marks() | InStep():
             envelope, unique = None, False
+        case _:
+            assert_never(plan.frame.receiver)
     return Place(
         byteorder=plan.protocol.byteorder,
         classes=constant_classes(plan),

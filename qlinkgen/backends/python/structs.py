@@ -27,7 +27,7 @@ def format_of(codes: Iterable[str]) -> str:
 
 
 def tabled(payload: PayloadPlan, byteorder: ByteOrder) -> ItemsStep | None:
-    """The run for each of whose counts there is a struct that holds the whole payload, None where there is none.
+    """The run that has a struct of the whole payload for each of its counts, None where there is none.
 
     It is the only run of the payload that takes a starred target, and short enough.
     """

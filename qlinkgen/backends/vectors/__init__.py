@@ -19,7 +19,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Scalar
 from qlinkgen.model.values import to_json
 
-__all__ = ["KINDS", "Reference", "generate", "shared"]
+__all__ = ["KINDS", "Reference", "generate"]
 
 #: Kinds of vectors that every message has. Kinds that come to the same bytes share a line.
 KINDS = ("defaults", "minimum", "maximum", "a5", "random1", "random2")
@@ -41,11 +41,6 @@ def generate(protocol: Protocol, options: Options, reference: Reference) -> Outp
     rows = (row for message in kept for row in vectors.rows(message, good[message.name]))
     text = writer.document(head, {"vectors": rows, "faults": _faults(protocol, reference, kept, good)})
     return {f"vectors/{protocol.name}.json": text}
-
-
-def shared() -> Outputs:
-    """Nothing: each protocol's file stands alone."""
-    return {}
 
 
 def _faults(

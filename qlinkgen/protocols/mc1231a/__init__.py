@@ -1,7 +1,7 @@
 """The MC1231A chip set: its host, blocking and for asyncio, and the chip set itself, simulated.
 
 `Host` and `AsyncHost` ask, `ChipSet` behind a `ChipEngine` answers. Messages and their errors are in
-`qlinkgen_codecs.mc1231a`.
+`qlinkgen.codecs.mc1231a`.
 """
 
 from __future__ import annotations

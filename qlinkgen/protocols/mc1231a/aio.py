@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a_bus import AsyncAxisCalls, AsyncHostCalls
 from qlinkgen.link.events import Event
 from qlinkgen.link.host import HostEngine
 from qlinkgen.link.host_rules import Packet
@@ -14,8 +16,6 @@ from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine
 from qlinkgen.transport.aio import AsyncMaster
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import mc1231a
-from qlinkgen_stations.mc1231a import AsyncAxisCalls, AsyncHostCalls
 
 R = TypeVar("R", bound=mc1231a.Message)
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
+from qlinkgen.codecs import mc1231a
 from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
 from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
 from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
-from qlinkgen_codecs import mc1231a
 
 #: Seconds of one sample of the trajectories; set_smpl_time has no unit, so it is only kept.
 SAMPLE_TIME: Final = 0.0005

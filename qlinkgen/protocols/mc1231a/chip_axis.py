@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.protocols.mc1231a.facts import EVENTS
 from qlinkgen.protocols.mc1231a.registers import BUFFERED, after_reset
 from qlinkgen.protocols.mc1231a.trajectory import COUNTS, GEAR, S_CURVE, TRAPEZOIDAL, VELOCITY, Trajectory
-from qlinkgen_codecs.mc1231a import AxisStatus
 
 #: Positions wrap at the range of set_actl_pos.
 HALF_TURN: Final = 1 << 30

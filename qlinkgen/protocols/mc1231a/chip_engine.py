@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from qlinkgen.codecs import mc1231a
 from qlinkgen.protocols.mc1231a.chip import ChipSet
-from qlinkgen_codecs import mc1231a
 
 _REFUSAL = b"\0\0"
 

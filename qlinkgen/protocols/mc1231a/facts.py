@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.link.host_rules import HostRules
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import AxisStatus
 
 AXES: Final = (1, 2)
 #: Packet that makes an axis current.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a_bus import AxisCalls, HostCalls
 from qlinkgen.link.events import Event
 from qlinkgen.link.host import HostEngine
 from qlinkgen.link.host_rules import Packet
@@ -14,8 +16,6 @@ from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import mc1231a
-from qlinkgen_stations.mc1231a import AxisCalls, HostCalls
 
 R = TypeVar("R", bound=mc1231a.Message)
 
@@ -26,7 +26,7 @@ class Host(BlockingMaster, HostCalls):
     Every command of the table is a method here; those that act on the current axis take the axis as their
     first argument, and stand on `axis(n)` without it. The current axis is kept: set_1 or set_2 is sent only
     where it must be. They return the response and raise LinkError (NoReply, BadReply, IllegalCommand),
-    PortLost, or the EncodeError of `qlinkgen_codecs.mc1231a` before a byte is sent.
+    PortLost, or the EncodeError of `qlinkgen.codecs.mc1231a` before a byte is sent.
 
     Example:
         >>> with Host.open("/dev/ttyUSB0", baud=57600) as host:  # doctest: +SKIP

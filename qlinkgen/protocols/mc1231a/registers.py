@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from qlinkgen_codecs import mc1231a
+from qlinkgen.codecs import mc1231a
 
 #: Registers with a life of their own, which are not just kept.
 _LIVE: Final = {"actl_pos", "mtr_cmd"}

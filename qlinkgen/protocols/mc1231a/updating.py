@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from qlinkgen.codecs import mc1231a
+from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.errors import CommandError
 from qlinkgen.link.host_rules import Packet
 from qlinkgen.link.procedure import Ask, Procedure
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.mc1231a.facts import AXES, SELECT, check_axis
-from qlinkgen_codecs import mc1231a
-from qlinkgen_codecs.mc1231a import AxisStatus
 
 
 def raise_command_error(axis: int) -> Procedure[int]:

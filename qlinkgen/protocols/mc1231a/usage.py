@@ -7,12 +7,12 @@ import warnings
 from collections.abc import Collection
 from typing import Any, Literal
 
+from qlinkgen.codecs import mc1231a
 from qlinkgen.link.host import HostEngine
 from qlinkgen.link.host_timing import HostTiming
 from qlinkgen.protocols.mc1231a.facts import RULES
 from qlinkgen.transport.conversation import host_slack
 from qlinkgen.transport.port import Ability, Port
-from qlinkgen_codecs import mc1231a
 
 #: Whose checksum is read: that of every command, of none, or of those that are named.
 Checksum = Literal["always", "never"] | Collection[str]

@@ -1,6 +1,6 @@
 """Q.link on the wire: the master's side, blocking and for asyncio, and the slave's.
 
-`Bus` and `AsyncBus` ask, `VirtualNode` answers. Messages and their errors are in `qlinkgen_codecs.qlink`.
+`Bus` and `AsyncBus` ask, `VirtualNode` answers. Messages and their errors are in `qlinkgen.codecs.qlink`.
 """
 
 from __future__ import annotations

@@ -8,6 +8,8 @@ from collections.abc import AsyncGenerator, Callable, Iterable, Mapping
 from os import PathLike
 from typing import TypeVar
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink_bus import AsyncMasterCalls, AsyncNodeCalls
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
@@ -21,8 +23,6 @@ from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.aio import AsyncMaster
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import qlink
-from qlinkgen_stations.qlink import AsyncMasterCalls, AsyncNodeCalls
 
 R = TypeVar("R", bound=qlink.Message)
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from os import PathLike
 from typing import TypeVar
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink_bus import MasterCalls, NodeCalls
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
@@ -23,8 +25,6 @@ from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import qlink
-from qlinkgen_stations.qlink import MasterCalls, NodeCalls
 
 R = TypeVar("R", bound=qlink.Message)
 
@@ -34,7 +34,7 @@ class Bus(BlockingMaster, MasterCalls):
 
     Every command of the document is a method here with the node as its first argument, and on `node(n)`
     without it. They return the response, and raise LinkError (NoReply, BadReply, Collision), PortLost, or the
-    EncodeError of `qlinkgen_codecs.qlink` before a byte is sent.
+    EncodeError of `qlinkgen.codecs.qlink` before a byte is sent.
 
     Example:
         >>> with Bus.open("/dev/ttyUSB0") as bus:  # doctest: +SKIP

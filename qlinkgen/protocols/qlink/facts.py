@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from qlinkgen_codecs import qlink
+from qlinkgen.codecs import qlink
 
 
 def _bus(name: str) -> int:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError, LoadError
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import PIECE
-from qlinkgen_codecs import qlink
 
 #: Seconds between two rounds of attempts at one piece.
 RETRY_PAUSE = 0.05

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link.transaction import Accepts
-from qlinkgen_codecs import qlink
 
 
 def _setup(request: qlink.NodeSetupRequest, response: qlink.NodeSetupResponse) -> bool:

@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 
+from qlinkgen.codecs import qlink
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
@@ -19,7 +20,6 @@ from qlinkgen.protocols.qlink.hexfile import read_hex
 from qlinkgen.protocols.qlink.matching import ACCEPTS
 from qlinkgen.transport.conversation import timing_of
 from qlinkgen.transport.port import Port
-from qlinkgen_codecs import qlink
 
 #: Syncs of one run: more than a bus can send in its life.
 MOST_SYNCS = 1 << 62

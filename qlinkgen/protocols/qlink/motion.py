@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link.procedure import FAILURES, Ask, Pause, Procedure, Tell
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import WORDS
-from qlinkgen_codecs import qlink
 
 
 @dataclass(slots=True)

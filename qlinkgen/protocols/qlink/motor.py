@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink.arguments import positive
-from qlinkgen_codecs import qlink
 
 #: Bytes that fit into an answer beside the completion.
 MOST_DATA = qlink.MotorResponsePollResponse.MAX_SIZE - 1

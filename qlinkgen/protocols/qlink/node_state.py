@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from math import isfinite
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink import PositionType
 from qlinkgen.protocols.qlink.arguments import known, positive, whole
 from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.protocols.qlink.hex_image import HexImage
@@ -13,8 +15,6 @@ from qlinkgen.protocols.qlink.motor import MotorRequests, echo
 from qlinkgen.protocols.qlink.path_fifo import PathFifo, signed_word
 from qlinkgen.protocols.qlink.program_store import ProgramStore
 from qlinkgen.protocols.qlink.statistics import NodeStatistics, PathRecord
-from qlinkgen_codecs import qlink
-from qlinkgen_codecs.qlink import PositionType
 
 #: Seconds that a time may lie before the one told last: threads and drivers look at the clock in any order.
 _DISORDER = 1.0

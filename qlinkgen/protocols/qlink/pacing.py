@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import NoReply
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import BROADCAST
-from qlinkgen_codecs import qlink
 
 
 @dataclass(slots=True)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link.procedure import Ask, Procedure, Tell
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import NODES
-from qlinkgen_codecs import qlink
 
 #: What a node has to send back that does not answer node_info.
 _SIGN = b"\x5a\xc3"

@@ -21,10 +21,10 @@ What the document leaves open, and what this node does (the modules of its parts
 
 from __future__ import annotations
 
+from qlinkgen.codecs import qlink
+from qlinkgen.codecs.qlink_bus import SlaveHandlers
 from qlinkgen.protocols.qlink.node_state import NodeState
 from qlinkgen.protocols.qlink.path_fifo import wrapped
-from qlinkgen_codecs import qlink
-from qlinkgen_stations.qlink import SlaveHandlers
 
 
 class VirtualNode(NodeState, SlaveHandlers):

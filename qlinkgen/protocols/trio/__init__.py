@@ -2,7 +2,7 @@
 
 `MotionCoordinator` has the network's words of Trio BASIC as methods, `MembraneKeypad` keys and a display.
 Each joins the ring at one port, and sends on what is for others. Messages and their errors are in
-`qlinkgen_codecs.trio`.
+`qlinkgen.codecs.trio`.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
+from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
 from qlinkgen.protocols.trio.errors import NothingCame
 from qlinkgen.protocols.trio.face import TX_TIMEOUT, CoordinatorFace, Face, Item, N, paced_baud
@@ -15,7 +16,6 @@ from qlinkgen.protocols.trio.printing import Number
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import OnEvent
 from qlinkgen.transport.ring_aio import AsyncRingDriver, drive_async
-from qlinkgen_codecs import trio
 
 
 class AsyncFace(Face[N]):

@@ -9,12 +9,12 @@ from collections import deque
 from decimal import Decimal
 from typing import Any, cast
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Dropped
 from qlinkgen.protocols.trio.facts import KEYS, LAST_VARIABLE, OFFSET, RECEIVE_BUFFER, VARIABLE, wire_address
 from qlinkgen.protocols.trio.printing import Number
 from qlinkgen.protocols.trio.variables import KeyTable, Variables
-from qlinkgen_codecs import trio
 
 
 class CoordinatorCounters:

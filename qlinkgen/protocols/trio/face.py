@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import NetStat, RingCounters
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, text_message
@@ -20,7 +21,6 @@ from qlinkgen.protocols.trio.printing import Formatted, Number, pieces, printed
 from qlinkgen.protocols.trio.variables import Variables
 from qlinkgen.transport.port import Ability, Port
 from qlinkgen.transport.ring import RingDriver
-from qlinkgen_codecs import trio
 
 Node = CoordinatorNode | KeypadNode | RingNode
 N = TypeVar("N", bound=Node)

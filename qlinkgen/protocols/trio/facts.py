@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from qlinkgen_codecs.trio import BUS
+from qlinkgen.codecs.trio import BUS
 
 #: BASIC's number of the next node along the ring, whose address on the wire is 1 (Network Node Addressing).
 FIRST_NODE = 10

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Dropped
 from qlinkgen.protocols.trio.display import COLUMNS, ROWS, Display
 from qlinkgen.protocols.trio.facts import KEY_UP
-from qlinkgen_codecs import trio
 
 _MODES = (trio.KeypadModeEnum.ON_ONLY, trio.KeypadModeEnum.ON_OFF)
 

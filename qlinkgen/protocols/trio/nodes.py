@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Self
 
+from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
 from qlinkgen.protocols.trio.errors import NothingCame
@@ -21,7 +22,6 @@ from qlinkgen.protocols.trio.printing import Number
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import OnEvent, RingDriver, drive
-from qlinkgen_codecs import trio
 
 
 class MotionCoordinator(CoordinatorFace, BlockingFace[CoordinatorNode]):

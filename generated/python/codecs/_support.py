@@ -9,7 +9,9 @@ from __future__ import annotations
 from binascii import crc_hqx
 from struct import error as struct_error
 
-TYPE_CHECKING = False  # the name is enough for type checkers; importing `typing` costs 5 ms
+TYPE_CHECKING = (
+    False  # the name is enough for type checkers; importing `typing` costs 5 ms
+)
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from typing import Any, ClassVar
@@ -55,7 +57,9 @@ class DecodeError(CodecError):
         data: the bytes looked at: the payload where a field is wrong, else the frame.
     """
 
-    def __init__(self, text: str, kind: str, field: str = "", offset: int = 0, data: bytes = b"") -> None:
+    def __init__(
+        self, text: str, kind: str, field: str = "", offset: int = 0, data: bytes = b""
+    ) -> None:
         super().__init__(text)
         self.kind = kind
         self.field = field
@@ -71,16 +75,23 @@ class OutOfRange(ValueError):
     """Raised inside an encoder; the caller sees an EncodeError that names the field."""
 
 
-class Misfit(LookupError):
-    """Raised inside a decoder: the bytes do not have the shape of the message."""
+class LayoutError(LookupError):
+    """Raised inside a decoder: the bytes do not have the layout of the message."""
 
 
-#: What an encoder meets when a value is of the wrong type or too large.
-REFUSALS = (struct_error, TypeError, ValueError, ArithmeticError, AttributeError, LookupError)
-#: What a decoder meets when bytes are not the message that they seem to be.
-MISFITS = (struct_error, LookupError, CodecError)
-#: What it meets beside them where the argument may be anything.
-UNREADABLE = (*MISFITS, TypeError, BufferError, NotImplementedError)
+#: Raised inside an encoder by a value of the wrong type or out of range.
+REFUSALS = (
+    struct_error,
+    TypeError,
+    ValueError,
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+)
+#: Raised inside a decoder by bytes that are not the message that they seem to be.
+UNREAD = (struct_error, LookupError, CodecError)
+#: Raised besides where the argument may be anything.
+UNREADABLE = (*UNREAD, TypeError, BufferError, NotImplementedError)
 
 
 class Fault:
@@ -105,9 +116,11 @@ class Fault:
         """Same kind, place and bytes; the wording does not count."""
         if not isinstance(other, Fault):
             return NotImplemented
-        return (self.kind, self.offset, self.raw) == (other.kind, other.offset, other.raw)
-
-    __hash__ = None  # type: ignore[assignment]
+        return (self.kind, self.offset, self.raw) == (
+            other.kind,
+            other.offset,
+            other.raw,
+        )
 
     def __repr__(self) -> str:
         return f"Fault({self.kind!r}, offset={self.offset}, raw={self.raw.hex(' ')!r})"
@@ -172,7 +185,11 @@ class Rule:
             allowed = self.allows(value)
         except REFUSALS:
             allowed = False
-        return "" if allowed else f"{self.name}: {shown(value)} cannot be sent; give {self.legal}"
+        return (
+            ""
+            if allowed
+            else f"{self.name}: {shown(value)} cannot be sent; give {self.legal}"
+        )
 
 
 class Whole(Rule):
@@ -180,11 +197,14 @@ class Whole(Rule):
 
     __slots__ = ("ranges",)
 
-    def __init__(self, name: str, low: int, high: int, *more: int, unit: str = "") -> None:
+    def __init__(
+        self, name: str, low: int, high: int, *more: int, unit: str = ""
+    ) -> None:
         bounds = (low, high, *more)
         self.ranges = tuple(zip(bounds[::2], bounds[1::2], strict=True))
         words = " or ".join(
-            f"{first}..{last}" if first != last else str(first) for first, last in self.ranges
+            f"{first}..{last}" if first != last else str(first)
+            for first, last in self.ranges
         )
         super().__init__(name, f"a whole number, {words}{unit and ' '}{unit}")
 
@@ -216,7 +236,9 @@ class Constant(Rule):
     settable = False
 
     def __init__(self, name: str, value: int) -> None:
-        super().__init__(name, f"the constant {value:#x}" if value >= 0 else f"the constant {value}")
+        super().__init__(
+            name, f"the constant {value:#x}" if value >= 0 else f"the constant {value}"
+        )
 
 
 class Count(Rule):
@@ -235,15 +257,21 @@ class Items(Rule):
 
     __slots__ = ("fewest", "item", "most")
 
-    def __init__(self, name: str, fewest: int, most: int, low: int, high: int, *, unit: str = "") -> None:
+    def __init__(
+        self, name: str, fewest: int, most: int, low: int, high: int, *, unit: str = ""
+    ) -> None:
         self.fewest = fewest
         self.most = most
         self.item = Whole(name, low, high, unit=unit)
-        super().__init__(name, f"a list of {_span(fewest, most)} items, each {self.item.legal}")
+        super().__init__(
+            name, f"a list of {_span(fewest, most)} items, each {self.item.legal}"
+        )
 
     def allows(self, value: Any) -> bool:
         """The value has so many items, all in range."""
-        return self.fewest <= len(value) <= self.most and all(self.item.allows(item) for item in value)
+        return self.fewest <= len(value) <= self.most and all(
+            self.item.allows(item) for item in value
+        )
 
 
 class Octets(Rule):
@@ -272,28 +300,24 @@ class Text(Octets):
 
     def allows(self, value: Any) -> bool:
         """The value is text and has so many characters."""
-        return isinstance(value, str) and value.isascii() and self.fewest <= len(value) <= self.most
+        return (
+            isinstance(value, str)
+            and value.isascii()
+            and self.fewest <= len(value) <= self.most
+        )
 
 
 def _span(fewest: int, most: int) -> str:
     return str(most) if fewest == most else f"{fewest}..{most}"
 
 
-class Steps(Rule):
-    """A value that is sent in whole steps: value = (raw * factor + bias) / divisor, raw in low..high."""
+class Scale:
+    """Steps of a scaled value: value = (raw * factor + bias) / divisor, raw in low..high."""
 
     __slots__ = ("bias", "ceiling", "divisor", "factor", "floor", "high", "low")
 
     def __init__(
-        self,
-        name: str,
-        low: int,
-        high: int,
-        *,
-        factor: int = 1,
-        bias: int = 0,
-        divisor: int = 1,
-        unit: str = "",
+        self, low: int, high: int, *, factor: int = 1, bias: int = 0, divisor: int = 1
     ) -> None:
         self.low, self.high = low, high
         self.factor, self.bias, self.divisor = factor, bias, divisor
@@ -301,8 +325,6 @@ class Steps(Rule):
         # Whole numbers outside of all that rounds to a legal step.
         self.floor = (first - abs(factor)) // divisor
         self.ceiling = -((-last - abs(factor)) // divisor)
-        bounds = sorted((self.value(low), self.value(high)))
-        super().__init__(name, f"a number, {bounds[0]}..{bounds[1]}{unit and ' '}{unit}")
 
     def value(self, raw: int) -> Any:
         """The value that a number on the wire stands for, correctly rounded."""
@@ -320,22 +342,35 @@ class Steps(Rule):
             raise OutOfRange
         return raw
 
-    def allows(self, value: Any) -> bool:
-        """The value has a nearest step, and that is in range."""
-        self.raw(value)
-        return True
 
-
-class DecimalSteps(Steps):
+class DecimalScale(Scale):
     """Steps of a value that a float cannot hold: a Decimal loses nothing."""
 
     __slots__ = ()
 
     def value(self, raw: int) -> Any:
         """The value that a number on the wire stands for, exactly."""
-        from decimal import Context, Decimal  # noqa: PLC0415  # only protocols with such values pay for it
+        # Only protocols with such values pay for the import.
+        from decimal import Context, Decimal
 
-        return Context(prec=100).divide(Decimal(raw * self.factor + self.bias), Decimal(self.divisor))
+        number = Decimal(raw * self.factor + self.bias)
+        return Context(prec=100).divide(number, Decimal(self.divisor))
+
+
+class Scaled(Rule):
+    """A value that is sent in whole steps."""
+
+    __slots__ = ("scale",)
+
+    def __init__(self, name: str, scale: Scale, *, unit: str = "") -> None:
+        self.scale = scale
+        low, high = sorted((scale.value(scale.low), scale.value(scale.high)))
+        super().__init__(name, f"a number, {low}..{high}{unit and ' '}{unit}")
+
+    def allows(self, value: Any) -> bool:
+        """The value has a nearest step, and that is in range."""
+        self.scale.raw(value)
+        return True
 
 
 def _too_fine(value: Any) -> bool:
@@ -347,7 +382,9 @@ def _nearest(dividend: int, divisor: int) -> int:
     if divisor < 0:
         dividend, divisor = -dividend, -divisor
     quotient, remainder = divmod(dividend, divisor)
-    return quotient + (2 * remainder > divisor or (2 * remainder == divisor and quotient & 1))
+    return quotient + (
+        2 * remainder > divisor or (2 * remainder == divisor and quotient & 1)
+    )
 
 
 # Messages ---------------------------------------------------------------------------------------------------
@@ -377,6 +414,8 @@ class BaseMessage:
     RULES: ClassVar[tuple[Rule, ...]] = ()
     #: Name of the address, "" where the frame has none.
     ADDRESS: ClassVar[str] = ""
+    #: A payload of no bytes stands for every default.
+    EMPTY: ClassVar[bool] = False
 
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
@@ -389,12 +428,14 @@ class BaseMessage:
         """Same message, same values."""
         if type(other) is not type(self):
             return NotImplemented
-        return all(getattr(self, name) == getattr(other, name) for name in self._attributes())
-
-    __hash__ = None  # type: ignore[assignment]
+        return all(
+            getattr(self, name) == getattr(other, name) for name in self._attributes()
+        )
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={getattr(self, name, None)!r}" for name in self._attributes())
+        values = ", ".join(
+            f"{name}={getattr(self, name, None)!r}" for name in self._attributes()
+        )
         return f"{type(self).__name__}({values})"
 
 
@@ -418,11 +459,31 @@ def wrong_size(message: type[BaseMessage], payload: bytes) -> DecodeError:
     return DecodeError(text, "length", data=payload)
 
 
-def illegal(message: type[BaseMessage], name: str, seen: object, offset: int, payload: bytes) -> DecodeError:
+def illegal(
+    message: type[BaseMessage], name: str, seen: object, offset: int, payload: bytes
+) -> DecodeError:
     """The error for a field that holds what it must not; a negative offset counts from the end."""
-    legal = next((rule.legal for rule in message.RULES if rule.name == name), "something else")
+    legal = next(
+        (rule.legal for rule in message.RULES if rule.name == name), "something else"
+    )
     text = f"{message.NAME}: {name}: {shown(seen)} was received; legal is {legal}"
-    return DecodeError(text, "range", name, offset if offset >= 0 else len(payload) + offset, payload)
+    return DecodeError(
+        text, "range", name, offset if offset >= 0 else len(payload) + offset, payload
+    )
+
+
+def short_of(message: type[BaseMessage], packet: bytes, size: int) -> DecodeError:
+    """The error for a packet that ends too early."""
+    text = f"{message.NAME}: {len(packet)} bytes of at least {size}"
+    return DecodeError(text, "truncated", offset=len(packet), data=packet)
+
+
+def wrong_check(
+    seen: bytes, right: bytes, checksum: Checksum, frame: bytes
+) -> DecodeError:
+    """The error for a check value that is another one."""
+    text = f"checksum {seen.hex(' ')} was received, {right.hex(' ')} is right ({checksum.name})"
+    return DecodeError(text, "crc", data=frame)
 
 
 def as_bytes(data: BytesLike) -> bytes:
@@ -447,10 +508,21 @@ class OpenEnum(int):
     @property
     def name(self) -> str:
         """Name of the member as it stands in the class, "" where it has none."""
-        return next((name for name in type(self).__annotations__ if getattr(type(self), name) == self), "")
+        return next(
+            (
+                name
+                for name in type(self).__annotations__
+                if getattr(type(self), name) == self
+            ),
+            "",
+        )
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}.{self.name}" if self.name else f"{type(self).__name__}({int(self)})"
+        return (
+            f"{type(self).__name__}.{self.name}"
+            if self.name
+            else f"{type(self).__name__}({int(self)})"
+        )
 
 
 def named(number: int) -> Any:
@@ -470,7 +542,14 @@ class Bus:
         bits_per_byte: bits on the line for one byte: start, data, parity and stop bits.
     """
 
-    __slots__ = ("baud", "bits_per_byte", "broadcast", "first_node", "kind", "last_node")
+    __slots__ = (
+        "baud",
+        "bits_per_byte",
+        "broadcast",
+        "first_node",
+        "kind",
+        "last_node",
+    )
 
     def __init__(
         self,
@@ -507,7 +586,15 @@ class Marking:
         most: most bytes between header and end.
     """
 
-    __slots__ = ("address_mask", "address_shift", "end", "id_mask", "id_shift", "marker", "most")
+    __slots__ = (
+        "address_mask",
+        "address_shift",
+        "end",
+        "id_mask",
+        "id_shift",
+        "marker",
+        "most",
+    )
 
     def __init__(
         self,
@@ -557,7 +644,7 @@ class Command:
     def __init__(
         self,
         name: str,
-        id: int,  # noqa: A002  # the name that the schema gives it
+        id: int,
         request: type[Any],
         response: type[Any] | None,
         *,
@@ -612,7 +699,14 @@ CATALOGUE: tuple[tuple[str, int, int, bool, bool, int], ...] = (
         0xFFFF,
     ),
     ("crc-16/gsm", 0x1021, 0x0000, False, False, 0xFFFF),
-    ("crc-16/ibm-3740 crc-16/autosar crc-16/ccitt-false", 0x1021, 0xFFFF, False, False, 0x0000),
+    (
+        "crc-16/ibm-3740 crc-16/autosar crc-16/ccitt-false",
+        0x1021,
+        0xFFFF,
+        False,
+        False,
+        0x0000,
+    ),
     (
         "crc-16/ibm-sdlc crc-16/iso-hdlc crc-16/iso-iec-14443-3-b crc-16/x-25 crc-b x-25",
         0x1021,
@@ -644,7 +738,14 @@ CATALOGUE: tuple[tuple[str, int, int, bool, bool, int], ...] = (
     ("crc-16/t10-dif", 0x8BB7, 0x0000, False, False, 0x0000),
     ("crc-16/teledisk", 0xA097, 0x0000, False, False, 0x0000),
     ("crc-16/tms37157", 0x1021, 0x89EC, True, True, 0x0000),
-    ("crc-16/umts crc-16/buypass crc-16/verifone", 0x8005, 0x0000, False, False, 0x0000),
+    (
+        "crc-16/umts crc-16/buypass crc-16/verifone",
+        0x8005,
+        0x0000,
+        False,
+        False,
+        0x0000,
+    ),
     ("crc-16/usb", 0x8005, 0xFFFF, True, True, 0xFFFF),
     (
         "crc-16/xmodem crc-16/acorn crc-16/lte crc-16/v-41-msb xmodem zmodem",
@@ -678,22 +779,45 @@ class Checksum:
         compute = self.compute
         if compute is crc_hqx and order == "big":
             return crc_hqx  # a CRC over itself is 0
-        return lambda data, start: compute(data[:-size], start) ^ int.from_bytes(data[-size:], order)
+        return lambda data, start: (
+            compute(data[:-size], start) ^ int.from_bytes(data[-size:], order)
+        )
 
 
-def crc(name: str, *, width: int, poly: int, init: int, refin: bool, refout: bool, xorout: int) -> Checksum:
+def crc(
+    name: str,
+    *,
+    width: int,
+    poly: int,
+    init: int,
+    refin: bool,
+    refout: bool,
+    xorout: int,
+) -> Checksum:
     """A CRC by the parameters of the catalogue."""
     if (width, poly, refin, refout, xorout) == (16, 0x1021, False, False, 0):
-        return Checksum(name, crc_hqx, init)  # the one that the standard library computes, 20 times faster
+        return Checksum(
+            name, crc_hqx, init
+        )  # the one that the standard library computes, 20 times faster
     if refin:
-        return Checksum(name, _reflected_crc(width, poly, refout, xorout), _reflect(init, width))
-    spare = max(0, 8 - width)  # a register of less than 8 bits stands at the high end of a byte
-    return Checksum(name, _plain_crc(width + spare, poly << spare, spare, refout, xorout), init << spare)
+        return Checksum(
+            name, _reflected_crc(width, poly, refout, xorout), _reflect(init, width)
+        )
+    spare = max(
+        0, 8 - width
+    )  # a register of less than 8 bits stands at the high end of a byte
+    return Checksum(
+        name,
+        _plain_crc(width + spare, poly << spare, spare, refout, xorout),
+        init << spare,
+    )
 
 
 def _plain_crc(width: int, poly: int, spare: int, refout: bool, xorout: int) -> Crc:
     mask, shift, high = (1 << width) - 1, width - 8, 1 << (width - 1)
-    table = _table(high, lambda value: (value << 1 ^ (poly if value & high else 0)) & mask)
+    table = _table(
+        high, lambda value: (value << 1 ^ (poly if value & high else 0)) & mask
+    )
 
     def compute(data: bytes, register: int) -> int:
         for byte in data:
@@ -706,7 +830,9 @@ def _plain_crc(width: int, poly: int, spare: int, refout: bool, xorout: int) -> 
 
 def _reflected_crc(width: int, poly: int, refout: bool, xorout: int) -> Crc:
     feedback = _reflect(poly, width)
-    table = _table(1, lambda value: value >> 1 ^ (feedback if value & 1 else 0), up=False)
+    table = _table(
+        1, lambda value: value >> 1 ^ (feedback if value & 1 else 0), up=False
+    )
 
     def compute(data: bytes, register: int) -> int:
         for byte in data:
@@ -742,7 +868,11 @@ def find_crc(name: str) -> Checksum:
     key = _key(name)
     for names, *parameters in CATALOGUE:
         known = names.split()
-        if key in {_key(part) for each in known for part in (each, each.partition("/")[2] or each)}:
+        if key in {
+            _key(part)
+            for each in known
+            for part in (each, each.partition("/")[2] or each)
+        }:
             poly, init, refin, refout, xorout = parameters
             return crc(
                 known[0],

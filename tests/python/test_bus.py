@@ -1,4 +1,4 @@
-"""Stations: every command can be called and handled, and type checkers know what comes back."""
+"""Bus modules: every command can be called and handled, and type checkers know what comes back."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from unittest import mock
 
 import pytest
 
-from qlinkgen.backends.base import Options
+from qlinkgen.backends.base import OWN, Options
+from qlinkgen.backends.python import bus, load
 from qlinkgen.backends.python import generate as generate_codec
-from qlinkgen.backends.python import load, shared, stations
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.schema import loads
@@ -31,15 +31,16 @@ EVERY = [(name, command) for name in BUSES for command in protocol(name).command
 
 
 def loaded(model: Protocol, codec: ModuleType, options: Options | None = None) -> Any:
-    """The module of stations, compiled in memory beside a codec module in memory."""
-    made = ModuleType(f"stations_of_{model.name}")
-    with mock.patch.dict(sys.modules, {f"qlinkgen_codecs.{model.name}": codec}):
-        exec(compile(stations.render(model, options or Options()), made.__name__, "exec"), made.__dict__)
+    """The bus module, compiled in memory beside a codec module in memory."""
+    made = ModuleType(f"wire.{model.name}_bus")
+    made.__package__ = "wire"
+    with mock.patch.dict(sys.modules, {"wire": ModuleType("wire"), f"wire.{model.name}": codec}):
+        exec(compile(bus.render(model, options or Options()), made.__name__, "exec"), made.__dict__)
     return made
 
 
 @cache
-def stations_of(name: str) -> Any:
+def bus_of(name: str) -> Any:
     return loaded(protocol(name), module(name))
 
 
@@ -77,7 +78,7 @@ def arguments_of(name: str, command: Command) -> tuple[int, dict[str, Any]]:
 @pytest.mark.parametrize("caller", CALLERS)
 @pytest.mark.parametrize(("name", "command"), EVERY, ids=lambda value: getattr(value, "name", value))
 def test_every_command_can_be_called(name: str, command: Command, caller: str) -> None:
-    base = getattr(stations_of(name), caller)
+    base = getattr(bus_of(name), caller)
     if "Node" in caller and command.addressing == "broadcast":
         assert not hasattr(base, command.name)
         return
@@ -95,7 +96,7 @@ def test_every_command_can_be_called(name: str, command: Command, caller: str) -
 @pytest.mark.parametrize("caller", CALLERS)
 @pytest.mark.parametrize("name", BUSES)
 def test_a_method_takes_what_its_request_takes(name: str, caller: str) -> None:
-    made, address = stations_of(name), protocol(name).address_name
+    made, address = bus_of(name), protocol(name).address_name
     for command in protocol(name).commands:
         method = getattr(getattr(made, caller), command.name, None)
         if method is None:
@@ -111,7 +112,7 @@ def test_a_method_takes_what_its_request_takes(name: str, caller: str) -> None:
 
 
 def test_docstrings_say_unit_range_section_and_broadcast() -> None:
-    made = stations_of("qlink")
+    made = bus_of("qlink")
     text = made.MasterCalls.node_setup.__doc__
     assert "section" in text
     assert "0.0..25.5 s in steps of 1/10" in text
@@ -125,7 +126,7 @@ def test_docstrings_say_unit_range_section_and_broadcast() -> None:
 
 
 def test_nobody_answers_a_broadcast() -> None:
-    modbus, codec = stations_of("modbus_rtu"), module("modbus_rtu")
+    modbus, codec = bus_of("modbus_rtu"), module("modbus_rtu")
     for caller in ("MasterCalls", "AsyncMasterCalls"):
         calls, notes = recorder(getattr(modbus, caller), 1)
         assert result(calls.write_single_register(0, number=4, value=5)) is None
@@ -136,7 +137,7 @@ def test_nobody_answers_a_broadcast() -> None:
 
 @pytest.mark.parametrize("caller", CALLERS)
 def test_a_runtime_has_to_say_how_requests_are_sent(caller: str) -> None:
-    calls = getattr(stations_of("qlink"), caller)()
+    calls = getattr(bus_of("qlink"), caller)()
     codec = module("qlink")
     with pytest.raises(NotImplementedError):
         result(calls.ask(codec.NodeInfoRequest(node=1), codec.NodeInfoResponse))
@@ -164,7 +165,7 @@ def host_recorder(caller: str) -> tuple[Any, list[tuple[Any, ...]]]:
         return note(*given)
 
     used = note_later if caller.startswith("Async") else note
-    base = getattr(stations_of("mc1231a"), caller)
+    base = getattr(bus_of("mc1231a"), caller)
     return type("Recorder", (base,), {"ask": staticmethod(used), "number": 2})(), notes
 
 
@@ -189,7 +190,7 @@ def test_every_command_of_a_host_can_be_called(name: str, caller: str) -> None:
 
 @pytest.mark.parametrize("caller", HOST_CALLERS)
 def test_a_host_has_to_say_how_packets_are_sent(caller: str) -> None:
-    calls = getattr(stations_of("mc1231a"), caller)()
+    calls = getattr(bus_of("mc1231a"), caller)()
     codec = module("mc1231a")
     axis = () if "Axis" in caller else (2,)
     with pytest.raises(NotImplementedError):
@@ -199,7 +200,7 @@ def test_a_host_has_to_say_how_packets_are_sent(caller: str) -> None:
 
 
 def test_docstrings_of_a_host_say_what_the_schema_says() -> None:
-    calls = stations_of("mc1231a").HostCalls
+    calls = bus_of("mc1231a").HostCalls
     assert "Double buffered." in calls.set_pos.__doc__
     assert "axis: Axis that it acts on, counted from 1." in calls.set_pos.__doc__
     assert "Axis by mask." in calls.multi_update.__doc__
@@ -207,7 +208,7 @@ def test_docstrings_of_a_host_say_what_the_schema_says() -> None:
     assert "Axis unknown." in calls.lmts_on.__doc__
     assert "UNCONFIRMED" in calls.set_kvff.__doc__
     assert "0.0..65535.99998474121 counts/sample in steps of 1/65536" in calls.set_vel.__doc__
-    assert "number: Number of the axis" in stations_of("mc1231a").AxisCalls.__doc__
+    assert "number: Number of the axis" in bus_of("mc1231a").AxisCalls.__doc__
 
 
 HOST_SCHEMA = """
@@ -225,7 +226,7 @@ COMMANDS
 
 
 def small_host(commands: str) -> tuple[Any, Any]:
-    """Codec and stations of a small protocol of a host."""
+    """Codec and bus module of a small protocol of a host."""
     model, faults = loads(HOST_SCHEMA.replace("COMMANDS", commands), "small_host.yaml")
     assert model, faults
     codec = load(model)
@@ -261,7 +262,7 @@ def test_a_field_may_be_called_axis_too_and_not_everything_is_answered() -> None
 
 @pytest.mark.parametrize("name", BUSES)
 def test_what_is_not_overridden_is_not_answered(name: str) -> None:
-    slave = stations_of(name).SlaveHandlers(5)
+    slave = bus_of(name).SlaveHandlers(5)
     assert slave.number == 5
     for message in protocol(name).messages:
         assert slave.handle(build(name, message), 1.0) is None
@@ -279,7 +280,7 @@ def test_each_request_comes_to_the_method_of_its_command(name: str) -> None:
         return handle
 
     commands = protocol(name).commands
-    base = stations_of(name).SlaveHandlers
+    base = bus_of(name).SlaveHandlers
     slave = type("Slave", (base,), {command.name: handler(command.name) for command in commands})(1)
     for command in commands:
         request = build(name, command.request)
@@ -289,7 +290,7 @@ def test_each_request_comes_to_the_method_of_its_command(name: str) -> None:
 
 def test_one_handler_is_replaced_at_a_time() -> None:
     qlink = module("qlink")
-    base = stations_of("qlink").SlaveHandlers
+    base = bus_of("qlink").SlaveHandlers
 
     class Echoing(base):  # type: ignore[misc, valid-type]
         def loop_back(self, request: Any, now: float) -> Any:
@@ -313,8 +314,8 @@ def test_one_handler_is_replaced_at_a_time() -> None:
 
 
 def test_rings_have_none_and_neither_has_the_far_side_of_a_host() -> None:
-    assert stations.generate(protocol("trio"), Options()) == {}
-    assert stations.generate(protocol("mc1231a"), Options(role="slave")) == {}
+    assert bus.generate(protocol("trio"), Options()) == {}
+    assert bus.generate(protocol("mc1231a"), Options(role="slave")) == {}
 
 
 def test_a_side_and_commands_can_be_left_out() -> None:
@@ -329,7 +330,7 @@ def test_a_side_and_commands_can_be_left_out() -> None:
     small = public(only=("motion", "node_info.response"))
     assert hasattr(small.MasterCalls, "motion")
     assert not hasattr(small.MasterCalls, "node_info")
-    assert stations.generate(model, Options(only=("node_info.response",))) == {}
+    assert bus.generate(model, Options(only=("node_info.response",))) == {}
 
 
 SMALL = """
@@ -349,7 +350,7 @@ COMMANDS
 
 
 def small(commands: str, *, addressed: bool) -> tuple[Any, Any]:
-    """Codec and stations of a small protocol."""
+    """Codec and bus module of a small protocol."""
     text = SMALL.replace("NODE", "node: {role: address, type: u8}" if addressed else "")
     text = text.replace(
         "BUS",
@@ -391,12 +392,12 @@ def test_commands_may_have_the_names_of_what_a_class_has_itself() -> None:
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with codecs and stations of every bus, and a program that uses them."""
+    """A folder with codecs and bus modules of every bus, and a program that uses them."""
     folder = tmp_path_factory.mktemp("generated")
-    outputs = {**shared(), **stations.shared()}
+    outputs: dict[str, str] = {}
     for name in (*BUSES, "mc1231a"):
-        outputs.update(generate_codec(protocol(name), Options()))
-        outputs.update(stations.generate(protocol(name), Options()))
+        outputs.update(generate_codec(protocol(name), Options(package=OWN)))
+        outputs.update(bus.generate(protocol(name), Options(package=OWN)))
     for path, text in outputs.items():
         file = folder / path
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -410,10 +411,12 @@ from __future__ import annotations
 
 from typing import TypeVar, assert_type
 
-from qlinkgen_codecs import mc1231a as chip_codec
-from qlinkgen_codecs import modbus_rtu as modbus_codec
-from qlinkgen_codecs import qlink as codec
-from qlinkgen_stations import mc1231a, modbus_rtu, qlink
+from wire import mc1231a as chip_codec
+from wire import mc1231a_bus as mc1231a
+from wire import modbus_rtu as modbus_codec
+from wire import modbus_rtu_bus as modbus_rtu
+from wire import qlink as codec
+from wire import qlink_bus as qlink
 
 R = TypeVar("R", bound=codec.Message)
 
@@ -512,29 +515,29 @@ def run(*command: str, cwd: Path) -> str:
 def test_mypy_strict_is_content(written: Path) -> None:
     config = written / "mypy.ini"
     config.write_text("[mypy]\nstrict = True\nwarn_unreachable = True\n")
-    run(sys.executable, "-m", "mypy", "--config-file", str(config), "-p", "qlinkgen_stations", cwd=written)
+    run(sys.executable, "-m", "mypy", "--config-file", str(config), "-p", "wire", cwd=written)
     run(sys.executable, "-m", "mypy", "--config-file", str(config), "program.py", cwd=written)
 
 
 def test_pyright_strict_is_content(written: Path) -> None:
     pytest.importorskip("pyright", reason="needs pyright (pip install pyright[nodejs])")
     (written / "pyrightconfig.json").write_text(
-        '{"typeCheckingMode": "strict", "include": ["qlinkgen_stations", "program.py"]}'
+        '{"typeCheckingMode": "strict", "include": ["wire", "program.py"]}'
     )
     run(sys.executable, "-m", "pyright", "--pythonversion", "3.11", cwd=written)
 
 
 def test_a_module_needs_its_codecs_and_nothing_else(written: Path) -> None:
-    code = "old = set(sys.modules); import qlinkgen_stations.qlink; print(*set(sys.modules) - old)"
+    code = "old = set(sys.modules); import wire.qlink_bus; print(*set(sys.modules) - old)"
     begin = "import sys; sys.path.insert(0, '.'); "
     new = set(run(sys.executable, "-S", "-E", "-c", begin + code, cwd=written).split())
-    rest = {each for each in new if not each.startswith(("qlinkgen_codecs", "qlinkgen_stations"))}
+    rest = {each for each in new if not each.startswith("wire")}
     assert rest <= {"__future__", "struct", "_struct", "binascii"}
 
 
 @pytest.mark.parametrize("name", [*BUSES, "mc1231a"])
 def test_lines_are_not_too_long_and_nothing_trails(written: Path, name: str) -> None:
-    text = (written / f"qlinkgen_stations/{name}.py").read_text("utf-8")
+    text = (written / f"wire/{name}_bus.py").read_text("utf-8")
     for number, line in enumerate(text.splitlines(), 1):
         assert line == line.rstrip(), f"{name}:{number}"
         assert len(line) <= 110, f"{name}:{number}: {line}"
@@ -543,8 +546,8 @@ def test_lines_are_not_too_long_and_nothing_trails(written: Path, name: str) -> 
 
 def test_the_text_does_not_depend_on_the_hash_seed() -> None:
     code = (
-        "from tests.python.test_stations import *; import hashlib;"
-        "texts = [stations.render(protocol(n), Options()) for n in BUSES];"
+        "from tests.python.test_bus import *; import hashlib;"
+        "texts = [bus.render(protocol(n), Options()) for n in BUSES];"
         "print(hashlib.sha256(''.join(texts).encode()).hexdigest())"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -1,0 +1,339 @@
+"""Bus modules: a typed method for each command, for what a master or host asks and for what a slave does.
+
+The module `X_bus` is written beside the codec `X`, whose classes it takes and hands out. A runtime supplies
+how a request is sent; the module knows no port, clock or thread.
+"""
+
+from __future__ import annotations
+
+import keyword
+import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from qlinkgen.backends import python_text
+from qlinkgen.backends.base import Options, Outputs, banner
+from qlinkgen.backends.python import docstrings, package, values
+from qlinkgen.backends.python.layout import WIDTH, wrapped
+from qlinkgen.backends.python.module import templates
+from qlinkgen.backends.python.names import attribute, by_kind, class_name
+from qlinkgen.backends.python.place import Place, place_of
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.texts import one_line
+from qlinkgen.model.transaction import Command
+from qlinkgen.model.types import Enum
+from qlinkgen.plan import MessagePlan, Plan, plan_of
+from qlinkgen.plan.payload import MemberValue, ValueStep
+
+__all__ = ["generate", "render"]
+
+#: Names in the classes that no command can have: what they have themselves, and types of arguments.
+_TAKEN = ("ask", "tell", "handle", "number", "axis", "bytes", "list", "str")
+#: Attribute of the commands of a host that says on which axis they act, and those of its values for which the
+#: axis has to be chosen: where it is not known, a host is on the safe side with the one that it means.
+_AXIS = "axis"
+_CHOSEN = ("current", "unknown")
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method, ready to be placed: every entry is finished text."""
+
+    head: list[str]
+    doc: list[str]
+    body: list[str]
+
+
+@dataclass(frozen=True)
+class Caller:
+    """A class whose methods send requests."""
+
+    name: str
+    doc: list[str]
+    prefix: str
+    #: Its objects stand for one address or axis, and have its number.
+    one: bool
+    methods: list[Method]
+    #: Name of the argument that chooses an axis, "" where there is none.
+    axis: str = ""
+
+    @property
+    def ask(self) -> list[str]:
+        """The head of the method that sends a request for an axis."""
+        arguments = f"self, request: Message, response: type[_R], {self.axis}: int | None = None"
+        line = f"{self.prefix}def ask({arguments}) -> _R:"
+        return (
+            [line] if len(line) + 4 <= WIDTH else [f"{self.prefix}def ask(", f"    {arguments}", ") -> _R:"]
+        )
+
+
+def generate(protocol: Protocol, options: Options) -> Outputs:
+    """The module of a protocol and the package around it, by path; nothing if there are no commands."""
+    text = render(plan_of(protocol, options))
+    return {f"{options.package}/{protocol.name}_bus.py": text, **package(options)} if text else {}
+
+
+def render(plan: Plan) -> str:
+    """The text of a protocol's module, "" where there is nothing to say."""
+    bus = plan.protocol.bus
+    if bus.kind == "ring" or (bus.kind == "host" and plan.role == "slave"):
+        return ""
+    calls = [Transaction.of(plan, command) for command in plan.commands]
+    kept = [call for call in calls if call is not None]
+    return BusModule(plan, kept).text() if kept else ""
+
+
+@dataclass(frozen=True)
+class Transaction:
+    """A command whose messages are all in the module of the codec."""
+
+    command: Command
+    request: MessagePlan
+    response: MessagePlan | None
+
+    @classmethod
+    def of(cls, plan: Plan, command: Command) -> Transaction | None:
+        """The transaction of a command, None where its response is left out."""
+        request = plan.by_name[command.request.name]
+        if command.response is None:
+            return cls(command, request, None)
+        response = plan.by_name.get(command.response.name)
+        return cls(command, request, response) if response else None
+
+    @property
+    def name(self) -> str:
+        """Name of the method: the command's own, or with an underscore where that means something else."""
+        name = self.command.name
+        return f"{name}_" if name in _TAKEN or keyword.iskeyword(name) else name
+
+
+class BusModule:
+    """Collects what the template places."""
+
+    def __init__(self, plan: Plan, transactions: Sequence[Transaction]) -> None:
+        """``transactions`` are those that have all their messages in the module of the codec."""
+        self._plan = plan
+        self._protocol = plan.protocol
+        self._transactions = transactions
+        self._place: Place = place_of(plan)
+        self._classes = {"Message"}
+
+    def text(self) -> str:
+        """The module's text."""
+        host = self._protocol.bus.kind == "host"
+        callers = self._callers(host=host) if self._plan.role != "slave" else []
+        handlers = self._handlers() if self._plan.role != "master" and not host else []
+        asker = "host" if host else "master"
+        parts = {f"calls of a {asker}": callers, "handlers of a slave": handlers}
+        title = " and ".join(title for title, part in parts.items() if part)
+        first, *others = banner(self._protocol)
+        head = one_line(f"{first}: {title}, a method for each command.")
+        lines = [line for other in others for line in textwrap.wrap(one_line(other), WIDTH)]
+        context = {
+            "doc": python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines]),
+            "table": [f'{self._class(t.request)}: "{t.name}"' for t in self._transactions],
+            "imports": wrapped(
+                f"from .{self._protocol.name} import (", sorted(self._classes, key=by_kind), ")", 0
+            ),
+            "decimals": "Decimal" in self._place.used,
+            "public": sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),
+            "callers": callers,
+            "handlers": handlers,
+            "nodes": f", {self._nodes()}" if self._nodes() else "",
+        }
+        template = templates().get_template("templates/bus.j2")
+        return template.render(context).rstrip("\n") + "\n"
+
+    def _class(self, message: MessagePlan) -> str:
+        """The class of a message, which the module has to import."""
+        name = class_name(message)
+        self._classes.add(name)
+        return name
+
+    # The side that asks
+
+    def _taken(self, transaction: Transaction) -> list[str]:
+        """Parameters for the values of a request."""
+        settable = transaction.request.payload.settable
+        for each in settable:
+            if isinstance(each, ValueStep | MemberValue) and isinstance(each.number.meaning, Enum):
+                self._classes.add(self._place.classes[each.number.meaning.name])
+        return [values.argument(each, self._place) for each in settable]
+
+    @staticmethod
+    def _given(transaction: Transaction) -> list[str]:
+        """Arguments that hand the parameters on."""
+        names = (attribute(each.name) for each in transaction.request.payload.settable)
+        return [f"{name}={name}" for name in names]
+
+    def _answer(self, transaction: Transaction, *, surely: bool = False) -> str:
+        """Type of the value that a method returns."""
+        if transaction.response is None:
+            return "None"
+        name = self._class(transaction.response)
+        return name if surely else f"{name} | None"
+
+    def _callers(self, *, host: bool) -> list[Caller]:
+        found = []
+        for asynchronous in (False, True):
+            if host:
+                found += self._host_callers(asynchronous=asynchronous)
+                continue
+            found.append(self._caller("MasterCalls", asynchronous=asynchronous, node=False))
+            if self._place.address:
+                found.append(self._caller("NodeCalls", asynchronous=asynchronous, node=True))
+        return found
+
+    def _caller(self, name: str, *, asynchronous: bool, node: bool) -> Caller:
+        what = "calls to one node" if node else "calls of a master"
+        more = ["", "Attributes:", f"    number: Address of the node, {self._nodes()}."] if node else []
+        doc = _caller_doc(name, what, more, asynchronous=asynchronous)
+        asked = [each for each in self._transactions if not (node and each.command.addressing == "broadcast")]
+        methods = [self._method(each, asynchronous=asynchronous, node=node) for each in asked]
+        return _make_caller(name, doc, methods, asynchronous=asynchronous, one=node)
+
+    def _method(self, call: Transaction, *, asynchronous: bool, node: bool) -> Method:
+        command = call.command
+        address = "" if node or command.addressing in ("broadcast", "none") else self._place.address
+        answer = self._answer(call, surely=node or command.addressing != "either")
+        head = self._head(call, address, answer, asynchronous=asynchronous)
+        entry = f"{address}: Address of the node, {self._nodes()}{self._all(command)}." if address else ""
+        doc = _summary(command) if asynchronous else [*_summary(command), *self._arguments(call, entry)]
+        body = self._body(call, "await " if asynchronous else "", address=address, node=node)
+        return Method(head, python_text.docstring(doc), body)
+
+    def _head(self, call: Transaction, where: str, answer: str, *, asynchronous: bool) -> list[str]:
+        """The line that begins a method; ``where`` is the argument for an address or axis."""
+        arguments = ["self", *([f"{where}: int"] if where else [])]
+        taken = self._taken(call)
+        arguments += ["*", *taken] if taken else []
+        prefix = "async " if asynchronous else ""
+        return wrapped(f"{prefix}def {call.name}(", arguments, f") -> {answer}:", 4)
+
+    def _body(self, call: Transaction, wait: str, *, address: str, node: bool) -> list[str]:
+        addressed = [f"{self._place.address}={'self.number' if node else address}"] if address or node else []
+        request = wrapped(
+            f"_request = {self._class(call.request)}(", [*addressed, *self._given(call)], ")", 8
+        )
+        if call.response is None:
+            return [*request, f"{wait}self.tell(_request)"]
+        ask = f"return {wait}self.ask(_request, {self._class(call.response)})"
+        if call.command.addressing != "either" or node:
+            return [*request, ask]
+        return [
+            *request,
+            f"if {address} == {self._protocol.bus.broadcast}:",
+            f"    {wait}self.tell(_request)",
+            "    return None",
+            ask,
+        ]
+
+    def _arguments(self, call: Transaction, first: str) -> list[str]:
+        """The section on arguments; ``first`` is about the one that is not a field."""
+        entries = [first] if first else []
+        pairs = zip(call.request.message.values, call.request.payload.settable, strict=True)
+        entries += [f"{attribute(v.name)}: {values.description(v, each, self._place)}" for v, each in pairs]
+        lines = [line for entry in entries for line in docstrings.item(entry, WIDTH - 8)]
+        return ["", "Args:", *lines] if lines else []
+
+    def _all(self, command: Command) -> str:
+        """What the broadcast address means to a command."""
+        everybody = self._protocol.bus.broadcast
+        if command.addressing == "answered_broadcast":
+            return f"; or {everybody} for a node that is alone on the line, whatever its number"
+        if command.addressing != "either":
+            return ""
+        silent = ": there is no reply, None is returned" if command.response else ""
+        return f"; or {everybody} for all of them{silent}"
+
+    def _nodes(self) -> str:
+        nodes = self._protocol.bus.nodes
+        return f"{nodes[0]}..{nodes[1]}" if nodes else ""
+
+    # The host of a device, which may have axes
+
+    def _host_callers(self, *, asynchronous: bool) -> list[Caller]:
+        on_axis = [each for each in self._transactions if _axis_of(each.command) in _CHOSEN]
+        fields = {each.name for call in on_axis for each in call.request.payload.settable}
+        axis = ("axis_" if "axis" in fields else "axis") if on_axis else ""
+        host = self._host_caller("HostCalls", self._transactions, axis, asynchronous=asynchronous, one=False)
+        if not axis:
+            return [host]
+        return [host, self._host_caller("AxisCalls", on_axis, "", asynchronous=asynchronous, one=True)]
+
+    def _host_caller(
+        self, name: str, calls: Sequence[Transaction], axis: str, *, asynchronous: bool, one: bool
+    ) -> Caller:
+        what = "calls to one axis" if one else "calls of a host"
+        more = ["", "Attributes:", "    number: Number of the axis, counted from 1."] if one else []
+        doc = _caller_doc(name, what, more, asynchronous=asynchronous)
+        methods = [
+            self._host_method(
+                each, axis if _axis_of(each.command) in _CHOSEN else "", asynchronous=asynchronous
+            )
+            for each in calls
+        ]
+        return _make_caller(name, doc, methods, asynchronous=asynchronous, one=one, axis=axis)
+
+    def _host_method(self, call: Transaction, axis: str, *, asynchronous: bool) -> Method:
+        head = self._head(call, axis, self._answer(call, surely=True), asynchronous=asynchronous)
+        doc = [*_summary(call.command), *_attributes(call.command)]
+        if not asynchronous:
+            entry = f"{axis}: Axis that it acts on, counted from 1." if axis else ""
+            doc += self._arguments(call, entry)
+        wait, chosen = "await " if asynchronous else "", f", {axis}" if axis else ""
+        request = wrapped(f"_request = {self._class(call.request)}(", self._given(call), ")", 8)
+        ask = f"{wait}self.tell(_request{chosen})"
+        if call.response is not None:
+            ask = f"return {wait}self.ask(_request, {self._class(call.response)}{chosen})"
+        return Method(head, python_text.docstring(doc), [*request, ask])
+
+    # The slave's side
+
+    def _handlers(self) -> list[Method]:
+        return [self._handler(call) for call in self._transactions]
+
+    def _handler(self, call: Transaction) -> Method:
+        command = call.command
+        arguments = ["self", f"request: {self._class(call.request)}", "now: float"]
+        head = wrapped(f"def {call.name}(", arguments, f") -> {self._answer(call)}:", 4)
+        doc = _summary(command)
+        if command.echoes:
+            doc += ["", f"The response repeats {' and '.join(command.echoes)} of the request."]
+        if command.response and command.addressing == "either":
+            doc += ["", "A broadcast is not answered: return None then."]
+        return Method(head, python_text.docstring(doc), [])
+
+
+def _summary(command: Command) -> list[str]:
+    text = docstrings.opening(command.doc or command.name, command.section)
+    unconfirmed: Iterable[str] = () if command.confirmed else ("", docstrings.UNCONFIRMED)
+    return [*docstrings.paragraph(text, WIDTH - 12), *unconfirmed]
+
+
+def _axis_of(command: Command) -> str:
+    """On which axis a command acts, "" where its protocol knows no axes."""
+    return str(command.attributes.get(_AXIS, ""))
+
+
+def _attributes(command: Command) -> list[str]:
+    """What a protocol alone says of a command, in a line; what does not apply is left out."""
+    told = {(_AXIS, "current")}  # the method of an axis, or the argument for one, says it
+    said = [pair for pair in command.attributes.items() if pair[1] is not False and pair not in told]
+    words = [(key if value is True else f"{key} {value}").replace("_", " ") for key, value in said]
+    return ["", *textwrap.wrap(one_line(f"{', '.join(words).capitalize()}."), WIDTH - 8)] if words else []
+
+
+def _caller_doc(name: str, what: str, more: Sequence[str], *, asynchronous: bool) -> list[str]:
+    doc = [f"The {what}, a method for each command{': coroutines' if asynchronous else ''}.", ""]
+    if asynchronous:
+        doc += [f"The arguments are those of {name}.", ""]
+    supplied = "A subclass supplies `ask` and `tell`; what they raise, every method raises."
+    return python_text.docstring([*doc, *textwrap.wrap(supplied, WIDTH - 8), *more])
+
+
+def _make_caller(
+    name: str, doc: list[str], methods: list[Method], *, asynchronous: bool, one: bool, axis: str = ""
+) -> Caller:
+    prefix = "async " if asynchronous else ""
+    return Caller(f"Async{name}" if asynchronous else name, doc, prefix, one, methods, axis)
