@@ -18,9 +18,10 @@ from qlinkgen.cli.wire_options import (
     open_line,
     qlink_node,
     seconds,
-    select_crc,
     slack_option,
+    with_crc,
 )
+from qlinkgen.codecs import qlink
 from qlinkgen.errors import HexFileError, PortLost
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.protocols.qlink import Bus, LoadProgress
@@ -73,9 +74,9 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen load /dev/ttyUSB0 --node 3 program.hex
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     text = _text(file)
-    select_crc(crc)
+    with_crc(qlink, crc)
     with open_line(port, baud or BAUD) as opened:
-        bus = Bus(opened, attempts=attempts, echo=echo or "auto", health=None, slack=slack)
+        bus = Bus(opened, attempts=attempts, echo=echo or "auto", health=None, slack=slack, crc=crc)
         with _told(node, len(text)) as show:
             report = bus.load(node, text, patience=patience, progress=show)
     pieces, repeats = counted(report.pieces, "piece"), counted(report.repeats, "repeat")

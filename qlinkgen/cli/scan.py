@@ -18,9 +18,10 @@ from qlinkgen.cli.wire_options import (
     echo_option,
     open_line,
     parse_nodes,
-    select_crc,
     slack_option,
+    with_crc,
 )
+from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink import PositionType
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Sent
@@ -59,9 +60,9 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen scan /dev/ttyUSB0 --nodes 1-4 --json
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     numbers = parse_nodes(nodes, NODES[0], NODES[-1])
-    select_crc(crc)
+    with_crc(qlink, crc)
     with open_line(port, baud or BAUD) as opened:
-        bus = Bus(opened, echo=echo or "auto", health=None, slack=slack)
+        bus = Bus(opened, echo=echo or "auto", health=None, slack=slack, crc=crc)
         with _progress() as show:
             bus.on_event = lambda event: show(event.node) if isinstance(event, Sent) else None
             found = bus.scan(numbers)

@@ -8,7 +8,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import load_protocol
 from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import run_bus, say
-from qlinkgen.cli.wire_options import counted, parse_nodes, select_crc
+from qlinkgen.cli.wire_options import counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.slave import SlaveEngine, Station
 from qlinkgen.protocols.qlink.facts import NODES
@@ -49,8 +49,7 @@ def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, lis
     if is_shipped(name, "qlink"):
         from qlinkgen.codecs import qlink  # noqa: PLC0415  # other protocols do without
 
-        select_crc(crc)
-        return qlink, _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
+        return with_crc(qlink, crc), _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
     from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does without the compiler
     from qlinkgen.sim.generic import GenericNode  # noqa: PLC0415
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.simulating import run_bus, say
-from qlinkgen.cli.wire_options import counted, select_crc
+from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.face import Node, engine_of
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
@@ -23,10 +23,10 @@ def simulate_ring(
 
     if plan is not None and plan.to != "both":
         raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; leave out to={plan.to}")
-    select_crc(crc, trio)
+    codec = with_crc(trio, crc)
     given = RING if ring is None else ring
     try:
-        bus = ring_bus(given, link=link, baud=baud, faults=plan)
+        bus = ring_bus(given, link=link, baud=baud, faults=plan, codec=codec)
     except SimulationError as error:
         raise Failure(f"--ring {given}: {error}") from None
     run_bus(bus, link, f"{counted(len(bus.nodes), 'node')} of trio")

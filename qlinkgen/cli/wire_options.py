@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import ModuleType
 from typing import Any, NamedTuple, cast
 
 import click
 
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.kinds import is_shipped
+from qlinkgen.link.codec import Codec
 from qlinkgen.link.echo import PROBE, EchoMode
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.model.frame import DelimitedFrame
@@ -148,16 +150,10 @@ def matching(name: str) -> Mapping[str, Accepts] | None:
     return ACCEPTS
 
 
-def select_crc(crc: str | None, codec: Any = None) -> None:
-    """Make a codec that ships, Q.link's unless given, use another checksum, if one is wanted."""
-    if crc is None:
-        return
-    if codec is None:
-        from qlinkgen.codecs import qlink  # noqa: PLC0415  # not every command on a port is for Q.link
-
-        codec = qlink
+def with_crc(codec: ModuleType, crc: str | None) -> Codec:
+    """A codec that ships, or the same with another CRC if one is wanted."""
     try:
-        codec.select_crc(crc)
+        return cast(Codec, codec if crc is None else codec.Codec(crc))
     except ValueError as error:
         raise Failure(f"--set crc={crc}: {error}") from None
 

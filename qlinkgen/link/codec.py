@@ -20,8 +20,8 @@ class Message(Protocol):
         ...
 
 
-class Codec(Protocol):
-    """A generated module, such as `qlinkgen.codecs.qlink`."""
+class Module(Protocol):
+    """A generated module of any protocol, such as `qlinkgen.codecs.mc1231a`."""
 
     @property
     def COMMANDS(self) -> Mapping[str, Any]:  # noqa: N802  # as the generated module has it
@@ -41,6 +41,14 @@ class Codec(Protocol):
     @property
     def DecodeError(self) -> type[Exception]:  # noqa: N802
         """What a decoder raises."""
+        ...
+
+
+class Codec(Module, Protocol):
+    """A generated module whose messages have frames of their own, or its `Codec` with another CRC."""
+
+    def encode(self, message: Any) -> bytes:
+        """Return the whole frame of a message as it is on the wire."""
         ...
 
 

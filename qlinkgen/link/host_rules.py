@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from qlinkgen.link.codec import Codec
+from qlinkgen.link.codec import Module
 from qlinkgen.link.host_timing import HostTiming
 
 
@@ -22,7 +22,7 @@ class State:
     PROVING = "proving"
 
 
-class HostCodec(Codec, Protocol):
+class HostCodec(Module, Protocol):
     """A generated module of a protocol of the host kind, such as `qlinkgen.codecs.mc1231a`."""
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Self
 
-from qlinkgen.link.codec import Codec
+from qlinkgen.link.codec import Module
 from qlinkgen.link.timing import QUIET_BYTES, Timing
 
 #: Times that getting back in step is tried in one transaction ...
@@ -31,7 +31,7 @@ class HostTiming(Timing):
 
     @classmethod
     def for_host(
-        cls, codec: Codec, *, baud: int, host_slack: float, paced: bool, attempts: int, forgets: float
+        cls, codec: Module, *, baud: int, host_slack: float, paced: bool, attempts: int, forgets: float
     ) -> Self:
         """Make the timing of a protocol; see `Timing.of`."""
         if not 0 <= forgets < float("inf"):

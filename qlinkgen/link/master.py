@@ -169,7 +169,7 @@ class MasterEngine:
         if plan is None:
             raise TypeError(f"{type(request).__name__} was given; a request of this protocol is needed")
         tries = plan.tries if attempts is None else self._tries_of(plan, attempts)
-        self._frame = request.to_frame()
+        self._frame = self.codec.encode(request)
         if self._attempt:
             self._earlier = self._plan, self._node
         self._request = request
@@ -365,7 +365,7 @@ class MasterEngine:
             self._damaged(event, now)
 
     def _is_own(self, event: Any) -> bool:
-        return self._echo.is_own(event.to_frame() if hasattr(event, "to_frame") else event.raw)
+        return self._echo.is_own(self.codec.encode(event) if hasattr(event, "to_frame") else event.raw)
 
     def _answers(self, plan: Plan, response: Any) -> bool:
         """Whether a response of the right type answers the request."""
@@ -385,7 +385,7 @@ class MasterEngine:
         asked = self._attempt > 0 and self._may_answer(self._plan, self._node, message)
         late = asked or (self._earlier is not None and self._may_answer(*self._earlier, message))
         if asked and self._state is WAITING:
-            self._wrong.append((message.NAME, message.to_frame()))
+            self._wrong.append((message.NAME, self.codec.encode(message)))
         count.strays += 1
         count.late += late
         self.events.append(Stray(now, message, late))
@@ -419,7 +419,7 @@ class MasterEngine:
             self._echo.forget()
         if self._attempt > 1:
             self._distrust(now)  # the answer to an earlier attempt may be on its way
-        if self._paced and response.to_frame()[-1:] != self._received[-1:]:
+        if self._paced and self.codec.encode(response)[-1:] != self._received[-1:]:
             self._free_at = now + self._byte_time  # the byte that is inserted behind a checksum's end
         if self.health.answered(self._node):
             self._tell_health(now)

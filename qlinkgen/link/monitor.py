@@ -174,7 +174,7 @@ class Monitor:
             return
         pending.answered = pending.reported = True
         delay = now - pending.at
-        self.heard.append(Replied(now, pending.request, response, delay, late, response.to_frame()))
+        self.heard.append(Replied(now, pending.request, response, delay, late, self._codec.encode(response)))
 
     def _asked(self, request: Any, now: float) -> None:
         command = self._commands.get(type(request))
@@ -188,7 +188,7 @@ class Monitor:
         nobody = not addresses_that_answer(command, request, self._codec.BUS)
         self._pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
         self._pending.answered = self._pending.reported = nobody
-        self.heard.append(Asked(now, request, repeat, request.to_frame()))
+        self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))
 
 
 def _same_frames(asking: list[Any], answering: list[Any]) -> Iterator[tuple[Any, Any]]:

@@ -92,6 +92,10 @@ class RingCodec(Protocol):
         """What `decode` raises."""
         ...
 
+    def encode(self, message: Any) -> bytes:
+        """Return the whole frame of a message as it is on the wire."""
+        ...
+
     @property
     def decode(self) -> Callable[[bytes], Any]:
         """Return the message of a frame."""
@@ -298,7 +302,7 @@ class RingNode:
         Raises:
             EncodeError: of the generated module; nothing was put anywhere.
         """
-        frame = message.to_frame()
+        frame = self.codec.encode(message)
         if self._queued + len(frame) > self._room:
             return False
         if not self._queue:

@@ -86,6 +86,7 @@ class SlaveEngine:
             )
         self.station = station
         self.counters = SlaveCounters()
+        self._encode = codec.encode
         self._broadcast = codec.BUS.broadcast
         self._answering = {
             command.request: command.addressing == "answered_broadcast" for command in codec.COMMANDS.values()
@@ -112,7 +113,7 @@ class SlaveEngine:
                 damaged[event.kind] = damaged.get(event.kind, 0) + 1
 
     def _heard(self, request: Any, now: float) -> None:
-        if self._echo.active and self._echo.is_own(request.to_frame()):
+        if self._echo.active and self._echo.is_own(self._encode(request)):
             return
         if self._answer:  # the asker has given up on it, or there would be silence
             self.counters.replaced += 1
@@ -130,8 +131,8 @@ class SlaveEngine:
             self.counters.foreign += 1
             return
         if response is not None:
-            self._answer = response.to_frame()
-            inserted = request.to_frame()[-1:] != self._last
+            self._answer = self._encode(response)
+            inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
 
     def bytes_to_send(self, now: float) -> bytes:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from qlinkgen.link.codec import Codec
+from qlinkgen.link.codec import Module
 from qlinkgen.link.echo import PROBE
 
 #: A receiver needs as long to know that a line is quiet; three byte times are also Q.link's response time.
@@ -56,7 +56,7 @@ class Timing:
     @classmethod
     def of(
         cls,
-        codec: Codec,
+        codec: Module,
         *,
         host_slack: float,
         baud: int | None = None,

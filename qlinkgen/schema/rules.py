@@ -32,8 +32,8 @@ _ALL = (
     Rule(
         "control-character",
         "Texts hold no control characters, line separators or marks that reorder text.",
-        "They are commands to a terminal, end lines of generated code, or make a reader see something else than "
-        "a compiler. Line breaks and tabs are allowed.",
+        "They are commands to a terminal, end lines of generated code, or make a reader see something else "
+        "than a compiler. Line breaks and tabs are allowed.",
     ),
     Rule(
         "file-unreadable",

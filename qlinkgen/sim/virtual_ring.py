@@ -25,7 +25,7 @@ T = TypeVar("T")
 KINDS: dict[str, Callable[..., Node]] = {
     "coordinator": CoordinatorNode,
     "keypad": KeypadNode,
-    "passive": lambda **options: RingNode(trio, **options),
+    "passive": lambda **options: RingNode(options.pop("codec", trio), **options),
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from typing import Any, Protocol
 
-from qlinkgen.link.codec import Codec
+from qlinkgen.link.codec import Module
 from qlinkgen.link.events import Event
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Reply
@@ -30,7 +30,7 @@ def host_slack(port: Port) -> float:
     return woken + (ASSUMED_LATENCY if latency is None else latency)
 
 
-def timing_of(codec: Codec, port: Port, *, slack: float | None = None, attempts: int = 3) -> Timing:
+def timing_of(codec: Module, port: Port, *, slack: float | None = None, attempts: int = 3) -> Timing:
     """Make the timing of a protocol on a port; `slack` replaces what the port says of itself."""
     return Timing.of(
         codec,

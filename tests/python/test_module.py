@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from qlinkgen_codecs import mc1231a, qlink
+from qlinkgen.codecs import mc1231a, qlink
 
 from qlinkgen.backends.base import OWN, Options
 from qlinkgen.backends.python import generate, load

@@ -93,25 +93,32 @@ def test_an_unknown_number_of_an_enum_is_kept() -> None:
 
 
 @pytest.mark.parametrize("algorithm", catalogue(16), ids=lambda each: each.name)
-def test_any_16_bit_algorithm_can_be_selected(algorithm: Any) -> None:
+def test_a_codec_has_any_16_bit_algorithm(algorithm: Any) -> None:
     qlink = module("qlink")
     message = qlink.MotionRequest(node=3, counter=0xA5, segments=[0xA5A5, 1])
     before = message.to_frame()
-    assert qlink.select_crc(algorithm.name.upper()) == "crc-16/ibm-3740"
-    try:
-        wire = message.to_frame()
-        frame = wire[2:].replace(b"\xa5\x00", b"\xa5")
-        assert int.from_bytes(frame[-2:], "big") == algorithm.compute(frame[:-2])
-        assert qlink.decode_request(wire) == message
-        assert events(qlink.StreamDecoder("request"), b"\xa5" + wire) == [message]
-        for junk in (b"", b"\xa5", b"\xa5\xa5", b"\xa5\xa5\x04", b"\0\0\0\0", b"\0\0\0\0\0\0\0"):
-            with pytest.raises(qlink.DecodeError):
-                qlink.decode_request(junk)
-    finally:
-        assert qlink.select_crc("ccitt-false") == algorithm.name
+    codec = qlink.Codec(algorithm.name.upper())
+    assert codec.checksum.name == algorithm.name
+    wire = codec.encode(message)
+    frame = wire[2:].replace(b"\xa5\x00", b"\xa5")
+    assert int.from_bytes(frame[-2:], "big") == algorithm.compute(frame[:-2])
+    assert codec.decode_request(wire) == message
+    assert events(codec.StreamDecoder("request"), b"\xa5" + wire) == [message]
+    for junk in (b"", b"\xa5", b"\xa5\xa5", b"\xa5\xa5\x04", b"\0\0\0\0", b"\0\0\0\0\0\0\0"):
+        with pytest.raises(qlink.DecodeError):
+            codec.decode_request(junk)
+    # The module itself keeps the schema's algorithm.
     assert message.to_frame() == before
+    assert qlink.encode(message) == before
+    assert qlink.decode_request(before) == message
+    if algorithm.name != "crc-16/ibm-3740" and wire != before:
+        with pytest.raises(qlink.DecodeError):
+            qlink.decode_request(wire)
+
+
+def test_a_codec_needs_a_known_algorithm() -> None:
     with pytest.raises(ValueError, match="xmodem"):
-        qlink.select_crc("crc-17")
+        module("qlink").Codec("crc-17")
 
 
 def test_values_round_to_the_nearest_step_and_ties_to_the_even_one() -> None:

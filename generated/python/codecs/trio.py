@@ -673,6 +673,7 @@ class Codec:
         COMMANDS: every transaction by its name.
         MESSAGES: every message by its name in the schema.
         DecodeError: raised for bytes that are not a valid frame.
+        MARKING: the place of address and number in headers and end bytes.
 
     Raises:
         ValueError: no 16-bit algorithm has the name.
@@ -682,6 +683,7 @@ class Codec:
     COMMANDS = COMMANDS
     MESSAGES = MESSAGES
     DecodeError = DecodeError
+    MARKING = MARKING
 
     def __init__(self, crc: str) -> None:
         self.checksum = find_crc(crc)

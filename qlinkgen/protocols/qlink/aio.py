@@ -45,10 +45,11 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         echo: EchoMode = "auto",
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
+        crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
         """Take over a port, with the arguments of `Bus`."""
-        engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack)
+        engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
         self.memory = Memory()
         self._moving: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
@@ -63,11 +64,12 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         echo: EchoMode = "auto",
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
+        crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> AsyncBus:
         """Open a device name or a URL of pyserial, as `Bus.open`. Opening takes no time worth awaiting."""
         port = open_port(name, baud=baud or BAUD)
-        return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, on_event=on_event)
+        return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
 
     def node(self, number: int) -> AsyncNode:
         """Return one node, 1..16."""

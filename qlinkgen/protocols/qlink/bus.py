@@ -51,6 +51,7 @@ class Bus(BlockingMaster, MasterCalls):
         echo: EchoMode = "auto",
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
+        crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
         """Take over a port; closing the bus closes it.
@@ -63,9 +64,10 @@ class Bus(BlockingMaster, MasterCalls):
             health: when a node that does not answer is left alone; None: never.
             slack: seconds that driver, adapter and operating system may add to a transaction, in place of
                 what the port says of itself.
+            crc: 16-bit CRC of the catalogue in place of the schema's.
             on_event: called with each event, in the thread that asks.
         """
-        engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack)
+        engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
         self.memory = Memory()
         self._moving: defaultdict[int, threading.Lock] = defaultdict(threading.Lock)
@@ -80,6 +82,7 @@ class Bus(BlockingMaster, MasterCalls):
         echo: EchoMode = "auto",
         health: HealthPolicy | None = HealthPolicy(),  # noqa: B008  # immutable
         slack: float | None = None,
+        crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> Bus:
         """Open a device name or a URL of pyserial, at 115200 baud unless given; the rest as for the class.
@@ -89,7 +92,7 @@ class Bus(BlockingMaster, MasterCalls):
             PortBusy: another program has it, or this user may not open it.
         """
         port = open_port(name, baud=baud or BAUD)
-        return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, on_event=on_event)
+        return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
 
     def node(self, number: int) -> Node:
         """Return one node, 1..16."""

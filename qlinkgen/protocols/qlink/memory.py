@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 
 from qlinkgen.codecs import qlink
+from qlinkgen.link.codec import Codec
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
@@ -26,11 +27,18 @@ MOST_SYNCS = 1 << 62
 
 
 def make_engine(
-    port: Port, *, attempts: int, echo: EchoMode, health: HealthPolicy | None, slack: float | None
+    port: Port,
+    *,
+    attempts: int,
+    echo: EchoMode,
+    health: HealthPolicy | None,
+    slack: float | None,
+    crc: str | None,
 ) -> MasterEngine:
     """Return the engine of a Q.link master on a port."""
-    timing = timing_of(qlink, port, slack=slack, attempts=attempts)
-    return MasterEngine(qlink, timing, echo=echo, health=health, accepts=ACCEPTS)
+    codec: Codec = qlink if crc is None else qlink.Codec(crc)
+    timing = timing_of(codec, port, slack=slack, attempts=attempts)
+    return MasterEngine(codec, timing, echo=echo, health=health, accepts=ACCEPTS)
 
 
 class Memory:

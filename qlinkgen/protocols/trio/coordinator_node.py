@@ -52,7 +52,7 @@ class CoordinatorNode:
 
     def __init__(self, **options: Any) -> None:
         """Make a node; the options are those of `RingNode`."""
-        self.link = RingNode(trio, self._handle, **options)
+        self.link = RingNode(options.pop("codec", trio), self._handle, **options)
         self.vr = Variables()
         self.keys = KeyTable()
         self.received: deque[str] = deque()

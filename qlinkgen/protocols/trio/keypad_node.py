@@ -53,7 +53,7 @@ class KeypadNode:
 
     def __init__(self, *, rows: int = ROWS, columns: int = COLUMNS, **options: Any) -> None:
         """Make a keypad that was just switched on; the other options are those of `RingNode`."""
-        self.link = RingNode(trio, self._handle, **options)
+        self.link = RingNode(options.pop("codec", trio), self._handle, **options)
         self.display = Display(rows, columns)
         self.counters = KeypadCounters()
         self.reset()

@@ -188,7 +188,7 @@ class PassiveNode(BlockingFace[RingNode]):
 
     def __init__(self, port: Port, *, on_event: OnEvent | None = None, **options: Any) -> None:
         """Join the ring at a port; the options are those of `RingNode`."""
-        node = RingNode(trio, **{"baud": paced_baud(port), **options})
+        node = RingNode(options.pop("codec", trio), **{"baud": paced_baud(port), **options})
         node.verbose = True
         super().__init__(node, drive(port, node, on_event=on_event))
 
