@@ -16,7 +16,7 @@ from qlinkgen.backends.base import Options, Outputs, banner
 from qlinkgen.backends.python import docstrings, package, values
 from qlinkgen.backends.python.layout import WIDTH, wrapped
 from qlinkgen.backends.python.module import templates
-from qlinkgen.backends.python.names import attribute, by_kind, class_name
+from qlinkgen.backends.python.names import attribute, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
@@ -133,7 +133,7 @@ class BusModule:
             "doc": python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines]),
             "table": [f'{self._class(t.request)}: "{t.name}"' for t in self._transactions],
             "imports": wrapped(
-                f"from .{self._protocol.name} import (", sorted(self._classes, key=by_kind), ")", 0
+                f"from .{self._protocol.name} import (", sorted(self._classes, key=imported), ")", 0
             ),
             "decimals": "Decimal" in self._place.used,
             "public": sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),

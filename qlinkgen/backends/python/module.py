@@ -16,7 +16,7 @@ from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
 from qlinkgen.backends.python.frames import FrameView, MarkedView, PacketView, PartsView, UniqueView
 from qlinkgen.backends.python.layout import WIDTH
-from qlinkgen.backends.python.names import by_kind, class_name
+from qlinkgen.backends.python.names import by_kind, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Enum, Flags
@@ -172,7 +172,7 @@ class Module:
             struct_error=True,
             decimal="Decimal" in used,
             index="index" in used,
-            support=sorted(used - set(_ELSEWHERE), key=by_kind),
+            support=sorted(used - set(_ELSEWHERE), key=imported),
             callable=isinstance(view, UniqueView),
             typing=sorted(typing),
         )

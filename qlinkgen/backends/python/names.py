@@ -61,8 +61,13 @@ def natural(name: str) -> tuple[tuple[str, int], ...]:
     return tuple((text, int(digits or -1)) for text, digits in parts)
 
 
+def imported(name: str) -> tuple[int, tuple[tuple[str, int], ...]]:
+    """Sorts names as ``ruff`` wants imports: as `by_kind`, but capitals do not matter inside a name."""
+    return by_kind(name)[0], natural(name.lower())
+
+
 def by_kind(name: str) -> tuple[int, tuple[tuple[str, int], ...]]:
-    """Sorts names as ``ruff`` wants imports and ``__all__``: constants, classes, functions."""
+    """Sorts names as ``ruff`` wants ``__all__``: constants, classes, functions."""
     bare = name.lstrip("_")
     kind = 0 if bare.isupper() and len(bare) > 1 else 1 if bare[:1].isupper() else 2
     return kind, natural(name)
