@@ -6,7 +6,7 @@ import importlib.resources
 import linecache
 from types import ModuleType
 
-from qlinkgen.backends.base import Options, Outputs
+from qlinkgen.backends.base import Options, Outputs, copied
 from qlinkgen.backends.python.module import render
 from qlinkgen.model.protocol import Protocol
 
@@ -25,14 +25,15 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     support = importlib.resources.files(__package__).joinpath("_support.py").read_text("utf-8")
     return {
         f"{options.package}/{protocol.name}.py": render(protocol, options),
-        f"{options.package}/_support.py": support,
+        f"{options.package}/_support.py": copied("_support.py", support),
         **package(options),
     }
 
 
 def package(options: Options) -> Outputs:
     """What makes the folder a typed package."""
-    return {f"{options.package}/__init__.py": _PACKAGE, f"{options.package}/py.typed": ""}
+    initial = copied("__init__.py", _PACKAGE)
+    return {f"{options.package}/__init__.py": initial, f"{options.package}/py.typed": ""}
 
 
 def load(protocol: Protocol, options: Options | None = None) -> ModuleType:
