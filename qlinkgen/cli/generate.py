@@ -15,7 +15,8 @@ from qlinkgen._resources import schemas_dir
 from qlinkgen.backends.base import OWN, SHIPPED, Options
 from qlinkgen.cli import hand_vectors, reconcile
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, did_you_mean, load_protocol, on_terminal
+from qlinkgen.cli.common import crc_option, did_you_mean, find_schema, load_protocol, on_terminal
+from qlinkgen.cli.depfile import Depfile
 from qlinkgen.cli.drift import Folder
 from qlinkgen.cli.manifest import schema_of, ships
 from qlinkgen.cli.package import package_option
@@ -51,6 +52,9 @@ Role = Literal["both", "master", "slave"]
     "--list-outputs", is_flag=True, help="Print the paths of all outputs, one a line; write nothing."
 )
 @click.option("--dry-run", is_flag=True, help="Print what would be written and removed; write nothing.")
+@click.option(
+    "--depfile", metavar="FILE", help="Also write a rule of make that says what the outputs depend on."
+)
 def command(  # noqa: PLR0917  # click passes them by name
     schemas: tuple[str, ...],
     targets: tuple[str, ...],
@@ -62,6 +66,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     package: str | None,
     list_outputs: bool,
     dry_run: bool,
+    depfile: str | None,
 ) -> int:
     """Write what is made of the SCHEMAs, by default of all that come with qlinkgen.
 
@@ -97,7 +102,11 @@ def command(  # noqa: PLR0917  # click passes them by name
         return reconcile.check(folders)
     if dry_run:
         return reconcile.show(folders)
+    inputs = _inputs(protocols, targets)
+    rule = Depfile(Path(depfile), reconcile.outputs(folders), inputs) if depfile else None
     reconcile.update(folders)
+    if rule:
+        rule.write()
     return FINE
 
 
@@ -127,6 +136,14 @@ def _misfits(protocols: Mapping[str, Protocol]) -> list[str]:
         if ships(schema)
         for misfit in hand_vectors.misfits(protocol)
     ]
+
+
+def _inputs(protocols: Mapping[str, Protocol], targets: Sequence[str]) -> list[Path]:
+    """Files that the outputs depend on: the schemas, and the vectors that a kit holds."""
+    files = [find_schema(schema) for schema in protocols]
+    if "conformance" in targets:
+        files += [hand_vectors.file_of(each) for schema, each in protocols.items() if ships(schema)]
+    return [file for file in files if file.is_file()]
 
 
 def _kept(only: Sequence[str], protocols: Sequence[Protocol]) -> tuple[str, ...]:
