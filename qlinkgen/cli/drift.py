@@ -2,119 +2,148 @@
 
 from __future__ import annotations
 
-import contextlib
 import difflib
-import os
-import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from qlinkgen.cli import manifest
-from qlinkgen.cli.manifest import Manifest
+from qlinkgen.backends.base import is_generated
+from qlinkgen.cli import manifest, output
+from qlinkgen.cli.boundary import WRONG, Failure
+from qlinkgen.cli.manifest import Manifest, hash_of
+from qlinkgen.cli.output import Found
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One file that is not as it should be. ``ours``: it is in the manifest, so it may be removed."""
+    """One file that is not as it should be.
+
+    Attributes:
+        ours: qlinkgen wrote it, so it may be replaced or removed.
+        obstacle: why no file can be written or removed there.
+    """
 
     path: str
     kind: Literal["changed", "missing", "orphan"]
-    diff: tuple[str, ...] = ()
     ours: bool = True
+    obstacle: str = ""
 
 
 @dataclass
 class Folder:
     """An output folder: what is there, what should be, and the difference.
 
-    The folders in which outputs stand belong to qlinkgen: whatever else is in them is an orphan.
-    ``complete`` says that the run covers every protocol. Without ``listed`` there is neither manifest nor
-    orphan.
+    The folders of the outputs belong to qlinkgen: any other file in them is an orphan, though it is never
+    touched. Without ``listed`` there is neither manifest nor orphan, and every file is qlinkgen's.
     """
 
     root: Path
-    complete: bool = False
     listed: bool = True
     made: Manifest = field(default_factory=Manifest)
     wanted: dict[str, str] = field(default_factory=dict)
 
     def want(self, protocol: str, schema: str, target: str, outputs: dict[str, str]) -> None:
-        """Add what a target makes of a protocol."""
-        self.wanted.update(outputs)
+        """Add what a target makes of a protocol. Raises Failure if another one makes the same file."""
+        for path, text in outputs.items():
+            if self.wanted.setdefault(path, text) != text:
+                raise Failure(f"{path} would be made twice, for {protocol} and another; rename the protocol")
         self.made.add(protocol, schema, target, outputs)
 
     def files(self) -> dict[str, str]:
-        """Path to text of everything that should be there, the manifest included."""
-        return {**self.wanted, manifest.NAME: self._kept().text()} if self.listed else self.wanted
+        """Path to text of everything that should be there; the manifest, if there is one, is last."""
+        return {**self.wanted, manifest.NAME: self._kept.text()} if self.listed else self.wanted
 
     def changes(self) -> list[Change]:
-        """Everything that differs, by path."""
+        """Everything that differs, by path. Raises Failure for a manifest that is not qlinkgen's."""
         found = [change for path, text in self.files().items() if (change := self._compare(path, text))]
         found += self._orphans() if self.listed else []
         return sorted(found, key=lambda change: change.path)
 
-    def update(self, changes: Iterable[Change]) -> None:
+    def refusal(self, change: Change) -> str:
+        """Why a change cannot be made, "" if it can: qlinkgen did not write what is there."""
+        if change.kind == "changed" and not (change.ours or change.obstacle):
+            return f"{self.root / change.path} was not written by qlinkgen, or its first lines were changed"
+        return change.obstacle
+
+    def taken(self) -> Iterator[str]:
+        """Files that are a protocol's of another run, such as `oven_bus` beside the bus module of `oven`."""
+        made = self.made.entries
+        for name, entry in self._kept.entries.items() if self.listed else ():
+            own = {f"{each}.py" for each in (name, *made)}
+            for path in sorted(entry.paths() & set(self.wanted)) if name not in made else ():
+                if PurePosixPath(path).name in own:
+                    yield f"{self.root / path} belongs to the protocol {name}"
+
+    def update(self, changes: Sequence[Change]) -> None:
         """Write what is changed or missing, and remove orphans that an earlier run has made."""
         files = self.files()
-        for change in changes:
-            if change.kind != "orphan":
-                write(self.root / change.path, files[change.path])
-            elif change.ours:
-                (self.root / change.path).unlink()
+        written = {change.path for change in changes if change.kind != "orphan"}
+        gone = [change.path for change in changes if change.kind == "orphan" and change.ours]
+        output.clean(self.root, [*files, *gone])
+        # The manifest is last: if the run is killed, the next one still finds the orphans in it.
+        texts = {path: text for path, text in files.items() if path in written}
+        output.replace(self.root, texts, gone, last=manifest.NAME)
 
+    def diff(self, change: Change) -> list[str]:
+        """How a changed file differs."""
+        if change.kind != "changed" or change.obstacle:
+            return []
+        present = (self._found(change.path).data or b"").decode("utf-8", "replace")
+        before, after = present.splitlines(), self.files()[change.path].splitlines()
+        names = f"{change.path} (in the folder)", f"{change.path} (generated)"
+        lines = difflib.unified_diff(before, after, *names, lineterm="")
+        return list(lines) or [f"--- {change.path}: line ends differ"]
+
+    @cached_property
+    def _before(self) -> Manifest:
+        found = self._found(manifest.NAME)
+        if found.obstacle:
+            raise Failure(f"{found.obstacle}, where the manifest should be; move or delete it", WRONG)
+        if found.data is None:
+            return Manifest()
+        return Manifest.read(found.data.decode("utf-8", "replace"), self.root / manifest.NAME)
+
+    @cached_property
     def _kept(self) -> Manifest:
-        return self.made.over(Manifest.read(self.root), self.root, complete=self.complete)
+        return self.made.over(self._before, self.root)
+
+    def _found(self, path: str) -> Found:
+        return output.look(self.root, path)
 
     def _compare(self, path: str, text: str) -> Change | None:
-        try:
-            present = (self.root / path).read_bytes().decode("utf-8", "replace")
-        except FileNotFoundError:
+        found = self._found(path)
+        if found.obstacle:
+            return Change(path, "changed", ours=False, obstacle=found.obstacle)
+        if found.data is None:
             return Change(path, "missing")
-        return None if present == text else Change(path, "changed", tuple(_diff(present, text, path)))
+        if found.data == text.encode():
+            return None
+        return Change(path, "changed", ours=self._is_ours(path, found.data))
 
-    def _orphans(self) -> list[Change]:
-        before, kept = set(Manifest.read(self.root).paths()), set(self._kept().paths())
-        there = {path for path in before if self._is_below(path)} | set(self._present())
-        return [Change(path, "orphan", ours=path in before) for path in sorted(there - kept)]
+    def _is_ours(self, path: str, data: bytes) -> bool:
+        """A file has the banner, or is listed and as it was written."""
+        text = data.decode("utf-8", "replace")
+        listed = path == manifest.NAME or self._before.hashes.get(path) == hash_of(text)
+        return not self.listed or listed or is_generated(text)
 
-    def _is_below(self, path: str) -> bool:
-        """A manifest is a file that anybody can edit: it must not lead out of the folder."""
-        pure = PurePosixPath(path)
-        return not pure.is_absolute() and ".." not in pure.parts and (self.root / path).is_file()
+    def _orphans(self) -> Iterator[Change]:
+        kept = self._kept.paths()
+        listed = self._before.paths() - kept
+        for path in sorted(listed):
+            found = self._found(path)
+            if found.obstacle:
+                yield Change(path, "orphan", ours=False, obstacle=found.obstacle)
+            elif found.data is not None:
+                yield Change(path, "orphan", ours=self._is_ours(path, found.data))
+        for path in sorted(set(self._present()) - kept - listed):
+            yield Change(path, "orphan", ours=False)
 
     def _present(self) -> Iterator[str]:
-        """Files in the folders that outputs of this run stand in."""
+        """Files in the folders of this run's outputs."""
         for folder in sorted({str(PurePosixPath(path).parent) for path in self.wanted} - {"."}):
             if (self.root / folder).is_dir():
                 for file in (self.root / folder).iterdir():
                     if file.is_file() and not file.name.startswith("."):
                         yield f"{folder}/{file.name}"
-
-
-def _diff(present: str, text: str, path: str) -> Iterable[str]:
-    before, after = present.splitlines(), text.splitlines()
-    lines = difflib.unified_diff(before, after, f"{path} (in the folder)", f"{path} (generated)", lineterm="")
-    return list(lines) or [f"--- {path}: line ends differ"]
-
-
-def write(path: Path, text: str) -> None:
-    """Replace a file as a whole: a compiler that runs at the same time never sees half of it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with open(handle, "w", encoding="utf-8", newline="\n") as file:  # noqa: PTH123  # a descriptor, not a path
-            file.write(text)
-        Path(name).chmod(path.stat().st_mode & 0o777 if path.exists() else 0o666 & ~_umask())
-        Path(name).replace(path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(name).unlink()
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

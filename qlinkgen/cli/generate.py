@@ -13,14 +13,16 @@ import click
 
 from qlinkgen._resources import schemas_dir
 from qlinkgen.backends.base import OWN, SHIPPED, Options
+from qlinkgen.cli import hand_vectors, reconcile
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, did_you_mean, find_schema, load_protocol, on_terminal, warn
-from qlinkgen.cli.drift import Change, Folder
-from qlinkgen.cli.manifest import schema_of
-from qlinkgen.cli.targets import TARGETS, reference_outputs
+from qlinkgen.cli.common import crc_option, did_you_mean, find_schema, load_protocol, on_terminal
+from qlinkgen.cli.depfile import Depfile
+from qlinkgen.cli.drift import Folder
+from qlinkgen.cli.manifest import schema_of, ships
+from qlinkgen.cli.package import package_option
+from qlinkgen.cli.targets import DEFAULT, TARGETS, reference_outputs
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.texts import visible
 
 Role = Literal["both", "master", "slave"]
 
@@ -32,7 +34,7 @@ Role = Literal["both", "master", "slave"]
     "targets",
     multiple=True,
     type=click.Choice([*TARGETS]),
-    help="Repeat for several; default all.",
+    help=f"Repeat for several; default {', '.join(DEFAULT)}.",
 )
 @click.option("-o", "--output", default="generated", show_default=True, help="Folder for the output.")
 @click.option(
@@ -45,7 +47,14 @@ Role = Literal["both", "master", "slave"]
 @click.option(
     "--only", multiple=True, metavar="NAME", help="Keep these commands or messages; repeat for several."
 )
-@click.option("--list-outputs", is_flag=True, help="Print the paths that would be written, one a line.")
+@package_option
+@click.option(
+    "--list-outputs", is_flag=True, help="Print the paths of all outputs, one a line; write nothing."
+)
+@click.option("--dry-run", is_flag=True, help="Print what would be written and removed; write nothing.")
+@click.option(
+    "--depfile", metavar="FILE", help="Also write a rule of make that says what the outputs depend on."
+)
 def command(  # noqa: PLR0917  # click passes them by name
     schemas: tuple[str, ...],
     targets: tuple[str, ...],
@@ -54,34 +63,51 @@ def command(  # noqa: PLR0917  # click passes them by name
     crc: str | None,
     role: Role,
     only: tuple[str, ...],
+    package: str | None,
     list_outputs: bool,
+    dry_run: bool,
+    depfile: str | None,
 ) -> int:
     """Write what is made of the SCHEMAs, by default of all that come with qlinkgen.
 
-    Only files that change are written, and files that nothing makes any more are removed. In the repository
-    of qlinkgen, a run without SCHEMA and -o also writes the parts of docs/ that are made from the code.
+    Only files that change are written, and files that nothing makes any more are removed. Files that qlinkgen
+    did not write are neither overwritten nor removed: if one is in the way, nothing is written. The Python
+    package of a schema is python/wire, unless --package says otherwise; that of a shipped one python/codecs.
+
+    In the repository of qlinkgen, a run without SCHEMA and -o also writes the parts of docs/ that are made
+    from the code.
 
     \b
     qlinkgen generate                        everything that is shipped, to generated/
     qlinkgen generate bus.yaml --target c    one header
+    qlinkgen generate bus.yaml --package my.wire --target python --target bus -o src
     qlinkgen generate --check                for CI: 1 and a diff if anything is out of date
     qlinkgen generate qlink --set crc=crc-16/xmodem --role slave --only motion
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     from qlinkgen.schema import shipped  # noqa: PLC0415  # pydantic takes a while
 
     protocols = _load(schemas or shipped(), crc)
+    if misfits := _misfits(protocols) if crc is None else []:
+        click.echo("\n".join(misfits), err=True)
+        return WRONG
     options = Options(role=role, only=_kept(only, list(protocols.values())))
-    folder = Folder(Path(output), complete=not schemas)
-    _fill(folder, protocols, targets or tuple(TARGETS), options)
+    folder = Folder(Path(output))
+    _fill(folder, protocols, targets or DEFAULT, options, package)
     folders = [folder]
     if not (schemas or targets) and output == "generated" and schemas_dir().parent == Path.cwd():
         folders.append(_reference())
     if list_outputs:
-        click.echo(
-            "\n".join(sorted(str(folder.root / path) for folder in folders for path in folder.files()))
-        )
-        return FINE
-    return _check(folders) if check else _update(folders)
+        return reconcile.list_outputs(folders)
+    if check:
+        return reconcile.check(folders)
+    if dry_run:
+        return reconcile.show(folders)
+    inputs = _inputs(protocols, targets)
+    rule = Depfile(Path(depfile), reconcile.outputs(folders), inputs) if depfile else None
+    reconcile.update(folders)
+    if rule:
+        rule.write()
+    return FINE
 
 
 def _load(schemas: Sequence[str], crc: str | None) -> dict[str, Protocol]:
@@ -100,6 +126,24 @@ def _load(schemas: Sequence[str], crc: str | None) -> dict[str, Protocol]:
         if names.count(name) > 1:
             raise Failure(f"two schemas describe a protocol '{name}'; rename one under protocol: name")
     return protocols
+
+
+def _misfits(protocols: Mapping[str, Protocol]) -> list[str]:
+    """Vectors worked out by hand that shipped schemas do not fit, a line each."""
+    return [
+        misfit
+        for schema, protocol in protocols.items()
+        if ships(schema)
+        for misfit in hand_vectors.misfits(protocol)
+    ]
+
+
+def _inputs(protocols: Mapping[str, Protocol], targets: Sequence[str]) -> list[Path]:
+    """Files that the outputs depend on: the schemas, and the vectors that a kit holds."""
+    files = [find_schema(schema) for schema in protocols]
+    if "conformance" in targets:
+        files += [hand_vectors.file_of(each) for schema, each in protocols.items() if ships(schema)]
+    return [file for file in files if file.is_file()]
 
 
 def _kept(only: Sequence[str], protocols: Sequence[Protocol]) -> tuple[str, ...]:
@@ -121,23 +165,22 @@ def _show_hint(protocols: Sequence[Protocol]) -> str:
 
 
 def _fill(
-    folder: Folder, protocols: Mapping[str, Protocol], targets: Sequence[str], options: Options
+    folder: Folder,
+    protocols: Mapping[str, Protocol],
+    targets: Sequence[str],
+    options: Options,
+    package: str | None,
 ) -> None:
     with _progress(len(targets) * len(protocols)) as step:
         for target in dict.fromkeys(targets):
             generate = TARGETS[target].load()
             for schema, protocol in protocols.items():
-                if not _keeps(protocol, options):
-                    continue
                 step(f"{target} {protocol.name}")
                 source = schema_of(protocol, schema, folder.root)
-                chosen = replace(options, package=SHIPPED if _ships(schema) else OWN)
-                folder.want(protocol.name, source, target, dict(generate(protocol, chosen)))
-
-
-def _ships(schema: str) -> bool:
-    """The SCHEMA is one that comes with qlinkgen, by its name or its path."""
-    return find_schema(schema).resolve().parent == schemas_dir().resolve()
+                chosen = replace(options, package=package or (SHIPPED if ships(schema) else OWN))
+                kept = _keeps(protocol, options)
+                outputs = dict(generate(protocol, chosen)) if kept else {}
+                folder.want(protocol.name, source, target, outputs)
 
 
 def _keeps(protocol: Protocol, options: Options) -> bool:
@@ -168,54 +211,3 @@ def _progress(total: int) -> Iterator[Callable[[str], None]]:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("generating", total=total)
         yield lambda what: bar.update(task, advance=1, description=what)
-
-
-def _update(folders: Sequence[Folder]) -> int:
-    written = removed = total = 0
-    for folder in folders:
-        changes = folder.changes()
-        folder.update(changes)
-        total += len(folder.files())
-        written += sum(change.kind != "orphan" for change in changes)
-        removed += sum(change.kind == "orphan" and change.ours for change in changes)
-        for change in changes:
-            if not change.ours:
-                warn(
-                    f"{folder.root / change.path} stands among generated files, but nothing makes it; move it"
-                )
-    gone = f", {removed} removed" if removed else ""
-    click.echo(f"{written} written, {total - written} unchanged{gone} in {folders[0].root}")
-    return FINE
-
-
-def _check(folders: Sequence[Folder]) -> int:
-    changes = [(folder, change) for folder in folders for change in folder.changes()]
-    for folder, change in changes:
-        _report(folder, change)
-    if not changes:
-        click.echo(
-            f"{sum(len(folder.files()) for folder in folders)} files are up to date in {folders[0].root}"
-        )
-        return FINE
-    what = f"{len(changes)} file{'s' if len(changes) > 1 else ''} out of date in {folders[0].root}"
-    click.echo(
-        f"qlinkgen: {what}; run `qlinkgen generate` with the same arguments, and never edit the files",
-        err=True,
-    )
-    return WRONG
-
-
-def _report(folder: Folder, change: Change) -> None:
-    explained = {
-        "missing": "is missing",
-        "changed": "differs",
-        "orphan": "is an orphan: no schema makes it any more",
-    }[change.kind]
-    click.echo(visible(f"{folder.root / change.path}: {explained}"))
-    for line in map(visible, change.diff):
-        click.echo(_coloured(line) if on_terminal() else line)
-
-
-def _coloured(line: str) -> str:
-    colour = {"+": "green", "-": "red", "@": "cyan"}.get(line[:1])
-    return click.style(line, fg=colour) if colour else line

@@ -8,12 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from typing import Any
 
-import yaml
-
-from qlinkgen._resources import schemas_dir
 from qlinkgen.backends import conformance
 from qlinkgen.backends.base import Options, Outputs
 from qlinkgen.backends.conformance import Heard, Sources
+from qlinkgen.cli import hand_vectors
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
 
@@ -48,13 +46,9 @@ def by_hand(protocol: Protocol) -> Mapping[str, Any]:
     """
     from qlinkgen.schema import find, load  # noqa: PLC0415  # pydantic takes a while
 
-    path = schemas_dir() / "vectors" / f"{protocol.name}.yaml"
-    if not path.is_file() or protocol != load(find(protocol.name)):
+    if not hand_vectors.file_of(protocol).is_file() or protocol != load(find(protocol.name)):
         return {}
-    found: Mapping[str, Any] = yaml.load(
-        path.read_text("utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    )
-    return found
+    return hand_vectors.read(protocol)
 
 
 class _Listener:

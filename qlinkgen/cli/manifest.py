@@ -1,20 +1,24 @@
-"""The list of generated files that stands beside them.
+"""The list of generated files, kept beside them.
 
 It says which files each protocol has in an output folder, and which schema they come from. So a run for one
-protocol leaves the others alone, and what no schema makes any more is found: after a schema was deleted, a
-protocol renamed, or a back-end has stopped to make a file.
+protocol leaves the others alone, and orphans are found: files of a deleted schema, of a renamed protocol, or
+of a back-end that makes them no longer.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from qlinkgen._resources import schemas_dir
+from qlinkgen.backends.base import is_generated
+from qlinkgen.cli.boundary import WRONG, Failure
+from qlinkgen.cli.common import find_schema
 from qlinkgen.model.protocol import Protocol
 
 NAME = "manifest.json"
@@ -23,66 +27,104 @@ _NOTE = "Files that `qlinkgen generate` keeps in this folder. Do not edit."
 
 @dataclass
 class Entry:
-    """What one protocol has in the folder: its schema, and target to paths. Shared files have no schema."""
+    """What one protocol has in the folder: its schema, and target to paths."""
 
     schema: str = ""
     files: dict[str, list[str]] = field(default_factory=dict)
 
+    def paths(self) -> set[str]:
+        """Every file of the protocol; those of a package are shared with other protocols."""
+        return {path for paths in self.files.values() for path in paths}
+
 
 @dataclass
 class Manifest:
-    """Entries by protocol name; files that all protocols share stand under ""."""
+    """Entries by protocol name, and hashes by path of the files that have no banner."""
 
     entries: dict[str, Entry] = field(default_factory=dict)
+    hashes: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def read(cls, root: Path) -> Manifest:
-        """The manifest of a folder, an empty one if there is none; a spoilt one is written anew anyway."""
+    def read(cls, text: str, where: Path) -> Manifest:
+        """The manifest in a text; ``where`` is its file, for errors.
+
+        One that cannot be read, as after a merge with conflicts, is empty: it is written anew, and nothing is
+        removed. Raises Failure for a file that is not a manifest of qlinkgen, and for paths that leave it.
+        """
+        if json.dumps(_NOTE) not in text:
+            raise Failure(
+                f"{where} was not written by qlinkgen, which keeps a file of this name in the output folder; "
+                "nothing was written: move or delete it, or choose another folder with -o",
+                WRONG,
+            )
         try:
-            found = json.loads((root / NAME).read_text("utf-8"))["protocols"]
-            return cls({name: _entry(entry) for name, entry in found.items()})
-        except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
+            found = json.loads(text)
+            entries = {name: _entry(entry) for name, entry in found["protocols"].items()}
+            hashes = {str(path): str(hashed) for path, hashed in found.get("sha256", {}).items()}
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return cls()
+        manifest = cls(entries, hashes)
+        for path in sorted(manifest.paths()):
+            if not _is_below(path):
+                raise Failure(
+                    f"{where} lists {path!r}, which is not a file below its folder; nothing was written: "
+                    "remove the line",
+                    WRONG,
+                )
+        return manifest
 
     def text(self) -> str:
         """The file's text."""
         protocols = {
-            name: {"schema": entry.schema, "files": dict(sorted(entry.files.items()))}
+            name: {
+                "schema": entry.schema,
+                "files": {target: paths for target, paths in sorted(entry.files.items()) if paths},
+            }
             for name, entry in sorted(self.entries.items())
         }
-        return json.dumps({"note": _NOTE, "protocols": protocols}, indent=2) + "\n"
+        listed = self.paths()
+        hashes = {path: hashed for path, hashed in sorted(self.hashes.items()) if path in listed}
+        return json.dumps({"note": _NOTE, "protocols": protocols, "sha256": hashes}, indent=2) + "\n"
 
-    def paths(self) -> Iterator[str]:
+    def paths(self) -> set[str]:
         """Every file listed."""
-        for entry in self.entries.values():
-            for paths in entry.files.values():
-                yield from paths
+        return set().union(*(entry.paths() for entry in self.entries.values()))
 
     def add(self, protocol: str, schema: str, target: str, outputs: Mapping[str, str]) -> None:
-        """List what a target makes of a protocol."""
+        """List what a target makes of a protocol, which may be nothing."""
         entry = self.entries.setdefault(protocol, Entry(schema))
         entry.files[target] = sorted(outputs)
+        self.hashes |= {path: hash_of(text) for path, text in outputs.items() if not is_generated(text)}
 
-    def over(self, before: Manifest, root: Path, *, complete: bool) -> Manifest:
+    def over(self, before: Manifest, root: Path) -> Manifest:
         """This run's entries laid over those from before.
 
-        A run for some targets or protocols says nothing about the others: they stay, as long as their
-        schema is there. ``complete`` says that the run covers every protocol of the folder.
+        A run for some targets or protocols does not concern the others: they stay, as long as their schema is
+        there and was not generated under another name of the protocol.
         """
         made = {entry.schema for entry in self.entries.values()}
         kept = dict(self.entries)
         for name, entry in before.entries.items():
-            files = {**entry.files, **(self.entries[name].files if name in self.entries else {})}
             if name in self.entries:
-                kept[name] = Entry(self.entries[name].schema, files)
-            elif not complete and entry.schema not in made and _exists(entry.schema, root):
+                kept[name] = Entry(self.entries[name].schema, {**entry.files, **self.entries[name].files})
+            elif entry.schema not in made and _exists(entry.schema, root):
                 kept[name] = entry
-        return Manifest(kept)
+        return Manifest(kept, before.hashes | self.hashes)
+
+
+def hash_of(text: str) -> str:
+    """Identifies the text of a file that has no banner; line ends do not count."""
+    return hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()
+
+
+def ships(schema: str) -> bool:
+    """A SCHEMA comes with qlinkgen, whether it is given by name or by path."""
+    return find_schema(schema).resolve().parent == schemas_dir().resolve()
 
 
 def schema_of(protocol: Protocol, given: str, root: Path) -> str:
     """How a manifest names a schema: by its shipped name, or by its path from the folder."""
-    if "/" not in given and not Path(given).suffix:
+    if ships(given):
         return protocol.name
     return Path(os.path.relpath(given, root)).as_posix()
 
@@ -90,6 +132,13 @@ def schema_of(protocol: Protocol, given: str, root: Path) -> str:
 def _entry(found: Any) -> Entry:
     files = {str(target): [str(path) for path in paths] for target, paths in found["files"].items()}
     return Entry(str(found["schema"]), files)
+
+
+def _is_below(path: str) -> bool:
+    """Anybody can edit a manifest: it must not lead out of the folder, on any system, nor to itself."""
+    kinds = (PurePosixPath(path), PureWindowsPath(path))
+    outside = any(pure.anchor or ".." in pure.parts or not pure.name for pure in kinds)
+    return not outside and "\0" not in path and str(kinds[0]) == path != NAME
 
 
 def _exists(schema: str, root: Path) -> bool:

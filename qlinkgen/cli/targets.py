@@ -72,6 +72,9 @@ TARGETS = {
     )
 }
 
+#: What is made where no target is chosen. A conformance kit is large, and wanted once for each new target.
+DEFAULT = tuple(name for name in TARGETS if name != "conformance")
+
 
 #: Parts of docs/ that are made from the code; in the project's own repository alone.
 REFERENCE = "reference"

@@ -10,7 +10,7 @@ import importlib.resources
 import re
 
 from qlinkgen.backends import python_text
-from qlinkgen.backends.base import Options, Outputs, banner
+from qlinkgen.backends.base import Options, Outputs, banner, copied
 from qlinkgen.backends.construct.live import Live, live
 from qlinkgen.backends.construct.module import definitions
 from qlinkgen.backends.construct.tree import WIDTH, Definition, printed, used
@@ -42,8 +42,10 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     everything = definitions(protocol, options)
     text = "".join([_head(protocol), _imports(everything), *map(printed, everything)])
     folder = importlib.resources.files(__name__)
-    support = {f"{FOLDER}/{name}.py": folder.joinpath(f"{name}.py").read_text("utf-8") for name in _SUPPORT}
-    return {f"{FOLDER}/{protocol.name}.py": text, f"{FOLDER}/__init__.py": _PACKAGE_DOC, **support}
+    shared = {name: folder.joinpath(f"{name}.py").read_text("utf-8") for name in _SUPPORT}
+    shared["__init__"] = _PACKAGE_DOC
+    beside = {f"{FOLDER}/{name}.py": copied(f"{name}.py", each) for name, each in shared.items()}
+    return {f"{FOLDER}/{protocol.name}.py": text, **beside}
 
 
 def _head(protocol: Protocol) -> str:

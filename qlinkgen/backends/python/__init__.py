@@ -8,7 +8,7 @@ import linecache
 from collections.abc import Mapping
 from types import ModuleType
 
-from qlinkgen.backends.base import Outputs
+from qlinkgen.backends.base import Outputs, copied
 from qlinkgen.backends.python._support import BaseMessage, Rule
 from qlinkgen.backends.python.module import render
 from qlinkgen.model.message import Value
@@ -31,14 +31,15 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     support = importlib.resources.files(__package__).joinpath("_support.py").read_text("utf-8")
     return {
         f"{options.package}/{protocol.name}.py": render(plan_of(protocol, options)),
-        f"{options.package}/_support.py": support,
+        f"{options.package}/_support.py": copied("_support.py", support),
         **package(options),
     }
 
 
 def package(options: Options) -> Outputs:
     """What makes the folder a typed package."""
-    return {f"{options.package}/__init__.py": _PACKAGE, f"{options.package}/py.typed": ""}
+    initial = copied("__init__.py", _PACKAGE)
+    return {f"{options.package}/__init__.py": initial, f"{options.package}/py.typed": ""}
 
 
 def load(protocol: Protocol, options: Options | None = None) -> ModuleType:

@@ -1,0 +1,50 @@
+"""What outputs depend on, as a rule of make: make, Ninja and CMake read it to know when to run again."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from qlinkgen.cli import output
+from qlinkgen.cli.boundary import WRONG, Failure
+
+#: What may be overwritten: a rule as it is written here, or nothing.
+_OURS = re.compile(r"(?:[^\n]+ \\\n)*[^\n]+: \\\n(?: [^\n]+ \\\n)* [^\n]+\n|")
+
+
+class Depfile:
+    """A file with one rule."""
+
+    def __init__(self, file: Path, outputs: Sequence[Path], inputs: Sequence[Path]) -> None:
+        """Compose the rule. Raises Failure for a path that make cannot name, or a foreign file."""
+        self._file = file
+        self.text = rule(outputs, inputs)
+        found = output.look(file.parent, file.name)
+        self._present = "" if found.data is None else found.data.decode("utf-8", "replace")
+        what = found.obstacle
+        if file.resolve() in {path.resolve() for path in (*outputs, *inputs)}:
+            what = f"{file} is one of the outputs or schemas"
+        elif not _OURS.fullmatch(self._present):
+            what = f"{file} was not written by qlinkgen"
+        if what:
+            raise Failure(f"--depfile: {what}; nothing was written: choose another name", WRONG)
+
+    def write(self) -> None:
+        """Write the file, unless it is as it should be."""
+        if self._present != self.text:
+            output.replace(self._file.parent, {self._file.name: self.text})
+
+
+def rule(outputs: Sequence[Path], inputs: Sequence[Path]) -> str:
+    """The text of a rule."""
+    targets, needed = ([_escaped(str(path)) for path in paths] for paths in (outputs, inputs))
+    return " \\\n".join(targets) + ": \\\n " + " \\\n ".join(needed) + "\n"
+
+
+def _escaped(path: str) -> str:
+    """A path as make reads it: backslashes are doubled only where one would escape what follows."""
+    if "\n" in path or "\r" in path:
+        raise Failure(f"--depfile: a rule of make cannot hold {path!r}, which has a line break; rename it")
+    path = re.sub(r"\\+(?=[ #:]|$)", lambda found: found[0] * 2, path)
+    return re.sub(r"([ #:])", r"\\\1", path).replace("$", "$$")
