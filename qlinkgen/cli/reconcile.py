@@ -106,7 +106,9 @@ def _report(folder: Folder, change: Change) -> None:
         "changed": "differs",
         "orphan": "is an orphan: no schema makes it any more",
     }[change.kind]
-    click.echo(visible(f"{folder.root / change.path}: {explained}{change.obstacle and ': '}{change.obstacle}"))
+    click.echo(
+        visible(f"{folder.root / change.path}: {explained}{change.obstacle and ': '}{change.obstacle}")
+    )
     for line in map(visible, folder.diff(change)):
         click.echo(_coloured(line) if on_terminal() else line)
 
