@@ -34,7 +34,7 @@ def imports(text: str, *, enums: bool, flags: bool) -> dict[str, Any]:
     typing |= ({"ClassVar"} if enums else set()) | ({"Final"} if flags else set())
     support = {*used(_SUPPORT), *called(_CALLED), *PUBLIC, *(["OpenEnum", "named"] if enums else [])}
     return {
-        "structs": ", ".join(called(("Struct", "pack", "unpack_from"))),
+        "structs": ", ".join(called(("Struct", "pack", "unpack", "unpack_from"))),
         "decimals": bool(used(("Decimal",))),
         "used": used(("struct_error", "Callable")),
         "typing": ", ".join(sorted(typing)),
