@@ -172,6 +172,11 @@ def test_construct_has_the_bytes_and_values_of_the_reference(group: Group) -> No
     agree(group, group.output("construct"))
 
 
+@every_group
+def test_damaged_payloads_are_read_alike_or_refused(group: Group) -> None:
+    agree_on_damage(group, [group.output("construct"), group.output("python")])
+
+
 @pytest.mark.parametrize("group", COMPILED, ids=str)
 def test_c_has_the_bytes_and_values_of_the_reference(
     group: Group, tmp_path: Path, require_tool: Callable[..., str]
@@ -180,6 +185,7 @@ def test_c_has_the_bytes_and_values_of_the_reference(
     with Driver(program) as driver:
         output = COutput(group.protocol(), driver)
         agree(group, output)
+        agree_on_damage(group, [group.output("construct"), output])
 
 
 # What lint refuses

@@ -51,6 +51,9 @@ def _scalar(message: Message, scalar: Scalar) -> Node:
     raw = integer(scalar.chunks, signed=scalar.signed)
     if scalar.constant:
         return Call("Const", (scalar.default, raw))
+    if scalar.reserved and scalar.byteorder is None:  # bits between the groups are ignored too
+        data = bytes(scalar.default >> chunk.shift & chunk.mask for chunk in scalar.chunks)
+        return Call("Rebuild", (Call("Bytes", (scalar.size,)), data))
     if scalar.reserved:
         return Call("Rebuild", (raw, scalar.default))
     if scalar.counts:
