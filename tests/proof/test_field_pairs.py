@@ -1,6 +1,8 @@
 """Fields of every kind beside fields of every kind: the bytes and values of an independent reference.
 
-`tests.support.field_kinds` knows the kinds and their bytes. Here they become messages.
+`tests.support.field_kinds` knows the kinds and their bytes. Here they become messages: each kind alone, each
+ordered pair of the commonest kinds, triples of those that generated code treats differently, and chains in
+which every kind precedes every other. Where lint refuses a message, it says why.
 """
 
 from __future__ import annotations
@@ -23,10 +25,21 @@ from qlinkgen.schema import loads
 from tests.proof.outputs import ConstructOutput, COutput, Output, PythonOutput, Refused
 from tests.support import field_kinds
 from tests.support.cdriver import Driver, build
-from tests.support.field_kinds import KINDS, LENGTH, STUFFED, Edge, Layout, Order, Row
+from tests.support.field_kinds import COUNTS, KINDS, LENGTH, PACKET, STUFFED, Edge, Layout, Order, Row
 
 #: Messages in one schema.
 MANY = 250
+BY_NAME = {kind.name: kind for kind in KINDS}
+#: Those whose code differs, in every place of a pair.
+COMMON = tuple(
+    BY_NAME[name]
+    for name in (
+        *("u8", "i16le", "u24", "u40le", "u64", "i11g", "bool", "strict flags", "scaled i24", "fixed32.32"),
+        *("bits u16le", "bits u64", "const u24le", "reserved u8", "text[4]", "u8[2]", "i16le[3]"),
+        *("u64[2]", "u24[2]"),
+        *("bytes[0..5] rest", "u8[0..3] rest", "i64le[1..130] rest", "u24[0..3] rest", "u14g[0..3] rest"),
+    )
+)
 
 
 def refusals(layout: Layout) -> set[str]:
@@ -40,8 +53,13 @@ def refusals(layout: Layout) -> set[str]:
 
 def layouts() -> Mapping[str, list[Layout]]:
     """Every message that is made, legal or not."""
+    pairs = [Layout(pair, first) for first in (False,) for pair in itertools.product(COMMON, repeat=2)]
     return {
         "alone": [Layout((kind,)) for kind in KINDS],
+        # Counts before both fields make a difference only where the second one has a count.
+        "pairs": [
+            pair for pair in pairs if not pair.counts_first or pair.specs() != Layout(pair.kinds).specs()
+        ],
     }
 
 
@@ -93,6 +111,10 @@ def groups() -> Iterator[Group]:
         for start in range(0, len(legal), MANY):
             frame, order = next(frames)
             yield Group(f"{name} from {start}", tuple(legal[start : start + MANY]), frame, order)
+    closed = [kind for kind in COMMON if not isinstance(kind, Row) or not kind.open]
+    fixed = [kind for kind in closed if not kind.counts("")]
+    yield Group("packets", tuple(Layout(pair) for pair in itertools.product(fixed[::2], repeat=2)), PACKET)
+    yield Group("counts", tuple(Layout(pair) for pair in itertools.product(closed[1::2], repeat=2)), COUNTS)
 
 
 GROUPS = tuple(groups())

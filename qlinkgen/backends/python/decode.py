@@ -62,6 +62,13 @@ class Decoder(FieldReader):
             self._misfit(f"not 0 <= rest <= {high - low}")
         elif message.variable and not self._by_size(message.variable[0]):
             self._count_by_size(message.variable[0], size, low)
+        elif not message.variable and self._several_runs():
+            self._misfit(f"{size} != {low}")
+
+    def _several_runs(self) -> bool:
+        """No single struct holds the whole message, so none refuses what is longer."""
+        arrays = [each.type for each in self.message.fields if isinstance(each.type, Array)]
+        return sum(map(self._struct_items, arrays)) > 1
 
     def _count_by_size(self, each: Field, size: str, low: int) -> None:
         kind = each.type

@@ -79,10 +79,19 @@ class RunReader:
             size = self.message.max_size + self.place.overhead
             self._misfit(f"len({self.place.data}) != {size}" if size else self.place.data)
         self.lines += run.after
-        if not self._moved:
+        if run.items is not None and not self._is_last:
+            self._pass_items(run, run.items)
+        elif not self._moved:
             self._fixed_at += run.size
         elif run.size:
             self.lines.append(f"end += {run.size}")
+
+    def _pass_items(self, run: Run, items: Field) -> None:
+        """Find the end of a run with items of any number: as far from the end of the data as what follows."""
+        fixed = self.message.min_size - items.min_size + self.place.overhead
+        behind = fixed - self._fixed_at - run.size
+        self.lines.append(f"end = len({self.place.data}) - {behind}")
+        self._moved = True
 
     def _unpack(self, run: Run) -> None:
         self._runs += 1
