@@ -25,7 +25,7 @@ from qlinkgen.schema import loads
 from tests.proof.outputs import ConstructOutput, COutput, Output, PythonOutput, Refused
 from tests.support import field_kinds
 from tests.support.cdriver import Driver, build
-from tests.support.field_kinds import COUNTS, KINDS, LENGTH, PACKET, STUFFED, Edge, Layout, Order, Row
+from tests.support.field_kinds import COUNTS, KINDS, LENGTH, PACKET, STUFFED, Edge, Kind, Layout, Order, Row
 
 #: Messages in one schema.
 MANY = 250
@@ -38,6 +38,16 @@ COMMON = tuple(
         *("bits u16le", "bits u64", "const u24le", "reserved u8", "text[4]", "u8[2]", "i16le[3]"),
         *("u64[2]", "u24[2]"),
         *("bytes[0..5] rest", "u8[0..3] rest", "i64le[1..130] rest", "u24[0..3] rest", "u14g[0..3] rest"),
+        *("text[1..4] by u8", "u16[0..4] by u8", "u8[1..250] by both", "i16le[1..5] by bytes"),
+        *("u64[0..3] by both", "i40[1..4] by bytes", "i11g[1..2] by both"),
+    )
+)
+#: In triples.
+DISTINCT = tuple(
+    BY_NAME[name]
+    for name in (
+        *("u24", "bits u8", "u8[2]", "u64[2]", "bytes[2..200] rest", "i64le[1..130] rest"),
+        *("u8[0..3] by both", "i24le[0..150] by both"),
     )
 )
 
@@ -51,15 +61,30 @@ def refusals(layout: Layout) -> set[str]:
     return found | {"bad-count" for row in later if row.counted}
 
 
+def chains(kinds: Sequence[Kind], size: int) -> Iterator[Layout]:
+    """Messages in which every kind precedes every other, as far as lint allows, in blocks of some kinds."""
+    opens = [kind for kind in kinds if isinstance(kind, Row) and kind.open]
+    others = tuple(kind for kind in kinds if kind not in opens)
+    blocks = [others[start : start + size] for start in range(0, len(others), size)]
+    for block in blocks:
+        yield Layout(block[::-1])
+        yield from (Layout(block + other) for other in blocks)
+        fixed = [kind for kind in block if not isinstance(kind, Row) or not kind.counted]
+        yield from (Layout((*block, each, *fixed)) for each in opens)
+
+
 def layouts() -> Mapping[str, list[Layout]]:
     """Every message that is made, legal or not."""
     pairs = [Layout(pair, first) for first in (False,) for pair in itertools.product(COMMON, repeat=2)]
+    triples = [Layout(triple) for triple in itertools.product(DISTINCT, repeat=3)]
     return {
         "alone": [Layout((kind,)) for kind in KINDS],
         # Counts before both fields make a difference only where the second one has a count.
         "pairs": [
             pair for pair in pairs if not pair.counts_first or pair.specs() != Layout(pair.kinds).specs()
         ],
+        "triples": triples,
+        "chains": list(chains(KINDS, 12)),
     }
 
 
@@ -119,7 +144,10 @@ def groups() -> Iterator[Group]:
 
 GROUPS = tuple(groups())
 #: Few enough to compile: every kind alone, and every common one in front of every other.
-COMPILED = (Group("alone", tuple(LAYOUTS["alone"])),)
+COMPILED = (
+    Group("alone", tuple(LAYOUTS["alone"])),
+    Group("chains", tuple(chains(COMMON, 4)), LENGTH, "little"),
+)
 SANITIZED = ("-O0", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 EDGES: tuple[Edge, ...] = ("least", "most", "any")
 

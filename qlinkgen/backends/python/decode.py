@@ -30,7 +30,7 @@ class Decoder(FieldReader):
         self._flush()
         if len(self.message.variable) > 1:
             self._misfit("rest")
-        return [*self.lines, *self._checks, "return message"]
+        return [*self.lines, *self._late, *self._checks, "return message"]
 
     # Sizes
 

@@ -126,7 +126,9 @@ class FieldReader(RunReader):
             if self._by_size(counted):
                 count = f"len(message.{counted.name})"
             expected = count if scale == 1 else f"{count} * {scale}"
-        self._run.after += [f"if {_operand(number)} != {expected}:", "    raise Misfit"]
+        # The items may be in a later run than their count.
+        after = self._late if self._by_size(counted) else self._run.after
+        after += [f"if {_operand(number)} != {expected}:", "    raise Misfit"]
 
     def _learn(self, counted: Field, number: str, scale: int) -> None:
         """The first count of a field says how long it is."""

@@ -45,6 +45,7 @@ class RunReader:
     constants: list[str] = field(default_factory=list)
     _run: Run = field(default_factory=Run)
     _runs: int = 0
+    _late: list[str] = field(default_factory=list)
     _checks: list[str] = field(default_factory=list)
     _moved: bool = False
     _is_last: bool = False
