@@ -75,7 +75,7 @@ def chains(kinds: Sequence[Kind], size: int) -> Iterator[Layout]:
 
 def layouts() -> Mapping[str, list[Layout]]:
     """Every message that is made, legal or not."""
-    pairs = [Layout(pair, first) for first in (False,) for pair in itertools.product(COMMON, repeat=2)]
+    pairs = [Layout(pair, first) for first in (False, True) for pair in itertools.product(COMMON, repeat=2)]
     triples = [Layout(triple) for triple in itertools.product(DISTINCT, repeat=3)]
     return {
         "alone": [Layout((kind,)) for kind in KINDS],
@@ -239,6 +239,16 @@ def test_c_has_the_bytes_and_values_of_the_reference(
 
 
 # What lint refuses
+
+
+def test_lint_names_a_reason_for_each_message_that_it_refuses() -> None:
+    refused = [layout for made in LAYOUTS.values() for layout in made if refusals(layout)]
+    text = field_kinds.schema(refused, LENGTH)
+    _, faults = loads(text, "pairs.yaml")
+    first = len(text.splitlines()) - len(refused) + 1
+    found = {(fault.line - first, fault.rule) for fault in faults if fault.severity == "error"}
+    assert found == {(number, rule) for number, layout in enumerate(refused) for rule in refusals(layout)}
+    assert {rule for _, rule in found} == {"two-open-ends", "bad-count"}
 
 
 def test_a_bit_field_cannot_count() -> None:
