@@ -30,7 +30,7 @@ from ._support import (
     OpenEnum,
     OutOfRange,
     REFUSALS,
-    refused,
+    settled,
     Steps,
     Whole,
     wrong_size,
@@ -471,7 +471,7 @@ class _StatusU16Response(Response):
         try:
             return _PACK_STATUS_U16_RESPONSE(self.status)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -527,7 +527,7 @@ class _ValueI32Response(Response):
         try:
             return _PACK_VALUE_I32_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -562,7 +562,7 @@ class _ValueU16Request(Request):
                 raise OutOfRange
             return _PACK_VALUE_U16_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -598,7 +598,7 @@ class _ValueU16Response(Response):
         try:
             return _PACK_VALUE_U16_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -795,7 +795,7 @@ class SetPosRequest(Request):
                 raise OutOfRange
             return _PACK_SET_POS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -849,7 +849,7 @@ class SetVelRequest(Request):
             value_raw = _VALUE.raw(self.value)
             return _PACK_SET_VEL_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -902,7 +902,7 @@ class SetAccRequest(Request):
             value_raw = _VALUE_2.raw(self.value)
             return _PACK_SET_ACC_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -956,7 +956,7 @@ class SetMaxAccRequest(Request):
             value_raw = _VALUE_3.raw(self.value)
             return _PACK_SET_MAX_ACC_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1008,7 +1008,7 @@ class SetJerkRequest(Request):
             value_raw = _VALUE_4.raw(self.value)
             return _PACK_SET_JERK_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1062,7 +1062,7 @@ class SetRatioRequest(Request):
             value_raw = _VALUE_5.raw(self.value)
             return _PACK_SET_RATIO_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1221,7 +1221,7 @@ class GetVelResponse(Response):
             value_raw = _VALUE.raw(self.value)
             return _PACK_GET_VEL_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1279,7 +1279,7 @@ class GetAccResponse(Response):
             value_raw = _VALUE_6.raw(self.value)
             return _PACK_GET_ACC_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1331,7 +1331,7 @@ class GetMaxAccResponse(Response):
             value_raw = _VALUE_3.raw(self.value)
             return _PACK_GET_MAX_ACC_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1383,7 +1383,7 @@ class GetJerkResponse(Response):
             value_raw = _VALUE_4.raw(self.value)
             return _PACK_GET_JERK_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1435,7 +1435,7 @@ class GetRatioResponse(Response):
             value_raw = _VALUE_5.raw(self.value)
             return _PACK_GET_RATIO_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1516,7 +1516,7 @@ class GetTrgtVelResponse(Response):
             value_raw = _VALUE_7.raw(self.value)
             return _PACK_GET_TRGT_VEL_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1710,7 +1710,7 @@ class SetMtrBiasRequest(Request):
                 raise OutOfRange
             return _PACK_SET_MTR_BIAS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1934,7 +1934,7 @@ class GetMtrLmtResponse(Response):
                 raise OutOfRange
             return _PACK_GET_MTR_LMT_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -1989,7 +1989,7 @@ class GetMtrBiasResponse(Response):
                 raise OutOfRange
             return _PACK_GET_MTR_BIAS_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2076,7 +2076,7 @@ class GetIntgrResponse(Response):
         try:
             return _PACK_GET_INTGR_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2131,7 +2131,7 @@ class GetActlPosErrResponse(Response):
         try:
             return _PACK_GET_ACTL_POS_ERR_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2419,7 +2419,7 @@ class SetBrkPntRequest(Request):
         try:
             return _PACK_SET_BRK_PNT_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2489,7 +2489,7 @@ class MultiUpdateRequest(Request):
         try:
             return _PACK_MULTI_UPDATE_REQUEST(self.axes)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2595,7 +2595,7 @@ class GetBrkPntResponse(Response):
         try:
             return _PACK_GET_BRK_PNT_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2636,7 +2636,7 @@ class SetIntrptMaskRequest(Request):
         try:
             return _PACK_SET_INTRPT_MASK_REQUEST(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2710,7 +2710,7 @@ class RstIntrptRequest(Request):
         try:
             return _PACK_RST_INTRPT_REQUEST(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2770,7 +2770,7 @@ class GetIntrptMaskResponse(Response):
         try:
             return _PACK_GET_INTRPT_MASK_RESPONSE(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -2832,7 +2832,7 @@ class RstStatusRequest(Request):
         try:
             return _PACK_RST_STATUS_REQUEST(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3096,7 +3096,7 @@ class SetMtrCmdRequest(Request):
                 raise OutOfRange
             return _PACK_SET_MTR_CMD_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3161,7 +3161,7 @@ class GetMtrCmdResponse(Response):
                 raise OutOfRange
             return _PACK_GET_MTR_CMD_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3209,7 +3209,7 @@ class SetBufMtrCmdRequest(Request):
                 raise OutOfRange
             return _PACK_SET_BUF_MTR_CMD_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3276,7 +3276,7 @@ class GetBufMtrCmdResponse(Response):
         try:
             return _PACK_GET_BUF_MTR_CMD_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3326,7 +3326,7 @@ class GetOutputModeResponse(Response):
         try:
             return _PACK_GET_OUTPUT_MODE_RESPONSE(self.mode)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3410,7 +3410,7 @@ class SetActlPosRequest(Request):
                 raise OutOfRange
             return _PACK_SET_ACTL_POS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3492,7 +3492,7 @@ class SetLmtSenseRequest(Request):
         try:
             return _PACK_SET_LMT_SENSE_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3555,7 +3555,7 @@ class GetLmtSwtchResponse(Response):
         try:
             return _PACK_GET_LMT_SWTCH_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3678,7 +3678,7 @@ class SetSmplTimeRequest(Request):
         try:
             return _PACK_SET_SMPL_TIME_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3824,7 +3824,7 @@ class GetTimeResponse(Response):
         try:
             return _PACK_GET_TIME_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3868,7 +3868,7 @@ class SetPhaseCntsRequest(Request):
                 raise OutOfRange
             return _PACK_SET_PHASE_CNTS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3926,7 +3926,7 @@ class SetPhaseOffsetRequest(Request):
         try:
             return _PACK_SET_PHASE_OFFSET_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -3981,7 +3981,7 @@ class SetPhaseTimeRequest(Request):
         try:
             return _PACK_SET_PHASE_TIME_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -4036,7 +4036,7 @@ class SetPhaseRequest(Request):
         try:
             return _PACK_SET_PHASE_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -4149,7 +4149,7 @@ class GetPhaseCntsResponse(Response):
         try:
             return _PACK_GET_PHASE_CNTS_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -4199,7 +4199,7 @@ class GetPhaseTimeResponse(Response):
         try:
             return _PACK_GET_PHASE_TIME_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -4254,7 +4254,7 @@ class GetPhaseOffsetResponse(Response):
         try:
             return _PACK_GET_PHASE_OFFSET_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:

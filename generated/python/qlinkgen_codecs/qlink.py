@@ -34,7 +34,7 @@ from ._support import (
     OpenEnum,
     OutOfRange,
     REFUSALS,
-    refused,
+    settled,
     Steps,
     UNREADABLE,
     Whole,
@@ -249,7 +249,7 @@ class _Empty(Message):
                 raise OutOfRange
             body = _PACK_EMPTY(4, self.ID, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -325,7 +325,7 @@ class NodeSetupRequest(Message):
                 8, 0x01, self.node, self.node_number, t1_delay_raw, t2_delay_raw, self.position_type,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -398,7 +398,7 @@ class NodeInfoRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_INFO_REQUEST(4, 0x02, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -492,7 +492,7 @@ class NodeInfoResponse(Message):
                 t1_delay_raw, t2_delay_raw, self.position_type, self.serial_number,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -548,7 +548,7 @@ class NodeStartRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_START_REQUEST(4, 0x03, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -598,7 +598,7 @@ class NodeStopRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_STOP_REQUEST(4, 0x04, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -653,7 +653,7 @@ class NodeSyncRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_SYNC_REQUEST(5, 0x05, self.node, self.counter)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -718,7 +718,7 @@ class NodeProgramLoadRequest(Message):
                 + program_data_raw
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -785,7 +785,7 @@ class NodeProgramLoadResponse(Message):
                 raise OutOfRange
             body = _PACK_NODE_PROGRAM_LOAD_RESPONSE(5, 0x06, self.node, self.counter)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -891,7 +891,7 @@ class MotorResponsePollResponse(Message):
                 + motor_data_raw
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -953,7 +953,7 @@ class MotorRequestRequest(Message):
                 raise OutOfRange
             body = _PACK_MOTOR_REQUEST_REQUEST(4 + motor_data_count, 0x16, self.node) + motor_data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1044,7 +1044,7 @@ class MotionRequest(Message):
                 6 + 2 * segments_count, 0x20, self.node, self.counter, self.outputs, *self.segments,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1125,7 +1125,7 @@ class MotionResponse(Message):
                 self.fifo_space,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1196,7 +1196,7 @@ class MotorPositionResponse(Message):
                 raise OutOfRange
             body = _PACK_MOTOR_POSITION_RESPONSE(8, 0x21, self.node, self.position)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1278,7 +1278,7 @@ class PresetMotorPositionRequest(Message):
                 raise OutOfRange
             body = _PACK_PRESET_MOTOR_POSITION_REQUEST(8, 0x23, self.node, self.position)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1349,7 +1349,7 @@ class ReadRequest(Message):
                 raise OutOfRange
             body = _PACK_READ_REQUEST(6, 0x81, self.node, self.size, self.offset)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1408,7 +1408,7 @@ class ReadResponse(Message):
                 raise OutOfRange
             body = _PACK_READ_RESPONSE(4 + data_count, 0x81, self.node) + data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1472,7 +1472,7 @@ class WriteRequest(Message):
                 raise OutOfRange
             body = _PACK_WRITE_REQUEST(5 + data_count, 0x82, self.node, self.offset) + data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1545,7 +1545,7 @@ class WriteReadRequest(Message):
                 raise OutOfRange
             body = _PACK_WRITE_READ_REQUEST(7, 0x83, self.node, self.outputs.to_bytes(3, "little"))
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1600,7 +1600,7 @@ class WriteReadResponse(Message):
                 raise OutOfRange
             body = _PACK_WRITE_READ_RESPONSE(7, 0x83, self.node, self.inputs.to_bytes(3, "little"))
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1655,7 +1655,7 @@ class SetOutputsRequest(Message):
                 raise OutOfRange
             body = _PACK_SET_OUTPUTS_REQUEST(7, 0x84, self.node, self.mask.to_bytes(3, "little"))
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1724,7 +1724,7 @@ class ClearOutputsRequest(Message):
                 raise OutOfRange
             body = _PACK_CLEAR_OUTPUTS_REQUEST(7, 0x85, self.node, self.mask.to_bytes(3, "little"))
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1798,7 +1798,7 @@ class LoopBackRequest(Message):
                 raise OutOfRange
             body = _PACK_LOOP_BACK_REQUEST(5 + data_count, 0xA4, self.node, self.offset) + data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1862,7 +1862,7 @@ class LoopBackResponse(Message):
                 raise OutOfRange
             body = _PACK_LOOP_BACK_RESPONSE(5 + data_count, 0xA4, self.node, self.offset) + data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)

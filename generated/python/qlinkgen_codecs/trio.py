@@ -11,6 +11,7 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from __future__ import annotations
 
+from _operator import index
 from struct import Struct
 from struct import error as struct_error
 from decimal import Decimal
@@ -35,6 +36,7 @@ from ._support import (
     OutOfRange,
     REFUSALS,
     refused,
+    settled,
     Text,
     Whole,
     wrong_size,
@@ -137,7 +139,7 @@ class Message(BaseMessage):
         payload = self.to_bytes()
         if self.RULES[0].complaint(self.address):
             raise refused(self)
-        mark = _MARKER | self.address << _ADDRESS_SHIFT
+        mark = _MARKER | index(self.address) << _ADDRESS_SHIFT
         check = _check(payload) if self.CHECKED else b""
         return bytes((mark | self.ID << _ID_SHIFT,)) + payload + check + bytes((mark | _END << _ID_SHIFT,))
 
@@ -198,7 +200,7 @@ class CharacterTransfer(Message):
                 raise OutOfRange
             return characters_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -251,9 +253,9 @@ class DirectVariableTransfer(Message):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            number_raw = self.number
+            number_raw = index(self.number)
             value_raw = _VALUE.raw(self.value)
-            if not 0 <= self.number <= 16383:
+            if not 0 <= number_raw <= 16383:
                 raise OutOfRange
             return _PACK_DIRECT_VARIABLE_TRANSFER(
                 number_raw & 0x7F, number_raw >> 7 & 0x7F, value_raw >> 32 & 0x7F, value_raw >> 39 & 0x7F,
@@ -262,7 +264,7 @@ class DirectVariableTransfer(Message):
                 value_raw >> 28 & 0x0F,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -329,12 +331,12 @@ class KeypadOffset(Message):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            offset_raw = self.offset
-            if not 1 <= self.offset <= 15:
+            offset_raw = index(self.offset)
+            if not 1 <= offset_raw <= 15:
                 raise OutOfRange
             return _PACK_KEYPAD_OFFSET(offset_raw & 0x7F)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
@@ -381,12 +383,12 @@ class KeypadMode(Message):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            mode_raw = self.mode
-            if not 0 <= self.mode <= 127:
+            mode_raw = index(self.mode)
+            if not 0 <= mode_raw <= 127:
                 raise OutOfRange
             return _PACK_KEYPAD_MODE(mode_raw & 0x7F)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:

@@ -155,15 +155,11 @@ class Encoder:
 
     def _outgoing(self, name: str, scalar: Scalar, *, in_struct: bool) -> str:
         """The number of an attribute, checked as far as struct will not."""
-        plain = in_struct and scalar.byteorder is not None
-        conversion = scalars.outgoing(
-            scalar, f"self.{name}", f"{name}_raw", self.steps.get(name, ""), checked=plain
-        )
+        packed = in_struct and scalar.byteorder is not None
+        steps = self.steps.get(name, "")
+        conversion = scalars.outgoing(scalar, f"self.{name}", f"{name}_raw", steps, packed=packed)
         self.lines.extend(conversion.lines)
         self.conditions.extend(conversion.conditions)
-        if in_struct and scalar.byteorder is None and conversion.result != f"{name}_raw":
-            self.lines.append(f"{name}_raw = {conversion.result}")
-            return f"{name}_raw"
         return conversion.result
 
     def _count(self, scalar: Scalar) -> None:

@@ -11,12 +11,12 @@ PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeErro
 
 _SUPPORT = (
     "BaseMessage", "MISFITS", "Misfit", "OutOfRange", "REFUSALS", "UNREADABLE", "as_bytes", "illegal",
-    "refused", "wrong_size",
+    "settled", "wrong_size",
 )  # fmt: skip
 #: Names that are plain words as well: used only where they are called.
 _CALLED = (
     "Constant", "Count", "DecimalSteps", "Items", "Marking", "Mask", "Octets", "Steps", "Text", "Whole",
-    "crc", "find_crc", "sum_of",
+    "crc", "find_crc", "refused", "sum_of",
 )  # fmt: skip
 
 
@@ -35,6 +35,7 @@ def imports(text: str, *, enums: bool, flags: bool) -> dict[str, Any]:
     support = {*used(_SUPPORT), *called(_CALLED), *PUBLIC, *(["OpenEnum", "named"] if enums else [])}
     return {
         "structs": ", ".join(called(("Struct", "pack", "unpack", "unpack_from"))),
+        "indexes": bool(called(("index",))),
         "decimals": bool(used(("Decimal",))),
         "used": used(("struct_error", "Callable")),
         "typing": ", ".join(sorted(typing)),

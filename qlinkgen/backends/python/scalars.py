@@ -146,19 +146,22 @@ def _group_out(number: str, chunk: Chunk) -> str:
     )
 
 
-def outgoing(scalar: Scalar, attribute: str, local: str, steps: str, *, checked: bool) -> Conversion:
+def outgoing(scalar: Scalar, attribute: str, local: str, steps: str, *, packed: bool) -> Conversion:
     """From the attribute to the number on the wire.
 
-    ``checked``: struct refuses what does not fit, so only a range inside of that is checked here.
+    ``packed``: the number goes to struct or `to_bytes`, which refuse what is not an integer and what does not
+    fit, so only a range inside of that is checked here. Otherwise there is arithmetic, for which it has to be
+    an int: other integers, like those of numpy, lose bits that are shifted.
     """
     if scalar.scaling is not None:
         return Conversion(local, (f"{local} = {steps}.raw({attribute})",))
+    number = attribute if packed else local
     conditions = []
     if isinstance(scalar.meaning, Flags) and scalar.meaning.reserved_zero:
-        conditions.append(f"{attribute} & ~{scalar.meaning.mask:#x} == 0")
-    if not scalar.full_range or not checked:
-        conditions.append(within(attribute, scalar))
-    return Conversion(attribute, (), tuple(conditions))
+        conditions.append(f"{number} & ~{scalar.meaning.mask:#x} == 0")
+    if not scalar.full_range or not packed:
+        conditions.append(within(number, scalar))
+    return Conversion(number, () if packed else (f"{local} = index({attribute})",), tuple(conditions))
 
 
 def within(number: str, scalar: Scalar) -> str:
