@@ -96,6 +96,21 @@ class FieldBuilder:
                 "two-open-ends", (*path, name), what, hint, of_key=True, needs=(*needs, *counts)
             )
             self._report.taint((*path, name))
+        if open_ends:
+            self._check_counts_behind(open_ends[0], fields, path)
+
+    def _check_counts_behind(self, name: str, fields: Sequence[Field], path: Path) -> None:
+        """Where a field takes what the counted ones leave, their counts come first."""
+        order = [field.name for field in fields]
+        for field in fields[order.index(name) + 1 :]:
+            if not isinstance(field.type, Blob | Array) or field.fixed:
+                continue
+            count = field.type.length.counted_by
+            if count and order.index(count) > order.index(name):
+                what = f"{count} counts {field.name} and follows {name}, which takes the rest of the payload"
+                hint = f"move {count} before {name}, or give {name} a count"
+                needs = ((*path, name), (*path, count), (*path, field.name))
+                self._report.error("bad-count", (*path, count, "counts"), what, hint, needs=needs)
 
     def _bounded(self, fields: Sequence[Field], path: Path) -> list[Field]:
         """The fields, where one without a bound may fill what the others leave of the payload."""

@@ -120,7 +120,7 @@ _ALL = (
     Rule(
         "bad-count",
         "A count names a later field of variable size in the same message, and is wide enough for it.",
-        "The codec fills and verifies it.",
+        "The codec fills and verifies it. It precedes a field that takes the rest of the payload.",
     ),
     Rule(
         "two-open-ends",

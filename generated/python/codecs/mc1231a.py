@@ -476,7 +476,7 @@ class _StatusU16Response(Response):
         try:
             return _PACK_STATUS_U16_RESPONSE(self.status)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -530,7 +530,7 @@ class _ValueI32Response(Response):
         try:
             return _PACK_VALUE_I32_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -563,7 +563,7 @@ class _ValueU16Request(Request):
                 raise OutOfRange
             return _PACK_VALUE_U16_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -597,7 +597,7 @@ class _ValueU16Response(Response):
         try:
             return _PACK_VALUE_U16_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -793,7 +793,7 @@ class SetPosRequest(Request):
                 raise OutOfRange
             return _PACK_SET_POS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -846,7 +846,7 @@ class SetVelRequest(Request):
             value_raw = _VELOCITY.raw(self.value)
             return _PACK_SET_VEL_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -897,7 +897,7 @@ class SetAccRequest(Request):
             value_raw = _ACCELERATION_LIMIT.raw(self.value)
             return _PACK_SET_ACC_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -950,7 +950,7 @@ class SetMaxAccRequest(Request):
             value_raw = _PEAK_ACCELERATION.raw(self.value)
             return _PACK_SET_MAX_ACC_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1001,7 +1001,7 @@ class SetJerkRequest(Request):
             value_raw = _JERK.raw(self.value)
             return _PACK_SET_JERK_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1053,7 +1053,7 @@ class SetRatioRequest(Request):
             value_raw = _GEAR_RATIO.raw(self.value)
             return _PACK_SET_RATIO_REQUEST(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1223,7 +1223,7 @@ class GetVelResponse(Response):
             value_raw = _VELOCITY.raw(self.value)
             return _PACK_GET_VEL_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1279,7 +1279,7 @@ class GetAccResponse(Response):
             value_raw = _ACCELERATION.raw(self.value)
             return _PACK_GET_ACC_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1330,7 +1330,7 @@ class GetMaxAccResponse(Response):
             value_raw = _PEAK_ACCELERATION.raw(self.value)
             return _PACK_GET_MAX_ACC_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1381,7 +1381,7 @@ class GetJerkResponse(Response):
             value_raw = _JERK.raw(self.value)
             return _PACK_GET_JERK_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1431,7 +1431,7 @@ class GetRatioResponse(Response):
             value_raw = _GEAR_RATIO.raw(self.value)
             return _PACK_GET_RATIO_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1511,7 +1511,7 @@ class GetTrgtVelResponse(Response):
             value_raw = _SIGNED_VELOCITY.raw(self.value)
             return _PACK_GET_TRGT_VEL_RESPONSE(value_raw)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1705,7 +1705,7 @@ class SetMtrBiasRequest(Request):
                 raise OutOfRange
             return _PACK_SET_MTR_BIAS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1929,7 +1929,7 @@ class GetMtrLmtResponse(Response):
                 raise OutOfRange
             return _PACK_GET_MTR_LMT_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -1982,7 +1982,7 @@ class GetMtrBiasResponse(Response):
                 raise OutOfRange
             return _PACK_GET_MTR_BIAS_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2067,7 +2067,7 @@ class GetIntgrResponse(Response):
         try:
             return _PACK_GET_INTGR_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2120,7 +2120,7 @@ class GetActlPosErrResponse(Response):
         try:
             return _PACK_GET_ACTL_POS_ERR_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2418,7 +2418,7 @@ class SetBrkPntRequest(Request):
         try:
             return _PACK_SET_BRK_PNT_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2487,7 +2487,7 @@ class MultiUpdateRequest(Request):
         try:
             return _PACK_MULTI_UPDATE_REQUEST(self.axes)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2591,7 +2591,7 @@ class GetBrkPntResponse(Response):
         try:
             return _PACK_GET_BRK_PNT_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2630,7 +2630,7 @@ class SetIntrptMaskRequest(Request):
         try:
             return _PACK_SET_INTRPT_MASK_REQUEST(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2703,7 +2703,7 @@ class RstIntrptRequest(Request):
         try:
             return _PACK_RST_INTRPT_REQUEST(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2763,7 +2763,7 @@ class GetIntrptMaskResponse(Response):
         try:
             return _PACK_GET_INTRPT_MASK_RESPONSE(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -2823,7 +2823,7 @@ class RstStatusRequest(Request):
         try:
             return _PACK_RST_STATUS_REQUEST(self.mask)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3085,7 +3085,7 @@ class SetMtrCmdRequest(Request):
                 raise OutOfRange
             return _PACK_SET_MTR_CMD_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3148,7 +3148,7 @@ class GetMtrCmdResponse(Response):
                 raise OutOfRange
             return _PACK_GET_MTR_CMD_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3194,7 +3194,7 @@ class SetBufMtrCmdRequest(Request):
                 raise OutOfRange
             return _PACK_SET_BUF_MTR_CMD_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3259,7 +3259,7 @@ class GetBufMtrCmdResponse(Response):
         try:
             return _PACK_GET_BUF_MTR_CMD_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3307,7 +3307,7 @@ class GetOutputModeResponse(Response):
         try:
             return _PACK_GET_OUTPUT_MODE_RESPONSE(self.mode)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3389,7 +3389,7 @@ class SetActlPosRequest(Request):
                 raise OutOfRange
             return _PACK_SET_ACTL_POS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3469,7 +3469,7 @@ class SetLmtSenseRequest(Request):
         try:
             return _PACK_SET_LMT_SENSE_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3530,7 +3530,7 @@ class GetLmtSwtchResponse(Response):
         try:
             return _PACK_GET_LMT_SWTCH_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3651,7 +3651,7 @@ class SetSmplTimeRequest(Request):
         try:
             return _PACK_SET_SMPL_TIME_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3795,7 +3795,7 @@ class GetTimeResponse(Response):
         try:
             return _PACK_GET_TIME_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3837,7 +3837,7 @@ class SetPhaseCntsRequest(Request):
                 raise OutOfRange
             return _PACK_SET_PHASE_CNTS_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3893,7 +3893,7 @@ class SetPhaseOffsetRequest(Request):
         try:
             return _PACK_SET_PHASE_OFFSET_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3946,7 +3946,7 @@ class SetPhaseTimeRequest(Request):
         try:
             return _PACK_SET_PHASE_TIME_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -3999,7 +3999,7 @@ class SetPhaseRequest(Request):
         try:
             return _PACK_SET_PHASE_REQUEST(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -4111,7 +4111,7 @@ class GetPhaseCntsResponse(Response):
         try:
             return _PACK_GET_PHASE_CNTS_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -4159,7 +4159,7 @@ class GetPhaseTimeResponse(Response):
         try:
             return _PACK_GET_PHASE_TIME_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -4212,7 +4212,7 @@ class GetPhaseOffsetResponse(Response):
         try:
             return _PACK_GET_PHASE_OFFSET_RESPONSE(self.value)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:

@@ -11,7 +11,7 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from __future__ import annotations
 
-from operator import index
+from _operator import index
 from struct import Struct
 from struct import error as struct_error
 
@@ -264,7 +264,7 @@ class _Empty(Message):
                 raise OutOfRange
             body = _PACK_EMPTY(4, self.ID, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -348,7 +348,7 @@ class NodeSetupRequest(Message):
                 self.position_type,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -428,7 +428,7 @@ class NodeInfoRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_INFO_REQUEST(4, 0x02, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -543,7 +543,7 @@ class NodeInfoResponse(Message):
                 self.serial_number,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -607,7 +607,7 @@ class NodeStartRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_START_REQUEST(4, 0x03, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -655,7 +655,7 @@ class NodeStopRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_STOP_REQUEST(4, 0x04, self.node)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -708,7 +708,7 @@ class NodeSyncRequest(Message):
                 raise OutOfRange
             body = _PACK_NODE_SYNC_REQUEST(5, 0x05, self.node, self.counter)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -783,7 +783,7 @@ class NodeProgramLoadRequest(Message):
             )
             body += program_data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -850,7 +850,7 @@ class NodeProgramLoadResponse(Message):
                 raise OutOfRange
             body = _PACK_NODE_PROGRAM_LOAD_RESPONSE(5, 0x06, self.node, self.counter)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -966,7 +966,7 @@ class MotorResponsePollResponse(Message):
             )
             body += motor_data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1029,7 +1029,7 @@ class MotorRequestRequest(Message):
             body = _PACK_MOTOR_REQUEST_REQUEST(4 + motor_data_count, 0x16, self.node)
             body += motor_data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1125,7 +1125,7 @@ class MotionRequest(Message):
                 *self.segments,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1216,7 +1216,7 @@ class MotionResponse(Message):
                 self.fifo_space,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1292,7 +1292,7 @@ class MotorPositionResponse(Message):
                 raise OutOfRange
             body = _PACK_MOTOR_POSITION_RESPONSE(8, 0x21, self.node, self.position)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1381,7 +1381,7 @@ class PresetMotorPositionRequest(Message):
                 self.position,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1453,7 +1453,7 @@ class ReadRequest(Message):
                 raise OutOfRange
             body = _PACK_READ_REQUEST(6, 0x81, self.node, self.size, self.offset)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1510,7 +1510,7 @@ class ReadResponse(Message):
             body = _PACK_READ_RESPONSE(4 + data_count, 0x81, self.node)
             body += data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1570,7 +1570,7 @@ class WriteRequest(Message):
             body = _PACK_WRITE_REQUEST(5 + data_count, 0x82, self.node, self.offset)
             body += data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1645,7 +1645,7 @@ class WriteReadRequest(Message):
                 outputs_raw.to_bytes(3, "little"),
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1704,7 +1704,7 @@ class WriteReadResponse(Message):
                 inputs_raw.to_bytes(3, "little"),
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1763,7 +1763,7 @@ class SetOutputsRequest(Message):
                 mask_raw.to_bytes(3, "little"),
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1836,7 +1836,7 @@ class ClearOutputsRequest(Message):
                 mask_raw.to_bytes(3, "little"),
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1908,7 +1908,7 @@ class LoopBackRequest(Message):
             body = _PACK_LOOP_BACK_REQUEST(5 + data_count, 0xA4, self.node, self.offset)
             body += data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)
@@ -1973,7 +1973,7 @@ class LoopBackResponse(Message):
             )
             body += data_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_frame()
         crc = _crc(body, _crc_start)
         if _MARK in body or crc >> 8 == _MARK or crc & 0xFF == _MARK:
             return _stuffed(body, crc)

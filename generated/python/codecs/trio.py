@@ -11,8 +11,8 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from __future__ import annotations
 
+from _operator import index
 from decimal import Decimal
-from operator import index
 from struct import Struct
 from struct import error as struct_error
 
@@ -214,7 +214,7 @@ class CharacterTransfer(Message):
                 raise OutOfRange
             return characters_raw
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -292,7 +292,7 @@ class DirectVariableTransfer(Message):
                 value_raw >> 28 & 0x0F,
             )
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -383,7 +383,7 @@ class KeypadOffset(Message):
                 raise OutOfRange
             return _PACK_KEYPAD_OFFSET(offset_raw & 0x7F)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:
@@ -437,7 +437,7 @@ class KeypadMode(Message):
                 raise OutOfRange
             return _PACK_KEYPAD_MODE(mode_raw & 0x7F)
         except REFUSALS:
-            raise refused(self) from None
+            return settled(self).to_bytes()
 
     @classmethod
     def _read(cls, payload: bytes) -> Self:

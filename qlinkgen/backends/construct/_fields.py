@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
 from typing import Any
@@ -216,16 +216,27 @@ class Items(Construct):
     """A list of minimum to maximum items.
 
     ``count`` names the field that says how many. A list of no fixed size without it takes the payload's rest,
-    all but the ``tail`` bytes behind it.
+    all but the ``tail`` bytes of fixed size after it, and the fields after it that ``counted`` tells of: the
+    size of an item by the name of each count.
     """
 
-    def __init__(self, item: Any, minimum: int, maximum: int, *, count: str = "", tail: int = 0) -> None:
+    def __init__(
+        self,
+        item: Any,
+        minimum: int,
+        maximum: int,
+        *,
+        count: str = "",
+        tail: int = 0,
+        counted: Mapping[str, int] | None = None,
+    ) -> None:
         super().__init__()
         self.item = item
         self.minimum = minimum
         self.maximum = maximum
         self.count = count
         self.tail = tail
+        self.counted = counted or {}
 
     def _number(self, stream: Any, context: Any, path: Any) -> int:
         if self.count:
@@ -233,7 +244,8 @@ class Items(Construct):
         elif self.minimum == self.maximum:
             number = self.minimum
         else:
-            number = (len(stream.getbuffer()) - stream.tell() - self.tail) // int(self.item.sizeof())
+            behind = self.tail + sum(context[name] * size for name, size in self.counted.items())
+            number = (len(stream.getbuffer()) - stream.tell() - behind) // int(self.item.sizeof())
         return self._checked(number, path)
 
     def _checked(self, number: int, path: Any) -> int:
@@ -256,8 +268,16 @@ class Items(Construct):
 class Octets(Items):
     """A byte string of minimum to maximum bytes, otherwise like Items."""
 
-    def __init__(self, minimum: int, maximum: int, *, count: str = "", tail: int = 0) -> None:
-        super().__init__(_OCTET, minimum, maximum, count=count, tail=tail)
+    def __init__(
+        self,
+        minimum: int,
+        maximum: int,
+        *,
+        count: str = "",
+        tail: int = 0,
+        counted: Mapping[str, int] | None = None,
+    ) -> None:
+        super().__init__(_OCTET, minimum, maximum, count=count, tail=tail, counted=counted)
 
     def _parse(self, stream: Any, context: Any, path: Any) -> Any:
         return stream_read(stream, self._number(stream, context, path), path)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from qlinkgen.backends.construct.tree import Call, Named, Node, Power, Ref, Sequence
-from qlinkgen.errors import GenerationError
+from qlinkgen.backends.construct.tree import Call, Named, Node, Power, Ref, Sequence, Table
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Enum, Flags, Scalar
 from qlinkgen.model.values import native_from_raw
@@ -51,6 +50,9 @@ def _scalar(message: Message, scalar: Scalar) -> Node:
     raw = integer(scalar.chunks, signed=scalar.signed)
     if scalar.constant:
         return Call("Const", (scalar.default, raw))
+    if scalar.reserved and scalar.byteorder is None:  # bits between the groups are ignored too
+        data = bytes(scalar.default >> chunk.shift & chunk.mask for chunk in scalar.chunks)
+        return Call("Rebuild", (Call("Bytes", (scalar.size,)), data))
     if scalar.reserved:
         return Call("Rebuild", (raw, scalar.default))
     if scalar.counts:
@@ -99,8 +101,8 @@ def _items(message: Message, field: Field, kind: Blob | Array) -> Node:
     kwargs: tuple[tuple[str, Node], ...] = ()
     if length.counted_by:
         kwargs = (("count", length.counted_by),)
-    elif not length.fixed and (tail := _tail(message, field)):
-        kwargs = (("tail", tail),)
+    elif not length.fixed:
+        kwargs = _behind(message, field)
     if isinstance(kind, Array):
         item = _ranged(integer(kind.item.chunks, signed=kind.item.signed), kind.item)
         return Call(
@@ -110,11 +112,18 @@ def _items(message: Message, field: Field, kind: Blob | Array) -> Node:
     return Call("Default", (node, kind.default.decode("ascii") if kind.text else kind.default))
 
 
-def _tail(message: Message, field: Field) -> int:
+def _behind(message: Message, field: Field) -> tuple[tuple[str, Node], ...]:
+    """What follows a field that takes the rest: fixed bytes, and counts with the size of an item."""
     behind = message.fields[message.fields.index(field) + 1 :]
-    if not all(each.fixed for each in behind):
-        raise GenerationError(f"{message.name}: what follows {field.name} must have a fixed size")
-    return sum(each.max_size for each in behind)
+    found: list[tuple[str, Node]] = []
+    if tail := sum(each.max_size for each in behind if each.fixed):
+        found.append(("tail", tail))
+    sizes: list[tuple[str, Node]] = [
+        (each.type.length.counted_by, each.type.item_size)
+        for each in behind
+        if isinstance(each.type, Blob | Array) and not each.fixed
+    ]
+    return (*found, ("counted", Table(tuple(sizes)))) if sizes else tuple(found)
 
 
 def _doc(field: Field) -> str:

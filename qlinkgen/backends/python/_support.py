@@ -6,6 +6,7 @@ would cost 6 ms, `dataclasses` 30.
 
 from __future__ import annotations
 
+from _operator import index  # built in; `operator` would be read from a file
 from binascii import crc_hqx
 from struct import error as struct_error
 
@@ -14,7 +15,9 @@ TYPE_CHECKING = (
 )
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-    from typing import Any, ClassVar
+    from typing import Any, ClassVar, TypeVar
+
+    AnyMessage = TypeVar("AnyMessage", bound="BaseMessage")
 
     #: Checksum of some bytes, beginning with a register.
     Crc = Callable[[bytes, int], int]
@@ -179,6 +182,10 @@ class Rule:
         """The value can be sent. May raise any of REFUSALS instead."""
         raise NotImplementedError
 
+    def plain(self, value: Any) -> Any:
+        """The value as encoders take it: an int for what only has the value of one."""
+        return value
+
     def complaint(self, value: object) -> str:
         """What is wrong with a value, "" where nothing is."""
         try:
@@ -210,8 +217,12 @@ class Whole(Rule):
 
     def allows(self, value: Any) -> bool:
         """The value is an integer (or has the value of one) in range."""
-        number = value.__index__()
+        number = index(value)
         return any(first <= number <= last for first, last in self.ranges)
+
+    def plain(self, value: Any) -> int:
+        """An int."""
+        return index(value)
 
 
 class Mask(Rule):
@@ -225,7 +236,11 @@ class Mask(Rule):
 
     def allows(self, value: Any) -> bool:
         """The value has no other bits."""
-        return bool(value.__index__() & ~self.mask == 0)
+        return index(value) & ~self.mask == 0
+
+    def plain(self, value: Any) -> int:
+        """An int."""
+        return index(value)
 
 
 class Constant(Rule):
@@ -272,6 +287,12 @@ class Items(Rule):
         return self.fewest <= len(value) <= self.most and all(
             self.item.allows(item) for item in value
         )
+
+    def plain(self, value: Any) -> Any:
+        """A list of ints."""
+        numbers = [index(item) for item in value]
+        same = all(new is old for new, old in zip(numbers, value, strict=True))
+        return value if same and value.__class__ is list else numbers
 
 
 class Octets(Rule):
@@ -369,8 +390,12 @@ class Scaled(Rule):
 
     def allows(self, value: Any) -> bool:
         """The value has a nearest step, and that is in range."""
-        self.scale.raw(value)
+        self.scale.raw(self.plain(value))
         return True
+
+    def plain(self, value: Any) -> Any:
+        """A number with an exact ratio."""
+        return value if hasattr(value, "as_integer_ratio") else index(value)
 
 
 def _too_fine(value: Any) -> bool:
@@ -447,6 +472,24 @@ def refused(message: BaseMessage) -> EncodeError:
             if complaint := rule.complaint(value):
                 return EncodeError(f"{message.NAME}: {complaint}", rule.name, value)
     return EncodeError(f"{message.NAME}: cannot be sent: {shown(message)}")
+
+
+def settled(message: AnyMessage) -> AnyMessage:
+    """A copy of a message that an encoder has failed on, with plain ints in it.
+
+    Raises EncodeError where a value cannot be sent, and where nothing can be made plain.
+    """
+    same, plain = True, object.__new__(type(message))
+    for rule in message.RULES:
+        if rule.settable:
+            value = getattr(message, rule.name, None)
+            if rule.complaint(value):
+                raise refused(message) from None
+            setattr(plain, rule.name, rule.plain(value))
+            same = same and getattr(plain, rule.name) is value
+    if same:
+        raise refused(message) from None
+    return plain
 
 
 def wrong_size(message: type[BaseMessage], payload: bytes) -> DecodeError:
@@ -849,9 +892,9 @@ def _table(seed: int, clock: Callable[[int], int], *, up: bool = True) -> list[i
     for bit in bits:
         value = clock(value)
         table[1 << bit] = value
-    for index in range(3, 256):
-        low = index & -index
-        table[index] = table[low] ^ table[index ^ low]
+    for byte in range(3, 256):
+        low = byte & -byte
+        table[byte] = table[low] ^ table[byte ^ low]
     return table
 
 
