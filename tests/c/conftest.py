@@ -15,6 +15,11 @@ from tests.support.cdriver import WARNINGS, Driver, build
 SHIPPED = ("qlink", "trio", "mc1231a")
 OTHERS = ("kitchen_sink", "modbus_rtu", "dynamixel")
 PROTOCOLS = SHIPPED + OTHERS
+#: Every warning an error, and every wrong access the end of the program.
+SANITIZED = (
+    *("-O1", "-g", "-std=c99", *WARNINGS),
+    *("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+)
 
 
 @functools.cache
@@ -35,15 +40,7 @@ def drivers(
     def get(name: str) -> Driver:
         if name not in running:
             folder = tmp_path_factory.mktemp(f"c_{name}")
-            flags = (
-                "-O1",
-                "-g",
-                "-std=c99",
-                *WARNINGS,
-                "-fsanitize=address,undefined",
-                "-fno-sanitize-recover=all",
-            )
-            running[name] = Driver(build(protocol_of(name), folder, compiler, flags))
+            running[name] = Driver(build(protocol_of(name), folder, compiler, SANITIZED))
         return running[name]
 
     yield get

@@ -26,6 +26,17 @@ static size_t from_hex(const char *text, uint8_t *out)
     return size;
 }
 
+/* Bytes at the end of a piece of memory, so that a sanitizer sees what is read or written behind them. */
+static uint8_t *copy_of(const uint8_t *bytes, size_t size)
+{
+    uint8_t *const memory = (uint8_t *)malloc(size + 16u);
+    if (memory == NULL) { abort(); }
+    memcpy(memory + 16u, bytes, size);
+    return memory + 16u;
+}
+
+static void release(uint8_t *copy) { free(copy - 16u); }
+
 static void put_digits(const uint8_t *data, size_t size)
 {
     for (size_t index = 0u; index < size; ++index) { printf("%02x", data[index]); }

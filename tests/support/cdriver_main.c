@@ -16,6 +16,8 @@ int main(void)
             printf("usage");
         } else if (strcmp(command, "stream") == 0) {
             stream(word());
+        } else if (strcmp(command, "cuts") == 0) {
+            cuts(word());
         } else if (strcmp(command, "check") == 0) {
             check(word());
         } else if ((entry = find(word())) == NULL) {

@@ -35,6 +35,7 @@ class _Source:
             self._encode(message)
             self._decode(message)
         self._stream()
+        self._cuts()
         self._check()
         rows = [f'    {{"{m.name}", encode_{s}, decode_{s}, payload_{s}}},' for m, s in self._stems()]
         table = [
@@ -260,6 +261,47 @@ class _Source:
                 "    }",
             )
         self._add("}")
+
+    # Cuts
+
+    def _cuts(self) -> None:
+        """Each front part of the bytes, at the end of memory of exactly its size; see cdriver_head.c."""
+        unpacks, directed = _unpacks(self.protocol.frame), _directed(self.protocol)
+        self._add(
+            "static void cuts(const char *direction)",
+            "{",
+            "    const size_t size = from_hex(word(), bytes_a);",
+            '    if (direction == NULL) { printf("usage"); return; }',
+            '    printf("ok");',
+            "    for (size_t cut = 0u; cut <= size; ++cut) {",
+            "        uint8_t *const part = copy_of(bytes_a, cut);",
+            "        @p@_frame_t frame;",
+            "        int status;",
+        )
+        if unpacks:
+            self._add("        uint8_t *const body = copy_of(bytes_b, @P@_DECODE_BUFFER_SIZE);")
+        buffer = "body, " if unpacks else ""
+        chosen = 'strcmp(direction, "request") == 0 ? @P@_REQUEST : @P@_RESPONSE, ' if directed else ""
+        self._add(f"        status = @p@_frame_decode({chosen}&frame, {buffer}part, cut);")
+        self._add("        if (status == @P@_OK) {")
+        for direction in self._directions():
+            self._add(f'            if (strcmp(direction, "{direction}") == 0) {{')
+            self._add(f"                status = @p@_{direction}_check(&frame);")
+            self._add("                for (size_t least = 0u; least < frame.size; ++least) {")
+            self._add("                    @p@_frame_t shorter = frame;")
+            self._add("                    uint8_t *const payload = copy_of(frame.payload, least);")
+            self._add(
+                "                    shorter.payload = payload;", "                    shorter.size = least;"
+            )
+            self._add(f"                    (void)@p@_{direction}_check(&shorter);")
+            self._add("                    release(payload);", "                }", "            }")
+        self._add("        }")
+        self._add(
+            '        printf(" %s", (status == @P@_OK) ? "intact" : kind_of(status));',
+            "        release(part);",
+            "        release(body);" if unpacks else "",
+        )
+        self._add("    }", "}")
 
     def _check(self) -> None:
         frame = self.protocol.frame

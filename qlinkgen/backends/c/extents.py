@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from qlinkgen.backends.c.names import Names, unsigned
+from qlinkgen.backends.c.checks import condition
+from qlinkgen.backends.c.names import Names, grouped, unsigned
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Array, Blob, Scalar
 
@@ -24,65 +25,65 @@ def extents(names: Names, messages: tuple[Message, ...], get: Get) -> list[dict[
 
 @dataclass
 class _Extent:
-    """Collects the statements for one message; ``moved`` is how far a variable field has pushed the rest."""
+    """Collects the statements for one message.
+
+    ``passed`` names the variables of the fields of variable size before the current place: how many bytes
+    each has beyond its fewest.
+    """
 
     message: Message
     upper: str
     get: Get
     lines: list[str] = field(default_factory=list)
-    _counts: int = 0
+    passed: list[str] = field(default_factory=list)
 
     def statements(self) -> list[str]:
-        self.lines = [f"*size = {self.message.min_size}U;"]
+        """Lines of the case, which return in the end."""
         fields = {each.name: each for each in self.message.fields}
-        counts = [each for each in self.message.fields if self._counted(each, fields)]
         offset = 0
         for each in self.message.fields:
-            counted = self._counted(each, fields)
-            if counted is not None and isinstance(each.type, Scalar):
-                self._count(each.type, counted, offset, last=each is counts[-1])
+            if isinstance(each.type, Scalar) and (counted := fields.get(each.type.counts)):
+                self._count(each.name, each.type, counted, offset)
+            if not each.fixed:
+                self.passed.append(f"{each.name}_more")
             offset += each.min_size
-        if not self._counts:
-            return [*self.lines, f"return {self.upper}_OK;"]
+        first = f"*size = {self.message.min_size}U;"
+        if not self.passed:
+            return [first, f"return {self.upper}_OK;"]
         enough = f"return (available < *size) ? {self.upper}_ERROR_TRUNCATED : {self.upper}_OK;"
-        if len(counts) == 1:
-            return [*self.lines, enough]
-        return ["{", "    size_t moved = 0U;", *(f"    {line}" for line in [*self.lines, enough]), "}"]
+        return ["{", *(f"    {line}" for line in [first, *self.lines, enough]), "}"]
 
-    @staticmethod
-    def _counted(each: Field, fields: dict[str, Field]) -> Array | Blob | None:
-        """The field of variable size whose end the count tells, where this one does."""
-        counted = fields.get(each.type.counts) if isinstance(each.type, Scalar) else None
-        if counted is None or counted.fixed or not isinstance(counted.type, Array | Blob):
-            return None
-        return counted.type if counted.type.length.counted_by == each.name else None
-
-    def _count(self, scalar: Scalar, kind: Array | Blob, offset: int, *, last: bool) -> None:
-        moved, self._counts = bool(self._counts), self._counts + 1
-        end = f"(moved + {offset + scalar.size}U)" if moved else f"{offset + scalar.size}U"
-        self._refuse(f"available < {end}", "TRUNCATED")
-        value = self.get(scalar, "payload", f"moved + {offset}U" if moved else str(offset))
+    def _count(self, name: str, scalar: Scalar, counted: Field, offset: int) -> None:
+        kind = counted.type
+        assert isinstance(kind, Array | Blob)
+        if kind.length.counted_by != name:  # another count tells the end; decoding compares the two
+            return
+        self._refuse(f"available < {grouped(self._place(offset + scalar.size))}", "TRUNCATED")
+        value = self.get(scalar, "payload", self._place(offset) or "0")
         self._bound(scalar, kind, value)
-        extra = self._extra(scalar, kind, value)
-        self.lines += [f"*size += {extra};"] if last else [f"moved += {extra};", f"*size += {extra};"]
+        more = f"{counted.name}_more"
+        self.lines += [f"const size_t {more} = {self._more(scalar, kind, value)};", f"*size += {more};"]
+
+    def _place(self, offset: int) -> str:
+        """An index after the fields that were passed, "" for the first byte."""
+        return " + ".join([*self.passed, *([f"{offset}U"] if offset else [])])
 
     def _bound(self, scalar: Scalar, kind: Array | Blob, value: str) -> None:
         scale = kind.item_size if scalar.counts_unit == "bytes" else 1
         least, most = kind.length.minimum * scale, kind.length.maximum * scale
-        terms = (
-            [f"({value} > {unsigned(most, max(scalar.bits, 16))})"] if most < scalar.natural_maximum else []
-        )
-        terms += [f"({value} < {least}U)"] if least else []
+        terms = [f"{value} < {least}U"] if least else []
+        if most < scalar.natural_maximum:
+            terms.append(f"{value} > {unsigned(most, max(scalar.bits, 16))}")
         if terms:
-            self._refuse(" || ".join(terms), "LENGTH")
+            self._refuse(condition(terms), "LENGTH")
 
     @staticmethod
-    def _extra(scalar: Scalar, kind: Array | Blob, value: str) -> str:
+    def _more(scalar: Scalar, kind: Array | Blob, value: str) -> str:
         """Bytes of the field beyond the fewest."""
         step = 1 if scalar.counts_unit == "bytes" else kind.item_size
         least = kind.length.minimum * kind.item_size
         times = f"({step}U * (size_t){value})" if step > 1 else f"(size_t){value}"
-        return f"({times} - {least}U)" if least else times
+        return f"{times} - {least}U" if least else times
 
-    def _refuse(self, condition: str, status: str) -> None:
-        self.lines += [f"if ({condition}) {{", f"    return {self.upper}_ERROR_{status};", "}"]
+    def _refuse(self, terms: str, status: str) -> None:
+        self.lines += [f"if ({terms}) {{", f"    return {self.upper}_ERROR_{status};", "}"]
