@@ -100,9 +100,9 @@ typedef struct {
     const char *name;
     const member_t *members;
     const uint8_t *vectors;
-    uint16_t size; /* bytes of vectors */
+    size_t size; /* bytes of vectors */
     const uint8_t *unsent;
-    uint16_t unsent_size;
+    size_t unsent_size;
     uint16_t id;
     uint16_t answer; /* number of the message that answers it, or its own */
     uint16_t tests;

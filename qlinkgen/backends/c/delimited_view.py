@@ -38,6 +38,7 @@ def render(protocol: Protocol, frame: DelimitedFrame, writer: DelimitedWriter) -
         "wrong_head": writer.wrong_constants("body", header=True),
         "max_frame": frame.overhead + writer.most_payload,
         "max_wire": _max_wire(frame, writer),
+        "index_type": unsigned_type(max(16, _max_wire(frame, writer).bit_length())),
         "header_constants": _header_constants(frame),
         "length_end": _end_of(frame, "length"),
         "body_size": _body_size(frame, writer),

@@ -185,7 +185,9 @@ class Header:
             "about": wrapped(protocol.doc),
             "options": option_lines(self._names.upper, self._section.check),
             "example": example_lines(protocol, self._names, self._section, self._kept, self._options.role),
-            "max_wire_size": sizes.protocol_max_wire_size(protocol),
+            "max_wire_size": max(
+                sizes.protocol_max_wire_size(protocol), self._section.view.get("max_wire", 0)
+            ),
             "limits": limits(protocol, self._kept),
             "enums": enum_views(protocol, self._names),
             "helpers": self._layouts.helpers(),
