@@ -1,4 +1,4 @@
-"""Kits of long frames and of many values: every test that was planned runs."""
+"""Kits of long frames, wide ids and large addresses: every test that was planned runs."""
 
 from __future__ import annotations
 
@@ -61,6 +61,15 @@ def check(kit: Path, compiler: str) -> None:
 def test_long_values(most: int, tmp_path: Path, require_tool: Callable[..., str]) -> None:
     """The vectors of a message have more than 65,535 bytes long before one of them has."""
     check(write(tmp_path, most=most), require_tool("gcc", package="gcc"))
+
+
+@pytest.mark.parametrize("bits", [8, 16, 24, 32, 64])
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_wide_ids_and_addresses(
+    bits: int, compiler: str, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    kit = write(tmp_path, most=8, bits=bits)
+    check(kit, require_tool(compiler, package=compiler))
 
 
 @pytest.mark.parametrize("values", [255, 256, 300])

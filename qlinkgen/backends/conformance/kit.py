@@ -84,6 +84,7 @@ class Kit:
         return {
             # A number in a struct is followed by up to seven bytes of padding.
             "place_type": _unsigned(values + 8 * members),
+            "id_type": _unsigned((1 << self._header.id_bits) - 1),
             "number_type": _unsigned(tests),
             "member_type": "uint8_t" if members <= 0xFF else "uint16_t",
             "printed_type": _unsigned(printed),
