@@ -25,7 +25,7 @@ def render(protocol: Protocol, frame: DelimitedFrame, writer: DelimitedWriter) -
         "header": frame.header_size,
         "has_length": has_length,
         "needs_extent": not has_length,
-        "needs_direction": bare or not has_length,
+        "needs_direction": (bare or not has_length) and len(protocol.directions) > 1,
         "reports_runs": bare,
         "stuffed_payload": frame.stuffing is not None and not writer.stuffed_whole,
         "max_payload": frame.payload.max_size,
@@ -59,12 +59,12 @@ def render(protocol: Protocol, frame: DelimitedFrame, writer: DelimitedWriter) -
 
 def _public(view: dict[str, Any], writer: DelimitedWriter, protocol: Protocol) -> dict[str, Any]:
     directed = view["needs_direction"]
+    view["pass_decode_direction"] = "direction, " if directed else ""
     return {
         "tailed": writer.stuffed_whole or view["stuffed_payload"],
         "encode_trailer": "",
         "seal_checked": False,
         "decode_direction": f"{protocol.name}_direction_t direction, " if directed else "",
-        "pass_decode_direction": "direction, " if directed else "",
         "check_name": "message_check"
         if protocol.directions == ("message",)
         else "request_check or _response_check",
@@ -74,7 +74,7 @@ def _public(view: dict[str, Any], writer: DelimitedWriter, protocol: Protocol) -
 
 def _check_sender(view: dict[str, Any], protocol: Protocol) -> list[str]:
     values = ", ".join([view["id_value"]] + ([view["address_value"]] if view["address"] else []))
-    refused = f"!{protocol.name}_admits_(direction, {values})"
+    refused = f"!{protocol.name}_admits_({view['pass_decode_direction']}{values})"
     return [f"if ({refused}) {{", f"    return {protocol.name.upper()}_ERROR_FRAME;", "}"]
 
 

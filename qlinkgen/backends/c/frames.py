@@ -37,7 +37,9 @@ class FrameSection:
     @property
     def needs_ids(self) -> bool:
         """Receiving a frame needs to know the messages, so their ids stand in front of them."""
-        return bool(self.view.get("needs_direction")) or not isinstance(self.protocol.frame, DelimitedFrame)
+        view = self.view
+        early = view["reports_runs"] or view["needs_extent"]
+        return early or not isinstance(self.protocol.frame, DelimitedFrame)
 
     def groups(
         self, names: Names, received: list[tuple[Direction, tuple[Message, ...]]]
