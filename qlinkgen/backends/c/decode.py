@@ -26,6 +26,8 @@ class Decoder:
     prefix: str
     layouts: Layouts
     lines: list[str] = field(default_factory=list)
+    #: Some byte of the payload is looked at.
+    reads: bool = False
     _cursor: Cursor = field(default_factory=Cursor)
     _counted: set[str] = field(default_factory=set)
 
@@ -84,6 +86,7 @@ class Decoder:
     def _get(self, scalar: Scalar) -> str:
         if misfit := self.layouts.misfit(scalar, "payload", self._cursor.index()):
             self._refuse([misfit], "RANGE")
+        self.reads = True
         value = self.layouts.get(scalar, "payload", self._cursor.index())
         self._cursor.offset += scalar.size
         return value
@@ -160,15 +163,22 @@ class Decoder:
             count = f"{each.name}_count"
             member = count_type(kind.length.maximum)
             self.lines.append(f"message->{count_member(each)} = ({member}){count};")
+        self.reads = True
         if isinstance(kind, Blob):
             self._read_blob(each, kind, count)
         else:
             self._read_items(each, kind, count)
         if kind.length.fixed:
             self._cursor.offset += kind.length.maximum * kind.item_size
-        elif each is not self.message.fields[-1]:
+        elif self._reads_behind(each):
             step = kind.item_size
             self.lines.append(self._cursor.pass_over(f"({step}U * {count})" if step > 1 else count))
+
+    def _reads_behind(self, each: Field) -> bool:
+        """A later field is looked at: reserved bytes are not."""
+        fields = self.message.fields
+        later = fields[fields.index(each) + 1 :]
+        return any(not (isinstance(other.type, Scalar) and other.type.reserved) for other in later)
 
     def _read_blob(self, each: Field, kind: Blob, count: str) -> None:
         place = pointer("payload", self._cursor.index())

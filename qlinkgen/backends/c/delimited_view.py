@@ -241,6 +241,7 @@ def _sum(value: str, constant: int) -> str:
 def _plain(writer: DelimitedWriter) -> dict[str, Any]:
     """Seal and scan where the frame lies on the wire as it is."""
     body = writer.lead
+    wrong, differs = writer.wrong_constants("end", header=False), writer.check_differs("end", "value")
     return {
         "put_header": writer.put_header("body" if body else "wire", f"sent + {writer.bias}U"),
         "put_trailer": writer.put_trailer("end"),
@@ -249,8 +250,9 @@ def _plain(writer: DelimitedWriter) -> dict[str, Any]:
         + loops(writer.runs(str(body), f"{writer.lead + writer.head}U + sent"), writer.prefix, array="wire"),
         "update_received": writer.update_lead
         + loops(writer.runs("0", f"payload + {writer.head}U"), writer.prefix, array="body"),
-        "wrong_tail": writer.wrong_constants("end", header=False),
-        "check_differs": writer.check_differs("end", "value"),
+        "wrong_tail": wrong,
+        "check_differs": differs,
+        "reads_tail": bool(wrong or differs),
     }
 
 
