@@ -201,6 +201,18 @@ def _stuffed(writer: DelimitedWriter) -> dict[str, Any]:
         "put_trailer": trailer,
         "put_check": check,
         "seal_trailer": bool(trailer or check),
+        "stuffed_when_sent": _stuffed_part(
+            "from",
+            f"capacity - {writer.head + writer.tail - writer.plain_head}U - size"
+            if writer.plain_head
+            else "",
+            f"capacity - {writer.plain_tail}U" if writer.plain_tail else "",
+        ),
+        "stuffed_when_received": _stuffed_part(
+            "at",
+            f"{writer.plain_head}U" if writer.plain_head else "",
+            f"total - {writer.plain_tail}U" if writer.plain_tail else "",
+        ),
         "update_before": writer.update_lead
         + ([] if writer.covers_body else loops(sent, writer.prefix, array="wire")),
         "wrong_tail": wrong,
@@ -210,6 +222,13 @@ def _stuffed(writer: DelimitedWriter) -> dict[str, Any]:
         if writer.covers_body
         else loops(writer.runs("0", f"payload + {writer.head}U"), writer.prefix, array="body"),
     }
+
+
+def _stuffed_part(place: str, first: str, last: str) -> str:
+    """A condition that holds where the byte before a place is stuffed, "" where every byte is."""
+    terms = [f"({place} > ({first}))" if " " in first else f"({place} > {first})"] if first else []
+    terms += [f"({place} <= ({last}))"] if last else []
+    return " && ".join(terms)
 
 
 def _streamed(frame: DelimitedFrame, writer: DelimitedWriter) -> dict[str, Any]:

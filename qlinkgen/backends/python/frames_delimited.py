@@ -7,7 +7,6 @@ from typing import Any
 from qlinkgen.backends.python import scalars
 from qlinkgen.backends.python.checks import check_bytes, checksum_definition, order_of, regular
 from qlinkgen.backends.python.place import in_hex, literal
-from qlinkgen.errors import GenerationError
 from qlinkgen.model.frame import Checksum, DelimitedFrame, Part, Role
 from qlinkgen.model.protocol import Protocol
 
@@ -239,9 +238,6 @@ def _stuffing(frame: DelimitedFrame) -> dict[str, Any]:
     }
     open_parts = [index for index, part in enumerate(frame.parts) if part.name not in stuffing.exempt]
     first, last = open_parts[0], open_parts[-1]
-    if not stuffing.before_checksum and open_parts != list(range(first, last + 1)):
-        what = "parts in the middle of a frame that are exempt from its stuffing have no Python codec"
-        raise GenerationError(f"{what}; exempt parts at its front or end only")
     model["plain_front"] = sum(part.size for part in frame.parts[:first])
     model["plain_back"] = sum(part.size for part in frame.parts[last + 1 :])
     return model
