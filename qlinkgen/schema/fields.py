@@ -85,17 +85,23 @@ class FieldBuilder:
         return True
 
     def _check_open_ends(self, fields: Sequence[Field], path: Path) -> None:
-        open_ends = [field.name for field in fields if is_open(field)]
-        for name in open_ends[1:]:
-            what = f"{name} and {open_ends[0]} both take the rest of the payload"
-            needs = ((*path, name), (*path, open_ends[0]))
-            # A count that is broken may have been the count of one of them.
-            counts = [(*path, field.name, "counts") for field in fields]
-            hint = "give one of them a count, or a fixed size"
-            self._report.error(
-                "two-open-ends", (*path, name), what, hint, of_key=True, needs=(*needs, *counts)
-            )
-            self._report.taint((*path, name))
+        first = next((index for index, field in enumerate(fields) if is_open(field)), len(fields))
+        # An integer that is broken may have been the count of an open field.
+        counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
+        for field in fields[first + 1 :]:
+            if field.fixed:
+                continue
+            other, place = fields[first].name, (*path, field.name)
+            if is_open(field):
+                rule, what = "two-open-ends", f"{field.name} and {other} both take the rest of the payload"
+                hint = "give one of them a count, or a fixed size"
+            else:
+                rule = "open-end-not-last"
+                what = f"{field.name} has a variable size and follows {other}, which takes the rest"
+                hint = f"move it before {other}, or give {other} a count"
+            needs = (place, (*path, other), *counts)
+            self._report.error(rule, place, what, hint, of_key=True, needs=needs)
+            self._report.taint(place)
 
     def _bounded(self, fields: Sequence[Field], path: Path) -> list[Field]:
         """The fields, where one without a bound may fill what the others leave of the payload."""

@@ -121,6 +121,11 @@ _ALL = (
         "At most one field of a message takes the rest of the payload.",
         "Nobody could tell where one ends and the other begins; give one of them a count.",
     ),
+    Rule(
+        "open-end-not-last",
+        "Only fields of fixed size follow a field that takes the rest of the payload.",
+        "The end of the rest is found by counting back from the end of the payload.",
+    ),
     Rule("bad-array", "Arrays hold plain integers.", "Give scaled or named values a field of their own."),
     Rule(
         "payload-too-long",
