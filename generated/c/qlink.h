@@ -76,7 +76,7 @@ extern "C" {
 /* What the code relies on: bytes of eight bits, and two's complement where an unsigned number becomes a signed one. */
 typedef char qlink_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
 typedef char qlink_needs_twos_complement_[(((int8_t)0xFFU == -1) && ((int16_t)0xFFFFU == -1)) ? 1 : -1];
-typedef char qlink_needs_sizes_in_int_[(INT_MAX >= 61) ? 1 : -1];
+typedef char qlink_needs_sizes_in_int_[(INT_MAX >= 64) ? 1 : -1];
 
 /* What went wrong; functions return it as an int, which may also be a number of bytes. */
 enum {

@@ -23,6 +23,9 @@ def build_stuffing(
     after_stuffing = spec.checksum == "after"
     if after_stuffing:
         exempt = _all_but_payload(spec, parts, report)
+        _check_end(parts, report)
+    else:
+        _check_middle(exempt, parts, report)
     payload = next(part for part in parts if part.role == "payload")
     if payload.name in spec.exempt:
         what = f"{payload.name} is exempt, which leaves nothing worth stuffing"
@@ -45,6 +48,30 @@ def _all_but_payload(spec: StuffingSpec, parts: tuple[Part, ...], report: Report
         hint = "exempt all parts but the payload, or leave exempt out"
         report.error("bad-frame", (*_PATH, "exempt"), what, hint)
     return others
+
+
+def _check_end(parts: tuple[Part, ...], report: Reporter) -> None:
+    """The end of a payload that is stuffed first follows from a length, and a checksum covers it."""
+    roles, place = [part.role for part in parts], (*_PATH, "checksum")
+    needs = (place, ("frame", "parts"))
+    if "checksum" not in roles:
+        what, hint = "there is no checksum to compute after the stuffing", "remove it, or add a checksum"
+        report.error("bad-frame", place, what, hint, needs=needs)
+    if "length" not in roles:
+        what = "nothing tells where a payload ends that is stuffed before the checksum is computed"
+        hint = "add a length that counts the payload, or remove checksum: after"
+        report.error("no-frame-end", place, what, hint, needs=needs)
+
+
+def _check_middle(exempt: tuple[str, ...], parts: tuple[Part, ...], report: Reporter) -> None:
+    """Stuffed parts follow one another."""
+    stuffed = [index for index, part in enumerate(parts) if part.name not in exempt]
+    for part in parts[stuffed[0] : stuffed[-1]] if stuffed else ():
+        if part.name in exempt and part.role != "payload":
+            place = (*_PATH, "exempt", exempt.index(part.name))
+            what = f"{part.name} is exempt between parts that are stuffed"
+            hint = "exempt only parts at the front and at the end of the frame"
+            report.error("bad-frame", place, what, hint, needs=(place, ("frame", "parts")))
 
 
 def check_unique(frame: DelimitedFrame, report: Reporter) -> None:

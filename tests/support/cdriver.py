@@ -18,9 +18,9 @@ the full name, DIRECTION is request, response or message. KIND is capacity, leng
 stuffing, truncated, frame or illegal. An EVENT is `AT:KIND` or `AT:message:MESSAGE:NODE:PAYLOAD`, where AT
 is the number of the byte, from 0, with which it came; a fault of what an intact frame carries (unknown,
 length, range) is an event like the others. A last `end:KIND` comes from the header's finish function where
-it has one. `cuts` takes the first 0, 1, 2 ... bytes apart, each in memory of exactly its size, and every front
-part of an intact payload too, so that an address sanitizer sees what is read past the end. A line that is not
-understood is answered by `usage`.
+it has one. `cuts` takes the first 0, 1, 2 ... bytes apart, each in memory of exactly its size, and every
+front part of an intact payload too, so that an address sanitizer sees what is read past the end. A line that
+is not understood is answered by `usage`.
 """
 
 from __future__ import annotations

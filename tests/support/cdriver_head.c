@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LINE_SIZE 65536
+#define LINE_SIZE 1048576
 static char line[LINE_SIZE];
 static uint8_t bytes_a[LINE_SIZE / 2];
 static uint8_t bytes_b[LINE_SIZE / 2];

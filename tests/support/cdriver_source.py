@@ -407,9 +407,11 @@ def _check_of(protocol: Protocol, message: Message) -> str:
 
 def _directed(protocol: Protocol) -> bool:
     frame = protocol.frame
+    if len(protocol.directions) == 1:
+        return False
     if isinstance(frame, DelimitedFrame):
         return frame.part("length") is None or not frame.preamble
-    return isinstance(frame, MarkedFrame) and len(protocol.directions) > 1
+    return isinstance(frame, MarkedFrame)
 
 
 def _unpacks(frame: object) -> bool:

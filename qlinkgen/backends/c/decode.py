@@ -8,7 +8,6 @@ from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.encode import Cursor, count_member, loop
 from qlinkgen.backends.c.layout import Layouts, pointer
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
-from qlinkgen.errors import GenerationError
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Array, Bits, Blob, Scalar
 
@@ -26,6 +25,8 @@ class Decoder:
     prefix: str
     layouts: Layouts
     lines: list[str] = field(default_factory=list)
+    #: Some byte of the payload is looked at.
+    reads: bool = False
     _cursor: Cursor = field(default_factory=Cursor)
     _counted: set[str] = field(default_factory=set)
 
@@ -84,6 +85,7 @@ class Decoder:
     def _get(self, scalar: Scalar) -> str:
         if misfit := self.layouts.misfit(scalar, "payload", self._cursor.index()):
             self._refuse([misfit], "RANGE")
+        self.reads = True
         value = self.layouts.get(scalar, "payload", self._cursor.index())
         self._cursor.offset += scalar.size
         return value
@@ -160,15 +162,22 @@ class Decoder:
             count = f"{each.name}_count"
             member = count_type(kind.length.maximum)
             self.lines.append(f"message->{count_member(each)} = ({member}){count};")
+        self.reads = True
         if isinstance(kind, Blob):
             self._read_blob(each, kind, count)
         else:
             self._read_items(each, kind, count)
         if kind.length.fixed:
             self._cursor.offset += kind.length.maximum * kind.item_size
-        elif each is not self.message.fields[-1]:
+        elif self._reads_behind(each):
             step = kind.item_size
             self.lines.append(self._cursor.pass_over(f"({step}U * {count})" if step > 1 else count))
+
+    def _reads_behind(self, each: Field) -> bool:
+        """A later field is looked at: reserved bytes are not."""
+        fields = self.message.fields
+        later = fields[fields.index(each) + 1 :]
+        return any(not (isinstance(other.type, Scalar) and other.type.reserved) for other in later)
 
     def _read_blob(self, each: Field, kind: Blob, count: str) -> None:
         place = pointer("payload", self._cursor.index())
@@ -211,32 +220,16 @@ class Decoder:
         self.lines.append(f"{each.name}_count = {left};")
 
     def _measure(self, each: Field, kind: Array | Blob) -> None:
-        later = self._later_shares(each)
-        if later:
-            self._refuse([f"{grouped(' + '.join(later))} > rest"], "LENGTH")
-        left = f"(rest - {grouped(' + '.join(later))})" if later else "rest"
+        """The last field of variable size takes what the counted ones before it leave."""
+        left = "rest"
         if kind.item_size > 1:
-            self._refuse([f"({left} % {kind.item_size}U) != 0U"], "LENGTH")
-            left = f"({left} / {kind.item_size}U)"
+            self._refuse([f"(rest % {kind.item_size}U) != 0U"], "LENGTH")
+            left = f"(rest / {kind.item_size}U)"
         least = kind.length.minimum
         self.lines.append(
             f"{each.name}_count = {left} + {least}U;" if least else f"{each.name}_count = {left};"
         )
         self._refuse([f"{each.name}_count > {kind.length.maximum}U"], "LENGTH")
-
-    def _later_shares(self, each: Field) -> list[str]:
-        behind = self.message.variable[self.message.variable.index(each) + 1 :]
-        shares = []
-        for other in behind:
-            assert isinstance(other.type, Array | Blob)
-            if other.name not in self._counted:
-                what = f"{self.message.name}: the count of {other.name} stands behind the open {each.name}"
-                raise GenerationError(f"{what}, so no decoder can find it; move it in front")
-            least = other.type.length.minimum * other.type.item_size
-            step = other.type.item_size
-            share = f"({step}U * {other.name}_count)" if step > 1 else f"{other.name}_count"
-            shares.append(f"({share} - {least}U)" if least else share)
-        return shares
 
 
 def _less(value: str, number: int) -> str:

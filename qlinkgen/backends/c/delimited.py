@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
-from qlinkgen.errors import GenerationError
 from qlinkgen.model.frame import Checksum, DelimitedFrame, Part
 from qlinkgen.model.protocol import Protocol
 
@@ -40,13 +40,8 @@ class DelimitedWriter:
         names = [part.role for part in frame.parts]
         self._payload_at = names.index("payload")
         self._check = frame.part("checksum")
-        if self._check and frame.parts.index(self._check) < self._payload_at:
-            raise GenerationError(
-                f"{self._check.name} stands in front of the payload; C frames have it behind"
-            )
         self.id_name, self.address_name = frame_names(protocol)
         self._lead_parts = self._find_lead()
-        self._refuse_plain_parts()
         self.lead = sum(part.size for part in self._lead_parts)
         self.head = frame.header_size - self.lead
         self.tail = sum(part.size for part in frame.parts[self._payload_at :])
@@ -76,6 +71,16 @@ class DelimitedWriter:
     def stuffed_whole(self) -> bool:
         """The finished frame is stuffed, so a body has to be unpacked before it can be looked at."""
         return self._frame.stuffing is not None and not self._frame.stuffing.before_checksum
+
+    @property
+    def plain_head(self) -> int:
+        """Bytes at the front of the body that are not stuffed."""
+        return sum(part.size for part in itertools.takewhile(self._exempt, self._head_parts()))
+
+    @property
+    def plain_tail(self) -> int:
+        """Bytes at the end of the body that are not stuffed."""
+        return sum(part.size for part in itertools.takewhile(self._exempt, reversed(self._tail_parts())))
 
     @property
     def streamed(self) -> bool:
@@ -162,15 +167,6 @@ class DelimitedWriter:
                 else:
                     runs.append(Run(first, end))
         return runs
-
-    def _refuse_plain_parts(self) -> None:
-        """Only the lead, and a length (which never is the stuffed byte in a frame with a unique preamble)."""
-        if not self.stuffed_whole:
-            return
-        for part in self._frame.parts[len(self._lead_parts) :]:
-            if self._exempt(part) and part.role != "length":
-                what = f"{part.name} is exempt from stuffing behind parts that are not"
-                raise GenerationError(f"{what}; C frames have exempt parts at the front alone")
 
     def _find_lead(self) -> list[Part]:
         lead = []

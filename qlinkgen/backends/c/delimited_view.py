@@ -25,7 +25,7 @@ def render(protocol: Protocol, frame: DelimitedFrame, writer: DelimitedWriter) -
         "header": frame.header_size,
         "has_length": has_length,
         "needs_extent": not has_length,
-        "needs_direction": bare or not has_length,
+        "needs_direction": (bare or not has_length) and len(protocol.directions) > 1,
         "reports_runs": bare,
         "stuffed_payload": frame.stuffing is not None and not writer.stuffed_whole,
         "max_payload": frame.payload.max_size,
@@ -38,6 +38,7 @@ def render(protocol: Protocol, frame: DelimitedFrame, writer: DelimitedWriter) -
         "wrong_head": writer.wrong_constants("body", header=True),
         "max_frame": frame.overhead + writer.most_payload,
         "max_wire": _max_wire(frame, writer),
+        "index_type": unsigned_type(max(16, _max_wire(frame, writer).bit_length())),
         "header_constants": _header_constants(frame),
         "length_end": _end_of(frame, "length"),
         "body_size": _body_size(frame, writer),
@@ -58,12 +59,12 @@ def render(protocol: Protocol, frame: DelimitedFrame, writer: DelimitedWriter) -
 
 def _public(view: dict[str, Any], writer: DelimitedWriter, protocol: Protocol) -> dict[str, Any]:
     directed = view["needs_direction"]
+    view["pass_decode_direction"] = "direction, " if directed else ""
     return {
         "tailed": writer.stuffed_whole or view["stuffed_payload"],
         "encode_trailer": "",
         "seal_checked": False,
         "decode_direction": f"{protocol.name}_direction_t direction, " if directed else "",
-        "pass_decode_direction": "direction, " if directed else "",
         "check_name": "message_check"
         if protocol.directions == ("message",)
         else "request_check or _response_check",
@@ -73,7 +74,7 @@ def _public(view: dict[str, Any], writer: DelimitedWriter, protocol: Protocol) -
 
 def _check_sender(view: dict[str, Any], protocol: Protocol) -> list[str]:
     values = ", ".join([view["id_value"]] + ([view["address_value"]] if view["address"] else []))
-    refused = f"!{protocol.name}_admits_(direction, {values})"
+    refused = f"!{protocol.name}_admits_({view['pass_decode_direction']}{values})"
     return [f"if ({refused}) {{", f"    return {protocol.name.upper()}_ERROR_FRAME;", "}"]
 
 
@@ -200,6 +201,18 @@ def _stuffed(writer: DelimitedWriter) -> dict[str, Any]:
         "put_trailer": trailer,
         "put_check": check,
         "seal_trailer": bool(trailer or check),
+        "stuffed_when_sent": _stuffed_part(
+            "from",
+            f"capacity - {writer.head + writer.tail - writer.plain_head}U - size"
+            if writer.plain_head
+            else "",
+            f"capacity - {writer.plain_tail}U" if writer.plain_tail else "",
+        ),
+        "stuffed_when_received": _stuffed_part(
+            "at",
+            f"{writer.plain_head}U" if writer.plain_head else "",
+            f"total - {writer.plain_tail}U" if writer.plain_tail else "",
+        ),
         "update_before": writer.update_lead
         + ([] if writer.covers_body else loops(sent, writer.prefix, array="wire")),
         "wrong_tail": wrong,
@@ -209,6 +222,13 @@ def _stuffed(writer: DelimitedWriter) -> dict[str, Any]:
         if writer.covers_body
         else loops(writer.runs("0", f"payload + {writer.head}U"), writer.prefix, array="body"),
     }
+
+
+def _stuffed_part(place: str, first: str, last: str) -> str:
+    """A condition that holds where the byte before a place is stuffed, "" where every byte is."""
+    terms = [f"({place} > ({first}))" if " " in first else f"({place} > {first})"] if first else []
+    terms += [f"({place} <= ({last}))"] if last else []
+    return " && ".join(terms)
 
 
 def _streamed(frame: DelimitedFrame, writer: DelimitedWriter) -> dict[str, Any]:
@@ -240,6 +260,7 @@ def _sum(value: str, constant: int) -> str:
 def _plain(writer: DelimitedWriter) -> dict[str, Any]:
     """Seal and scan where the frame lies on the wire as it is."""
     body = writer.lead
+    wrong, differs = writer.wrong_constants("end", header=False), writer.check_differs("end", "value")
     return {
         "put_header": writer.put_header("body" if body else "wire", f"sent + {writer.bias}U"),
         "put_trailer": writer.put_trailer("end"),
@@ -248,8 +269,9 @@ def _plain(writer: DelimitedWriter) -> dict[str, Any]:
         + loops(writer.runs(str(body), f"{writer.lead + writer.head}U + sent"), writer.prefix, array="wire"),
         "update_received": writer.update_lead
         + loops(writer.runs("0", f"payload + {writer.head}U"), writer.prefix, array="body"),
-        "wrong_tail": writer.wrong_constants("end", header=False),
-        "check_differs": writer.check_differs("end", "value"),
+        "wrong_tail": wrong,
+        "check_differs": differs,
+        "reads_tail": bool(wrong or differs),
     }
 
 

@@ -209,5 +209,7 @@ def _in_place(scalar: Scalar, shift: int, value: str, bits: int) -> str:
     mask = unsigned((1 << scalar.bits) - 1, bits, hexadecimal=True)
     if scalar.meaning == "bool":
         return f"({value} ? {unsigned(1 << shift, bits, hexadecimal=True)} : {unsigned(0, bits)})"
+    if scalar.signed and kind != unsigned_type(scalar.bits):
+        value = f"({unsigned_type(scalar.bits)}){value}"  # no sign is extended
     taken = f"({kind})(({kind}){value} & {mask})"
     return f"({kind})({taken} << {shift})" if shift else taken

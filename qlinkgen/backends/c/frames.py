@@ -37,7 +37,9 @@ class FrameSection:
     @property
     def needs_ids(self) -> bool:
         """Receiving a frame needs to know the messages, so their ids stand in front of them."""
-        return bool(self.view.get("needs_direction")) or not isinstance(self.protocol.frame, DelimitedFrame)
+        view = self.view
+        early = view["reports_runs"] or view["needs_extent"]
+        return early or not isinstance(self.protocol.frame, DelimitedFrame)
 
     def groups(
         self, names: Names, received: list[tuple[Direction, tuple[Message, ...]]]
@@ -90,11 +92,11 @@ class FrameSection:
         has_address = bool(self.view["address"])
         target = "&request, " if entry["has_struct"] else ""
         call = f"{entry['function']}_decode({target}frame->payload, frame->size)"
-        reject = self.view.get("reject")
+        reject = self.view.get("reject") if entry["answered"] else ""
         size = f"{entry['answer_constant']}_MIN_SIZE"
         return {
             "unsupported": f"{reject}({size}, wire, capacity)" if reject else "0",
-            "writes": bool(entry["answered"] or reject),
+            "writes": entry["answered"],
             "own": has_address and entry["refuses_broadcast"],
             "broadcast_only": has_address and entry["broadcast_only"],
             "right": f"{call} == {upper}_OK" if entry["has_bytes"] else "frame->size == 0U",
@@ -107,12 +109,15 @@ class FrameSection:
         others = [entry for entry in entries if not entry["own"]]
         unknown = self.view.get("unknown_answer", "0")
         if not own:
-            return [{"name": "any", "text": "All requests.", "entries": entries, "otherwise": unknown}]
+            writes = any(entry["writes"] for entry in entries)
+            group = {"name": "any", "text": "All requests.", "entries": entries, "otherwise": unknown}
+            return [{**group, "writes": writes}]
         call = f"{prefix}_handle_own_(slave, frame, wire, capacity)"
         first = {"name": "own", "text": "Requests that go to one node.", "entries": own, "otherwise": unknown}
+        first["writes"] = any(entry["writes"] for entry in own)
         rest = "Requests that all nodes may get; the others must not be broadcast."
         second = {"name": "any", "text": rest, "entries": others}
-        return [first, {**second, "otherwise": f"slave->broadcast ? {unknown} : {call}"}]
+        return [first, {**second, "writes": True, "otherwise": f"slave->broadcast ? {unknown} : {call}"}]
 
 
 def frame_section(protocol: Protocol, layouts: Layouts) -> FrameSection:

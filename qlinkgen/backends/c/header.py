@@ -97,7 +97,7 @@ class Header:
             "address_groups": self._address_groups(),
             "wide": any(map(framing.is_wide, self._kept)),
         }
-        return self._place(template, f=view, crc=self._section.check, shapes=shapes)
+        return self._place(template, f=view, crc=self._section.check, shapes=shapes, unused=self._unheard())
 
     def _address_groups(self) -> list[framing.AddressGroup]:
         """Sets of addresses that the messages which are encoded may have."""
@@ -117,15 +117,24 @@ class Header:
         names, view = self._names, self._section.view
         received = [(f"{names.upper}_{direction.upper()}", m) for direction, m in self._received()]
         texts = ["\n", *(self._id_constant(message) for message in self._kept)]
+        unheard = self._unheard()
         if view["reports_runs"]:
             address = self._address
-            admits = [{"direction": d, "messages": framing.checks(names, address, m)} for d, m in received]
-            texts.append(self._place("admit", f=view, admits=admits))
+            checks = [(d, framing.checks(names, address, messages)) for d, messages in received]
+            admits = [{"direction": d, "messages": messages} for d, messages in checks]
+            limited = any(message["admits"] for _, messages in checks for message in messages)
+            unused = [*unheard, *([view["address"]] if view["address"] and not limited else [])]
+            texts.append(self._place("admit", f=view, admits=admits, unused=unused))
         if view["needs_extent"]:
             get = self._layouts.get
             sizes_known = [{"direction": d, "messages": extents(names, m, get)} for d, m in received]
-            texts.append(self._place("extent", f=view, extents=sizes_known))
+            texts.append(self._place("extent", f=view, extents=sizes_known, unused=unheard))
         return texts
+
+    def _unheard(self) -> list[str]:
+        """Parameters that tell one message from another, where none is received."""
+        view = self._section.view
+        return [] if self._received() else [*(["direction"] if view["needs_direction"] else []), view["id"]]
 
     def _id_constant(self, message: Message) -> str:
         return f"#define {self._names.constant(message)}_ID 0x{message.id:02X}\n"
@@ -186,7 +195,9 @@ class Header:
             "about": c_text.comment(protocol.doc, WIDTH),
             "options": option_lines(self._names.upper, self._section.check),
             "example": example_lines(protocol, self._names, self._section, self._kept, self._options.role),
-            "max_wire_size": sizes.protocol_max_wire_size(protocol),
+            "max_wire_size": max(
+                sizes.protocol_max_wire_size(protocol), self._section.view.get("max_wire", 0)
+            ),
             "limits": limits(protocol, self._kept),
             "enums": enum_views(protocol, self._names),
             "helpers": self._layouts.helpers(),

@@ -24,6 +24,7 @@ class Interface:
     Attributes:
         prefix: what functions and types begin with; ``upper`` is that of macros.
         id: member of the frame that holds the message id.
+        id_bits: width of the id's C type.
         address: member of the frame that holds the address, "" if there is none.
         address_bits: width of the address's C type, 0 if there is none.
         directed: taking frames apart and receiving are told which direction is expected.
@@ -37,6 +38,7 @@ class Interface:
 
     names: Names
     id: str
+    id_bits: int
     address: str
     address_bits: int
     directed: bool
@@ -98,6 +100,7 @@ def interface(protocol: Protocol) -> Interface:
     return Interface(
         names=Names(protocol),
         id=view["id"],
+        id_bits=_bits(view["id_type"]),
         address=view["address"] or "",
         address_bits=_bits(view.get("address_type", "")) if view["address"] else 0,
         directed=view["needs_direction"],

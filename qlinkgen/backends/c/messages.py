@@ -99,7 +99,7 @@ class MessageWriter:
             "rest": decoder.uses_rest,
             "empty_is_default": message.empty_is_default and message.min_size > 0,
             "defaults": self._defaults(message),
-            "reads": message.max_size > 0,
+            "reads": decoder.reads,
         }
 
     def _defaults(self, message: Message) -> list[str]:

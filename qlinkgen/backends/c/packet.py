@@ -81,6 +81,7 @@ def packet_from_frame(names: Names, message: Message, view: dict[str, Any]) -> d
         call = "message, " if struct else ""
         lines.append(f"return {names.function(message)}_decode({call}wire, {payload_size});")
     else:
+        lines += [] if view["has_check"] else ["(void)wire;"]
         lines.append(
             f"return ({grouped(payload_size)} == 0U) ? {names.upper}_OK : {names.upper}_ERROR_LENGTH;"
         )

@@ -38,6 +38,8 @@ class Kit:
         """What the templates place."""
         header, entries = self._header, self._entries.views()
         check, kinds, noise = self._check(), self._kinds(), streams.noise(self._protocol)
+        tests = bool(check) + sum(entry[key] for entry in entries for key in _COUNTED)
+        most_wire = max(len(row.wire) for row in self._every)
         return {
             "about": [piece for line in banner(self._protocol) for piece in wrapped(line)],
             "p": header.prefix,
@@ -47,7 +49,8 @@ class Kit:
             "address_bytes": header.address_bits // 8,
             "marked": isinstance(self._protocol.frame, MarkedFrame),
             "broadcast": header.address and self._protocol.bus.broadcast is not None,
-            "wide": self._entries.wide,
+            "size_bytes": self._entries.size_bytes,
+            **self._types(entries, most_wire, tests),
             "check": check,
             "kinds": [{"name": kind, "bit": f"0x{1 << bit:02X}"} for bit, kind in enumerate(kinds)],
             "kind_mask": f"0x{(1 << _KINDS) - 1:02X}",
@@ -56,13 +59,13 @@ class Kit:
             "error_size": max(map(len, ERRORS)) + 1,
             "noise": [numbers((len(piece), *piece)) for piece in noise],
             "noise_size": max(map(len, noise)) + 1,
-            "most_wire": max(len(row.wire) for row in self._every),
+            "most_wire": most_wire,
             "most_request": max(len(row.request) for row in self._every),
             "most_values": max(1, *(most_values(header, message) for message in self._messages)),
             "most_events": self._entries.most_events + 1,
             "entries": entries,
             "last": len(entries) - 1,
-            "tests": bool(check) + sum(entry[key] for entry in entries for key in _COUNTED),
+            "tests": tests,
             "has_requests": bool(header.sum_bits and any(row.request for row in self._every)),
             "refuses": any(entry["unsent_lines"] for entry in entries),
             "encodes": any(entry["encoded"] for entry in entries),
@@ -71,6 +74,21 @@ class Kit:
             "asks": any(entry["slave_member"] for entry in entries),
             "tells": any(entry["told_member"] for entry in entries),
             "checks": sorted({entry["taken_as"] for entry in entries if entry["framed"]}),
+        }
+
+    def _types(self, entries: list[dict[str, Any]], most_wire: int, tests: int) -> dict[str, Any]:
+        """Unsigned types that hold every number of the kit; 16 bits where they do, for small targets."""
+        members = max(len(entry["members"]) for entry in entries)
+        values = max(most_values(self._header, message) for message in self._messages)
+        printed = max(tests, most_wire, (1 << self._header.address_bits) - 1)
+        return {
+            # A number in a struct is followed by up to seven bytes of padding.
+            "place_type": _unsigned(values + 8 * members),
+            "id_type": _unsigned((1 << self._header.id_bits) - 1),
+            "number_type": _unsigned(tests),
+            "member_type": "uint8_t" if members <= 0xFF else "uint16_t",
+            "printed_type": _unsigned(printed),
+            "printed_digits": len(str(printed)) if printed > 0xFFFF else 5,
         }
 
     def _kinds(self) -> tuple[str, ...]:
@@ -92,6 +110,10 @@ class Kit:
         suffix = {8: "u", 16: "u", 32: "ul", 64: "ull"}[bits]
         value = f"0x{algorithm.check:0{bits // 4}X}"
         return {"name": algorithm.name, "bits": bits, "value": value, "literal": value + suffix}
+
+
+def _unsigned(most: int) -> str:
+    return next(f"uint{bits}_t" for bits in (16, 32, 64) if most < 1 << bits)
 
 
 #: What the templates ask of the header under its own name.

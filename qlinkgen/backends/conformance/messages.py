@@ -42,8 +42,9 @@ class Entries:
         self._rows = rows
         self._numbers = {message.name: number for number, message in enumerate(messages)}
         self._streams = {message.name: self._stream(sources, message) for message in messages}
-        #: Sizes need two bytes.
-        self.wide = any(size > 0xFF for each in rows.values() for row in each for size in _sizes(row))
+        most = max(size for each in rows.values() for row in each for size in _sizes(row))
+        #: Bytes that say how long a part of a row is.
+        self.size_bytes = 1 if most <= 0xFF else 2 if most <= 0xFFFF else 3
 
     @property
     def most_events(self) -> int:
@@ -203,7 +204,7 @@ class Entries:
         return f"{kinds}, {self._address(row.address)}" if self._header.address else f"{kinds},"
 
     def _sized(self, data: bytes) -> str:
-        size = f"SIZE({len(data)})" if self.wide else str(len(data))
+        size = f"SIZE({len(data)})" if self.size_bytes > 1 else str(len(data))
         return ", ".join([size, *([numbers(data)] if data else [])]) + ","
 
 

@@ -30,6 +30,11 @@ class Header(typing.Protocol):
         ...
 
     @property
+    def id_bits(self) -> int:
+        """Width of its C type."""
+        ...
+
+    @property
     def address(self) -> str:
         """Member of the frame that holds the address, "" where there is none."""
         ...

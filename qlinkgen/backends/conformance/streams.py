@@ -16,6 +16,8 @@ from qlinkgen.model.protocol import Protocol
 
 #: The word for an event that is an intact frame.
 INTACT = "intact"
+#: Most events that a row of the kit can hold.
+_MOST_EVENTS = 0xFE
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +81,8 @@ def _heard(
             heard += listener.finish()
         intact += [each for each in heard if not each.kind]
         events.append(tuple(each.kind or INTACT for each in heard))
+        if len(heard) > _MOST_EVENTS:
+            return None
     return tuple(events) if _same(intact, due) else None
 
 

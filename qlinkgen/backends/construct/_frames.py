@@ -284,8 +284,10 @@ class DelimitedFrame(Frame):
 
     def _parse(self, stream: Any, context: Any, path: Any) -> Any:
         layout, wire = self.layout, stream_read_entire(stream, path)
-        self._check_front(wire)
+        if layout.stuffing is None or layout.exempt()[0]:
+            self._check_front(wire)
         data = layout.unstuffed(wire)
+        self._check_front(data)  # what is stuffed itself can be told only now
         if len(data) < layout.overhead:
             raise FrameError("truncated", f"{len(data)} bytes, and a frame has {layout.overhead} at least")
         self._check_length(data)

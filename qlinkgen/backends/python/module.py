@@ -146,7 +146,7 @@ class Module:
         plan, used = self.plan, {*self.place.used, *_PUBLIC, "BaseMessage", "as_bytes", "wrong_size"}
         used |= {"OpenEnum", "named"} if plan.enums else set()
         used |= (
-            {"REFUSALS", "refused"} if any(each.has_codec and each.refusable for each in models) else set()
+            {"REFUSALS", "settled"} if any(each.has_codec and each.refusable for each in models) else set()
         )
         typing = {"ClassVar", "Literal", "Self"}
         typing |= {"Final"} if plan.flags else set()
