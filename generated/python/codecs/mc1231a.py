@@ -33,7 +33,7 @@ from ._support import (
     as_bytes,
     illegal,
     named,
-    refused,
+    settled,
     short_of,
     wrong_size,
 )

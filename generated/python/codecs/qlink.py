@@ -40,7 +40,7 @@ from ._support import (
     find_crc,
     illegal,
     named,
-    refused,
+    settled,
     wrong_check,
     wrong_size,
 )

@@ -40,6 +40,7 @@ from ._support import (
     illegal,
     named,
     refused,
+    settled,
     wrong_check,
     wrong_size,
 )
