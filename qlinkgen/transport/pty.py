@@ -13,7 +13,7 @@ from pathlib import Path
 
 from qlinkgen.errors import CapabilityMissing, PortError
 from qlinkgen.transport.port import Ability, Capabilities
-from qlinkgen.transport.stream import CHUNK, DescriptorChannel, StreamPort, wait
+from qlinkgen.transport.stream import CHUNK, DescriptorChannel, StreamPort
 
 if sys.platform != "win32":
     import tty
@@ -46,13 +46,12 @@ class PtyChannel(DescriptorChannel):
         super().__init__(master, _STALL)
         self._master = master
         self._slave = slave
-        self._closed = False
         self.dropped = 0
 
     def _stalled(self, data: memoryview) -> memoryview:
         waiting = self._throw_away()
         self.dropped += waiting
-        if waiting or wait(self._master, 0, writable=True):
+        if waiting or self._wait(0, writable=True):
             return data
         self.dropped += len(data)  # a program has stopped the pty, so nothing can be taken out
         return data[:0]
@@ -67,10 +66,9 @@ class PtyChannel(DescriptorChannel):
 
     def close(self) -> None:
         """Close both ends."""
-        if not self._closed:
-            self._closed = True
-            os.close(self._slave)
-            os.close(self._master)
+        super().close()
+        os.close(self._slave)
+        os.close(self._master)
 
 
 class PtyPort(StreamPort):
@@ -93,13 +91,14 @@ class PtyPort(StreamPort):
             raise PortError(
                 f"the system gives no pty: {error.strerror}; close some, or raise its limit"
             ) from error
+        path = os.ttyname(slave)
+        super().__init__(path if link is None else str(link), baud)
         # Our own descriptor of the slave end stays open: without one the master would read EIO whenever no
         # program has the slave end.
-        self._pty = self._channel = PtyChannel(master, slave)
-        self.path = os.ttyname(slave)
+        self._pty = PtyChannel(master, slave)
+        self._use(self._pty)
+        self.path = path
         self.link: Path | None = None
-        self.name = self.path
-        self.baud = baud
         self.capabilities = _CAPABILITIES
         try:
             tty.setraw(slave)
@@ -107,9 +106,9 @@ class PtyPort(StreamPort):
             os.set_blocking(slave, False)
             if link is not None:
                 self.link = _make_link(Path(link), self.path)
-                self.name = str(link)
+                self._held.callback(self._unlink)
         except BaseException:
-            self._channel.close()
+            self.close()
             raise
 
     @property
@@ -117,14 +116,12 @@ class PtyPort(StreamPort):
         """Bytes that were thrown away because no program has read them in time."""
         return self._pty.dropped
 
-    def close(self) -> None:
-        """Close both ends and remove the link, unless it leads elsewhere by now."""
-        if self.link is not None:
-            with contextlib.suppress(OSError):
-                if str(self.link.readlink()) == self.path:
-                    self.link.unlink()
-            self.link = None
-        super().close()
+    def _unlink(self) -> None:
+        """Remove the link, unless it leads elsewhere by now."""
+        link, self.link = self.link, None
+        with contextlib.suppress(OSError):
+            if link is not None and str(link.readlink()) == self.path:
+                link.unlink()
 
 
 def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) -> PtyPort:
