@@ -70,6 +70,11 @@ class Bus(BlockingMaster, MasterCalls):
         self.memory = Memory()
         self._moving: defaultdict[int, threading.Lock] = defaultdict(threading.Lock)
 
+    def after_fork(self) -> None:
+        """See `BlockingMaster.after_fork`."""
+        super().after_fork()
+        self._moving = defaultdict(threading.Lock)
+
     @classmethod
     def open(
         cls,
