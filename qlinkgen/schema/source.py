@@ -14,6 +14,8 @@ from typing import Any, Final, TypeAlias
 
 import yaml
 
+from qlinkgen.schema.notation import DecimalNumber
+
 Path: TypeAlias = tuple[str | int, ...]
 Data: TypeAlias = Any
 
@@ -228,5 +230,5 @@ def _scalar(node: yaml.ScalarNode) -> Data:
     if len(text) > _MAX_DIGITS:
         return text
     if _INTEGER.match(text):
-        return int(text, 0)
+        return DecimalNumber(text) if text.isdecimal() and len(text) > 1 else int(text, 0)
     return Decimal(text) if _DECIMAL.match(text) else text
