@@ -14,6 +14,7 @@ import click
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.errors import SchemaError
+from qlinkgen.model.checksum import candidates
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 
@@ -37,7 +38,10 @@ def load_protocol(name: str, crc: str | None = None) -> Protocol:
     if crc is None:
         return protocol
     try:
-        return load(path, crc=crc)
+        protocol = load(path, crc=crc)
+        if names := [each.name for each in candidates(crc)]:
+            warn(f"--set crc={crc}: several algorithms have this name; write one of {', '.join(names)}")
+        return protocol
     except SchemaError as error:
         # The schema is right without it, so the fault is the option's.
         fault = error.faults[0]

@@ -397,7 +397,10 @@ def test_fields_that_the_codec_fills(qlinkgen: Run, thermo: Path) -> None:
 
 @pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])
 def test_another_crc(qlinkgen: Run, protocol: str) -> None:
+    result = qlinkgen("encode", "qlink", "motor_position", "--node", "3", "--set", "crc=crc-ccitt")
+    assert "several algorithms have this name; write one of crc-16/ibm-3740, crc-16/kermit, " in result.err
     result = qlinkgen("encode", "qlink", "motor_position", "--node", "3", "--set", "crc=crc-16/xmodem")
+    assert "several algorithms" not in result.err
     assert result.out.startswith("a5a5042103")
     assert qlinkgen("decode", "qlink", result.out.strip()).code == 1
     assert qlinkgen("decode", "qlink", result.out.strip(), "--set", "crc=xmodem").code == 0
