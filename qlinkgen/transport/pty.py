@@ -11,7 +11,8 @@ import os
 import sys
 from pathlib import Path
 
-from qlinkgen.errors import CapabilityMissing, PortError
+from qlinkgen.errors import CapabilityMissing, PortBusy, PortError
+from qlinkgen.transport import pty_lock
 from qlinkgen.transport.port import Ability, Capabilities
 from qlinkgen.transport.stream import CHUNK, DescriptorChannel, StreamPort
 
@@ -105,6 +106,7 @@ class PtyPort(StreamPort):
             os.set_blocking(master, False)
             os.set_blocking(slave, False)
             if link is not None:
+                pty_lock.lock(slave, Path(link))  # before others can see the link
                 self.link = _make_link(Path(link), self.path)
                 self._held.callback(self._unlink)
         except BaseException:
@@ -128,12 +130,12 @@ def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) 
     """Open a new pty and return its master end, raw and without echo.
 
     Args:
-        link: path for a symbolic link to the slave end, so that its name is known beforehand. A link that is
-            there already is replaced if it leads to a pty or nowhere; anything else is left alone.
+        link: path for a symbolic link to the slave end, so that its name is known beforehand. A link that a
+            killed program has left behind is replaced; anything else is left alone.
         baud: speed that the port says it has; only arithmetic uses it.
 
     Raises:
-        PortError: the link cannot be made.
+        PortError: the link cannot be made; PortBusy: it is that of a running program.
         CapabilityMissing: this system has no ptys.
     """
     return PtyPort(link, baud=baud)
@@ -141,12 +143,8 @@ def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) 
 
 def _make_link(link: Path, target: str) -> Path:
     """Put a link in its place in one step, so that there is never a moment without one."""
-    if os.path.lexists(link) and not _replaceable(link):
-        raise PortError(
-            f"{link} is there already and is no link to a pty, so it is left alone; "
-            "remove it, or choose another path",
-            port=str(link),
-        )
+    if os.path.lexists(link):
+        _check_stale(link, target)
     new = link.with_name(f".{link.name}.{os.urandom(4).hex()}")
     try:
         new.symlink_to(target)
@@ -161,5 +159,18 @@ def _make_link(link: Path, target: str) -> Path:
     return link.absolute()
 
 
-def _replaceable(link: Path) -> bool:
-    return link.is_symlink() and (not link.exists() or link.resolve().parent == _SLAVES)
+def _check_stale(link: Path, target: str) -> None:
+    """Refuse to replace anything but the link of a killed program, whose number `target` may have got."""
+    if not link.is_symlink() or (link.exists() and link.resolve().parent != _SLAVES):
+        raise PortError(
+            f"{link} is there already and is no link to a pty, so it is left alone; "
+            "remove it, or choose another path",
+            port=str(link),
+        )
+    device = str(link.resolve())
+    if device != target and link.exists() and pty_lock.is_locked(device, link):
+        raise PortBusy(
+            f"{link} leads to {device} and belongs to a program that is running; end that program, or "
+            "choose another path",
+            port=str(link),
+        )
