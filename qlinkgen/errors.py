@@ -10,7 +10,7 @@
         * `NoReply`: nothing usable came in time (also a `TimeoutError`)
         * `BadReply`: something came, but not the answer
             * `IllegalCommand`: the device does not know the command
-        * `CommandError`: the device knows the command, but it was not valid at that moment
+        * `CommandError`: the device knows the command, but it is not valid at this moment
         * `Collision`: what was sent came back changed, so others were sending too
         * `LoadError`: a program was not loaded to its end
     * `PortError`: the port itself failed (also an `OSError`)
@@ -194,7 +194,9 @@ class IllegalCommand(BadReply):
 
 
 class CommandError(LinkError):
-    """The device knows the command, but it was not valid at that moment: its change was dropped.
+    """The device knows the command, but it is not valid at this moment: its change was dropped.
+
+    With `attempts` 0 the last status said so beforehand, and nothing was sent.
 
     Attributes:
         status: the status word that says so.

@@ -161,6 +161,37 @@ def test_names_and_aliases(name: str, canonical: str) -> None:
     assert find(name).name == canonical
 
 
+AMBIGUOUS = [
+    "crc16-ccitt",
+    "CRC-CCITT",
+    "crc_16_ccitt",
+    "ccitt",
+    "CRC16",
+    "crc-16",
+    "crc-ibm",
+    "crc8",
+    "crc-8",
+]
+AMBIGUOUS += ["crc24", "crc-32", "CRC32", "crc_64"]
+
+
+@pytest.mark.parametrize("name", AMBIGUOUS)
+def test_names_that_are_used_for_several_algorithms(name: str) -> None:
+    found = checksum.candidates(name)
+    assert find(name) in found
+    assert len({each.check for each in found}) == len(found) >= 3
+    assert len({each.width for each in found}) == 1
+
+
+def test_all_other_names_are_clear() -> None:
+    keys = {checksum._key(name) for name in AMBIGUOUS}
+    assert keys == set(checksum._AMBIGUOUS)
+    for each in ALL:
+        for name in each.names:
+            assert bool(checksum.candidates(name)) is (checksum._key(name) in keys), name
+        assert not checksum.candidates(each.name)  # what the warning proposes is not warned of again
+
+
 def test_every_name_finds_its_own_algorithm() -> None:
     everything: tuple[checksum.Checksum, ...] = (*checksum.SUMS, *ALL)
     names = [(name, each) for each in everything for name in each.names]

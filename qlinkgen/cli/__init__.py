@@ -7,7 +7,7 @@ import importlib
 import click
 
 import qlinkgen
-from qlinkgen.cli.boundary import run
+from qlinkgen.cli.boundary import debug_option, run
 
 #: Command to the one line of `qlinkgen --help`; the command itself is `command` in the module of its name.
 COMMANDS = {
@@ -39,6 +39,8 @@ class LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = importlib.import_module(f"qlinkgen.cli.{cmd_name}").command
+        if not any(each.name == "debug" for each in command.params):
+            command.params.append(debug_option(hidden=True))  # at the end of a line that has failed
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -58,8 +60,11 @@ def cli() -> None:
     file.
 
     Exit codes: 0 fine, 1 what was checked is wrong (drift, bad frame, faulty schema, no answer, no such
-    port), 2 wrong usage.
+    port), 2 wrong usage, 70 a fault of qlinkgen itself (--debug shows where).
     """
+
+
+cli.params.append(debug_option())
 
 
 def main() -> None:

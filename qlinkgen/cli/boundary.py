@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import io
 import os
 import sys
+import traceback
+from pathlib import Path
 
 import click
 
+from qlinkgen.cli import standard_streams
 from qlinkgen.errors import QlinkgenError, SchemaError
 from qlinkgen.model.texts import visible
 
 FINE, WRONG, USAGE = 0, 1, 2
+#: A fault of qlinkgen itself; the number is that of EX_SOFTWARE in sysexits.h.
+FAULT = 70
 #: What a shell reports of a program that these signals ended.
 INTERRUPTED, BROKEN_PIPE = 130, 141
 
@@ -28,6 +32,8 @@ class Failure(Exception):
 
 def run(cli: click.Command) -> int:
     """Run the command line; the exit code."""
+    standard_streams.prepare()
+    _debug.wanted = False
     try:
         code = _invoke(cli)
         sys.stdout.flush()
@@ -41,6 +47,9 @@ def run(cli: click.Command) -> int:
     except OSError as error:
         _silence()
         return _complain(_of_system(error), WRONG)
+    except Exception as error:  # noqa: BLE001  # the boundary: nothing passes but a line that asks for a report
+        _silence()
+        return _complain(_unforeseen(error), FAULT)
 
 
 def _invoke(cli: click.Command) -> int:
@@ -66,6 +75,48 @@ def _invoke(cli: click.Command) -> int:
         return _complain(str(error), WRONG)
 
 
+class _Debug:
+    """Whether ``--debug`` was given."""
+
+    wanted = False
+
+
+_debug = _Debug()
+
+
+def _want_debug(context: click.Context, parameter: click.Parameter, value: bool) -> None:  # noqa: ARG001
+    _debug.wanted = _debug.wanted or value
+
+
+def debug_option(*, hidden: bool = False) -> click.Option:
+    """Return the option ``--debug``, of the command line as a whole or of a command."""
+    return click.Option(
+        ["--debug"],
+        is_flag=True,
+        expose_value=False,
+        is_eager=True,
+        hidden=hidden,
+        callback=_want_debug,
+        help="Show the traceback of a fault of qlinkgen itself.",
+    )
+
+
+def _unforeseen(error: Exception) -> str:
+    """Show the traceback if it is wanted; return the line that asks for a report."""
+    if _debug.wanted:
+        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    what = _one_line(f"{type(error).__name__}: {error}".rstrip(": "))
+    where = f"{Path(frame.filename).name}:{frame.lineno}"
+    report = "the traceback" if _debug.wanted else "the output of the same command with --debug"
+    return f"a fault of qlinkgen itself ({what}; {where}); please report it with {report}"
+
+
+def _one_line(text: str) -> str:
+    """Text without line breaks or other control characters, which a terminal would obey."""
+    return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
 def _complain(text: str, code: int) -> int:
     click.echo(f"qlinkgen: error: {visible(text)}", err=True)
     return code
@@ -82,7 +133,7 @@ def _silence() -> None:
     try:
         target = sys.stdout.fileno()
     except (OSError, ValueError):  # closed, or no real file
-        sys.stdout = io.StringIO()
+        sys.stdout = standard_streams.nothing()
         return
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, target)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import difflib
 import os
-import re
-import string
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,7 +12,9 @@ from typing import IO
 import click
 
 from qlinkgen.cli.boundary import Failure
+from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.errors import SchemaError
+from qlinkgen.model.checksum import candidates
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import visible
@@ -39,7 +39,10 @@ def load_protocol(name: str, crc: str | None = None) -> Protocol:
     if crc is None:
         return protocol
     try:
-        return load(path, crc=crc)
+        protocol = load(path, crc=crc)
+        if names := [each.name for each in candidates(crc)]:
+            warn(f"--set crc={crc}: several algorithms have this name; write one of {', '.join(names)}")
+        return protocol
     except SchemaError as error:
         # The schema is right without it, so the fault is the option's.
         fault = error.faults[0]
@@ -86,18 +89,11 @@ def warn_unconfirmed(protocol: Protocol, message: Message) -> None:
 
 
 def parse_hex(text: str, what: str = "HEX") -> bytes:
-    """Bytes of hex text; white space is ignored, a 0x in front of each word too."""
-    packed = ""
-    for word in re.finditer(r"\S+", text):
-        start = word.start() + (2 if word[0][:2].lower() == "0x" else 0)
-        for index in range(start, word.end()):
-            if text[index] not in string.hexdigits:
-                fix = "write bytes as pairs of 0-9 and a-f"
-                raise Failure(f"{what}: '{text[index]}' at character {index + 1} is no hex digit; {fix}")
-        packed += text[start : word.end()]
-    if len(packed) % 2:
-        raise Failure(f"{what}: {len(packed)} hex digits; a byte has two, so their number must be even")
-    return bytes.fromhex(packed)
+    """Bytes of hex text, by the rule of `qlinkgen.cli.hex_text`."""
+    try:
+        return HexReader().feed(f"{text}\n")
+    except HexError as error:
+        raise Failure(f"{what}: {error.message} (character {error.at + 1})") from None
 
 
 def on_terminal(stream: IO[str] | None = None) -> bool:

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from io import BufferedReader
+from itertools import chain
 from typing import Any, cast
 
 import click
@@ -16,6 +17,7 @@ from qlinkgen.cli.codec import fields, load_codec
 from qlinkgen.cli.common import crc_option, load_protocol, parse_hex, warn, warn_unconfirmed
 from qlinkgen.cli.conversations import Answers, Conversation
 from qlinkgen.cli.encode import asked
+from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
 from qlinkgen.model.frame import PacketFrame
 from qlinkgen.model.message import Direction
@@ -23,8 +25,6 @@ from qlinkgen.model.protocol import Protocol
 
 CHUNK = 65536
 _COMMENT = re.compile(rb"#[^\n]*")
-_PREFIX = re.compile(rb"(?<![0-9a-fA-F])0[xX]")
-_NO_DIGIT = re.compile(rb"[^0-9a-fA-F\s]")
 
 
 @click.command("decode")
@@ -46,9 +46,10 @@ def command(  # noqa: PLR0917  # click passes them by name
 ) -> int:
     """Print every frame of a stream as a JSON object; bytes between frames are passed over.
 
-    - (or nothing) reads hex text from standard input as it comes; white space, 0x, and comments from # to the
-    end of the line are ignored. A bad frame is an object
-    {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad frame, or none at all.
+    - (or nothing) reads hex text from standard input as it comes; comments go from # to the end of the line.
+    White space separates words of pairs of digits, each with or without 0x; a digit by itself is a byte too.
+    A bad frame is an object {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad
+    frame, or none at all.
 
     Nothing in most frames says whether it is a request or a response. Without --direction, what fits only one
     of them is that; what fits both is the response if it directly follows a request of the same command and
@@ -105,34 +106,19 @@ def _read_raw() -> Iterator[bytes]:
 def _read_hex() -> Iterator[bytes]:
     """Bytes as soon as both their digits are there; a chunk may end anywhere.
 
-    What stands before a wrong character is handed out before the error.
+    The bytes before a wrong character are handed out before the error.
     """
-    digit, comment, line = b"", False, 1
-    for chunk in _read_raw():
-        begun = line
-        line += chunk.count(b"\n")
+    reader, comment, line = HexReader(), False, 1
+    for chunk in chain(_read_raw(), (b"\n",)):
         text = _COMMENT.sub(b"", b"#" + chunk if comment else chunk)
         comment = b"#" in chunk[chunk.rfind(b"\n") + 1 :] or (comment and b"\n" not in chunk)
-        text = _PREFIX.sub(b"", digit + text)
-        wrong = _NO_DIGIT.search(text)
-        digits = b"".join(text[: wrong.start() if wrong else None].split())
-        whole = len(digits) & ~1
-        yield bytes.fromhex(digits[:whole].decode("ascii"))
-        if wrong:
-            at = begun + text.count(b"\n", 0, wrong.start())
-            raise Failure(
-                f"standard input, line {at}: {_character(wrong[0])} is no hex digit; comments begin with #"
-            )
-        digit = digits[whole:]
-    if digit:
-        raise Failure(
-            f"standard input: the number of hex digits is odd; '{digit.decode()}' stands alone at its end"
-        )
-
-
-def _character(byte: bytes) -> str:
-    shown = byte.decode("ascii", "replace")
-    return f"'{shown}'" if byte.isascii() and shown.isprintable() else f"byte {byte.hex()}"
+        try:
+            yield reader.feed(text.decode("ascii", "surrogateescape"))
+        except HexError as error:
+            yield error.before
+            at = line + text.count(b"\n", 0, error.at)
+            raise Failure(f"standard input, line {at}: {error.message}; comments begin with #") from None
+        line += chunk.count(b"\n")
 
 
 class _Printer:

@@ -19,7 +19,7 @@ from typing import ClassVar, Literal
 
 from qlinkgen.errors import QlinkgenError
 
-__all__ = ["SUMS", "Algorithm", "Checksum", "Sum", "UnknownAlgorithm", "catalogue", "find"]
+__all__ = ["SUMS", "Algorithm", "Checksum", "Sum", "UnknownAlgorithm", "candidates", "catalogue", "find"]
 
 
 class UnknownAlgorithm(QlinkgenError, LookupError):
@@ -227,6 +227,30 @@ def find(name: str) -> Checksum:
     if len(candidates) == 1:
         return candidates[0]
     raise UnknownAlgorithm(name, tuple(each.name for each in candidates) or _similar(key))
+
+
+#: Names that documents and libraries use for several algorithms, and those that they mean. The catalogue
+#: gives each of them to one, by its history, and that is not always the likeliest. "CRC-CCITT" is KERMIT by
+#: the standard, IBM-3740 ("FALSE") in most code, and XMODEM in many bootloaders.
+_CCITT = ("crc-16/ibm-3740", "crc-16/kermit", "crc-16/xmodem", "crc-16/ibm-sdlc", "crc-16/spi-fujitsu")
+_IBM = ("crc-16/modbus", "crc-16/arc", "crc-16/usb")
+_AMBIGUOUS = {
+    "ccitt": _CCITT,
+    "crcccitt": _CCITT,
+    "crc16ccitt": _CCITT,
+    "crcibm": _IBM,
+    "crc16": (*_IBM, "crc-16/ibm-3740", "crc-16/xmodem", "crc-16/kermit"),
+    "crc8": ("crc-8/smbus", "crc-8/maxim-dow", "crc-8/sae-j1850", "crc-8/autosar"),
+    "crc24": ("crc-24/openpgp", "crc-24/ble", "crc-24/flexray-a"),
+    "crc32": ("crc-32/iso-hdlc", "crc-32/mpeg-2", "crc-32/bzip2", "crc-32/iscsi"),
+    "crc64": ("crc-64/ecma-182", "crc-64/xz", "crc-64/go-iso"),
+}
+
+
+def candidates(name: str) -> tuple[Algorithm, ...]:
+    """Return the algorithms that a name is used for, the likeliest first; none where there is only one."""
+    by_name = {each.name: each for each in _catalogue()}
+    return tuple(by_name[each] for each in _AMBIGUOUS.get(_key(name), ()))
 
 
 def _similar(key: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
 from qlinkgen.schema.constants import integer_range
 from qlinkgen.schema.file_model import BitSpec, FieldSpec
 from qlinkgen.schema.kinds import MAX_PAYLOAD
-from qlinkgen.schema.notation import TypeText, shown, whole_range
+from qlinkgen.schema.notation import TypeText, byte_string, shown, whole_range
 from qlinkgen.schema.numbers import defaulted, quantified
 from qlinkgen.schema.scalars import Meaning, Plain, ScalarBuilder
 from qlinkgen.schema.site import Site
@@ -64,10 +64,14 @@ def _blob_default(spec: FieldSpec, text: TypeText, length: Length, site: Site) -
         return b""
     is_text = text.base == "text"
     try:
-        default = str(spec.default).encode("ascii") if is_text else bytes.fromhex(str(spec.default))
-    except ValueError:
-        hint = "write characters of 7 bits" if is_text else "write pairs of hex digits in quotes"
-        site.fault("bad-value", "default", f"{shown(spec.default)} is no {text.base}", hint)
+        default = str(spec.default).encode("ascii") if is_text else _bytes(spec.default)
+    except UnicodeEncodeError:
+        what = f"{shown(spec.default)} is no text"
+        site.fault("bad-value", "default", what, "write characters of 7 bits")
+        return b""
+    except ValueError as error:
+        what, _, hint = str(error).partition("; ")
+        site.fault("bad-value", "default", what, hint)
         return b""
     if not length.minimum <= len(default) <= length.maximum:
         what = f"the default has {len(default)} bytes"
@@ -76,6 +80,10 @@ def _blob_default(spec: FieldSpec, text: TypeText, length: Length, site: Site) -
         )
         return b""
     return default
+
+
+def _bytes(value: object) -> bytes:
+    return b"" if value == "" else byte_string(value)
 
 
 def build_array(item: Scalar, spec: FieldSpec, text: TypeText, payload_max: int, site: Site) -> Array | None:

@@ -48,6 +48,10 @@ class TypeText:
     count: str | None
 
 
+class DecimalNumber(int):
+    """A number of two decimal digits or more in the file; where bytes are meant, they may be hex."""
+
+
 def shown(value: object) -> str:
     """A value of the file as a message shows it."""
     if isinstance(value, dict | list):
@@ -102,7 +106,15 @@ def whole_range(value: object) -> tuple[int, int]:
 
 
 def byte_string(value: object) -> bytes:
-    """One number 0-255, or pairs of hex digits like ``A5 A5``. Raises ValueError."""
+    """One number 0-255, or pairs of hex digits like ``A5 A5``. Raises ValueError.
+
+    YAML takes a bare ``10`` for ten, while ``1A`` and ``10 10`` are text, which is read as hex.
+    """
+    if isinstance(value, DecimalNumber) and value <= 99:
+        raise ValueError(
+            f'{shown(value)} may be decimal or hex; write 0x{value} or "{value}" for the hex digits, '
+            f"0x{value:02X} for the decimal number"
+        )
     if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= 0xFF:
         return bytes([value])
     if isinstance(value, str) and _HEX.match(value):

@@ -207,13 +207,24 @@ class PartBuilder:
             taken |= mask
         return tuple(Chunk(first, last + 1 - first) for first, last in spec.sent)
 
+    def _ambiguous(self, name: str, found: catalogue.Checksum, path: Path) -> None:
+        candidates = catalogue.candidates(name)
+        if candidates:
+            what = f"{shown(name)} is taken for {found.name}, but is used for other algorithms too"
+            names = listed((f"{each.name} ({each.check:0{each.width // 4}X})" for each in candidates), "or")
+            hint = f"write the one that gives the check value of the document for 123456789: {names}"
+            place = (*path, "algorithm")
+            self._report.error("ambiguous-algorithm", place, what, hint, of_key=self._crc is not None)
+
     def _algorithm(self, spec: PartSpec, path: Path) -> catalogue.Algorithm | catalogue.Sum | None:
         name = self._crc or spec.algorithm
         if name is None:
             self._lacks("algorithm", "add algorithm: crc-16/ibm-3740 or another", path)
             return None
         try:
-            return catalogue.find(name[:80])
+            found = catalogue.find(name[:80])
+            self._ambiguous(name, found, path)
+            return found
         except catalogue.UnknownAlgorithm as error:
             hint = "see the catalogue of CRC algorithms, or use sum8 or sum16"
             if error.suggestions:

@@ -155,6 +155,12 @@ _ALL = (
         "The catalogue's names and their aliases are understood.",
     ),
     Rule(
+        "ambiguous-algorithm",
+        "The name of a checksum means one algorithm.",
+        "Documents use crc16-ccitt, crc-16 and crc-32 for algorithms that give different values.",
+        "warning",
+    ),
+    Rule(
         "checksum-does-not-fit",
         "A checksum is as wide as its algorithm.",
         "Bits would be lost; say with sent which bits go onto the wire.",

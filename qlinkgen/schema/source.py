@@ -16,6 +16,7 @@ import yaml
 
 from qlinkgen.model.texts import CONTROL
 from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT, control_character, written
+from qlinkgen.schema.notation import DecimalNumber
 
 Path: TypeAlias = tuple[str | int, ...]
 Data: TypeAlias = Any
@@ -240,5 +241,5 @@ def _scalar(node: yaml.ScalarNode) -> Data:
     if len(text) > _MAX_DIGITS:
         return text
     if _INTEGER.match(text):
-        return int(text, 0)
+        return DecimalNumber(text) if text.isdecimal() and len(text) > 1 else int(text, 0)
     return Decimal(text) if _DECIMAL.match(text) else text

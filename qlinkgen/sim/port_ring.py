@@ -92,7 +92,7 @@ class PortRing(PtyBus):
             super().__init__(wire, port=self.ports[0])
             opened.pop_all()
         self.paths = [port.path if isinstance(port, PtyPort) else port.name for port in self.ports]
-        self._look = make_looker(*descriptors, self._wake_out)
+        self._look = make_looker(*descriptors, self._waker.descriptor)
 
     def _engine(self, place: str | Node | Port, baud: int | None, opened: contextlib.ExitStack) -> Engine:
         """Take what stands at a place."""
@@ -106,12 +106,10 @@ class PortRing(PtyBus):
         self.nodes.append(node)
         return engine_of(node)
 
-    def run(self) -> None:
-        """Run the ring in this thread until `request_stop` is called.
+    def _all_ports(self) -> Sequence[Port]:
+        return self.ports
 
-        Raises:
-            PortLost: a port went away.
-        """
+    def _loop(self) -> None:
         wire, clock = self.wire, self.port.now
         while not self._stopping:
             wire.advance(clock())
@@ -127,12 +125,6 @@ class PortRing(PtyBus):
                 self.wire.wake(place)
                 found = True
         return found
-
-    def close(self) -> None:
-        """Stop the ring and close its ports. Closing twice does no harm."""
-        super().close()
-        for port in self.ports:
-            port.close()
 
 
 def _descriptor(port: Port) -> int:

@@ -7,15 +7,17 @@ import os
 import select
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Self
 
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.wire import Wire
+from qlinkgen.transport.forking import tell_of_forks
 from qlinkgen.transport.handing_over import HandOver
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.pty import open_pty
+from qlinkgen.transport.waker import Waker
 
 # `select` oversleeps by about 60 us, more than half a byte time at 115200 baud. The last stretch before
 # something is due, in seconds, is therefore waited for by looking again and again.
@@ -63,22 +65,31 @@ class PtyBus:
             raise SimulationError(
                 f"{self.port.name} has no descriptor to wait for: use a pty or a serial port"
             )
-        self._wake_out, self._wake_in = os.pipe()
-        os.set_blocking(self._wake_in, False)
-        os.set_blocking(self._wake_out, False)
-        self._look = make_looker(descriptor, self._wake_out)
+        self._waker = Waker()
+        self._look = make_looker(descriptor, self._waker.descriptor)
+        self._running = threading.RLock()
         self._calls: deque[Callable[[], object]] = deque()
         self._stopping = False
         self._closed = False
         self._thread: threading.Thread | None = None
         self._failure: BaseException | None = None
+        tell_of_forks(self)
 
     def run(self) -> None:
         """Run the line in this thread until `request_stop` is called.
 
         Raises:
-            PortLost: the port went away.
+            PortLost: a port went away, or was closed.
         """
+        with self._running, contextlib.ExitStack() as held:
+            for port in self._all_ports():
+                held.enter_context(port.hold(self._waker.wake))
+            self._loop()
+
+    def _all_ports(self) -> Sequence[Port]:
+        return [self.port]
+
+    def _loop(self) -> None:
         wire, port, clock = self.wire, self.port, self.port.now
         while not self._stopping:
             now = clock()
@@ -106,24 +117,19 @@ class PtyBus:
         return True
 
     def _answer_calls(self) -> None:
-        with contextlib.suppress(BlockingIOError):  # woken by something else
-            os.read(self._wake_out, 4096)
+        self._waker.clear()
         while self._calls:
             self._calls.popleft()()
 
     def request_stop(self) -> None:
         """Let `run` return at once; for any thread, for a signal handler, and also before `run` begins."""
         self._stopping = True
-        self._wake()
+        self._waker.wake()
 
     def call(self, function: Callable[[], object]) -> None:
         """Let the thread that runs the line call a function soon, such as one that detaches a station."""
         self._calls.append(function)
-        self._wake()
-
-    def _wake(self) -> None:
-        with contextlib.suppress(BlockingIOError):  # the pipe is full: that wakes as well
-            os.write(self._wake_in, b"!")
+        self._waker.wake()
 
     def start(self) -> Self:
         """Run the line in a thread of its own.
@@ -151,16 +157,21 @@ class PtyBus:
             raise failure
 
     def close(self) -> None:
-        """Stop the line and close the pty. Closing twice does no harm."""
+        """Stop the line, wherever it runs, and close the pty. Closing twice does no harm."""
         if self._closed:
             return
         try:
             self.stop()
         finally:
             self._closed = True
-            self.port.close()
-            os.close(self._wake_in)
-            os.close(self._wake_out)
+            with self._running:
+                for port in self._all_ports():
+                    port.close()
+                self._waker.close()
+
+    def after_fork(self) -> None:
+        """Make a new lock: the thread that runs the line does not exist in a forked child."""
+        self._running = threading.RLock()
 
     def fail(self, failure: BaseException) -> None:
         """Keep a failure for `stop` to raise."""

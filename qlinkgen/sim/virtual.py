@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import random
 
-from qlinkgen.errors import PortLost
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.wire import Wire
-from qlinkgen.transport.port import Ability, Capabilities, Port
+from qlinkgen.transport.port import Ability, Capabilities, Port, closed_here
 
 
 class VirtualPort(Port):
@@ -122,7 +121,7 @@ class VirtualPort(Port):
 
     def _check_open(self) -> None:
         if self._closed:
-            raise PortLost(f"{self.name}: the port was closed", port=self.name)
+            raise closed_here(self.name)
 
     def _react(self) -> float:
         low, high = self._reaction

@@ -7,8 +7,9 @@ blocking driver.
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import AsyncGenerator, Callable
-from contextlib import aclosing
+from contextlib import ExitStack, aclosing, suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -104,13 +105,11 @@ async def read(port: Port, timeout: float) -> bytes:
     """Read a port without holding up the loop."""
     if data := port.read(0):
         return data
-    descriptor = port.fileno()
-    if descriptor is None:
+    if port.fileno() is None:
         came: bytes = await _in_thread(port.read, timeout)
         return came
-    if await _readable(descriptor, timeout):
-        return port.read(0)
-    return b""
+    await _readable(port, timeout)
+    return port.read(0)
 
 
 async def sleep(port: Port, seconds: float) -> None:
@@ -121,20 +120,57 @@ async def sleep(port: Port, seconds: float) -> None:
         await asyncio.sleep(seconds)
 
 
-async def _readable(descriptor: int, timeout: float) -> bool:
+def watch(
+    port: Port, come: Callable[[], object], closed: Callable[[], object]
+) -> tuple[int | None, Callable[[], None]]:
+    """Have the running loop call `come` when bytes can be read, and `closed` once the port is closed.
+
+    Returns:
+        The descriptor, None where the port has none and nothing is watched; and a function that ends the
+        watch, after which the port may close its descriptor. It may be called any number of times.
+    """
     loop = asyncio.get_running_loop()
-    ready: asyncio.Future[bool] = loop.create_future()
+    thread = threading.get_ident()
+    held = ExitStack()
 
-    def settle(came: bool) -> None:  # the loop calls it with what it was given
-        if not ready.done():
-            ready.set_result(came)
+    def end() -> None:
+        held.close()
+        closed()
 
-    timer = loop.call_later(timeout, settle, False)
-    loop.add_reader(descriptor, settle, True)
-    try:
-        return await ready
-    finally:
+    def wake() -> None:
+        if threading.get_ident() == thread or loop.is_closed():
+            end()
+            return
+        with suppress(RuntimeError):  # the loop was closed meanwhile, and with it all its watches
+            loop.call_soon_threadsafe(end)
+
+    descriptor = held.enter_context(port.hold(wake))
+    if descriptor is not None:
+        loop.add_reader(descriptor, come)
+        held.callback(_unwatch, loop, descriptor)
+    return descriptor, held.close
+
+
+def _unwatch(loop: asyncio.AbstractEventLoop, descriptor: int) -> None:
+    if not loop.is_closed():
         loop.remove_reader(descriptor)
+
+
+async def _readable(port: Port, timeout: float) -> None:
+    """Return when bytes can be read, the port is closed, or the time is over."""
+    loop = asyncio.get_running_loop()
+    ready: asyncio.Future[None] = loop.create_future()
+
+    def settle() -> None:
+        if not ready.done():
+            ready.set_result(None)
+
+    _, let_go = watch(port, settle, settle)
+    timer = loop.call_later(timeout, settle)
+    try:
+        await ready
+    finally:
+        let_go()
         timer.cancel()
 
 

@@ -11,6 +11,7 @@ from qlinkgen.link.events import Event
 from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Steps
 from qlinkgen.link.transaction import Reply
 from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
+from qlinkgen.transport.forking import tell_of_forks
 from qlinkgen.transport.port import Port
 
 
@@ -29,6 +30,8 @@ class BlockingMaster(MasterDriver):
     def __init__(self, engine: Asker, port: Port, *, on_event: Callable[[Event], None] | None = None) -> None:
         super().__init__(engine, port, on_event)
         self._lock = threading.RLock()  # so that on_event may ask in its turn
+        self._asking: int | None = None  # the thread that holds it
+        tell_of_forks(self)
 
     def transact(self, request: Any, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """Ask, and return the answer with the number of attempts and the time that it took.
@@ -42,6 +45,7 @@ class BlockingMaster(MasterDriver):
         """
         port = self.port
         with self._lock:
+            outer, self._asking = self._asking, threading.get_ident()
             steps = conversation(self.engine, port, request, attempts, trial=trial)
             try:
                 timeout = next(steps)
@@ -53,6 +57,15 @@ class BlockingMaster(MasterDriver):
             finally:
                 steps.close()
                 self._report()
+                self._asking = outer
+
+    def after_fork(self) -> None:
+        """Give up a transaction of another thread, which does not exist in a forked child."""
+        self._lock = threading.RLock()
+        if self._asking not in {None, threading.get_ident()}:
+            self._asking = None
+            if self.engine.busy:
+                self.engine.abort(self.port.now())
 
     def run(self, procedure: Procedure[Outcome], progress: Callable[[Any], None] | None = None) -> Outcome:
         """Run a procedure to its end; `progress` is called with what it tells on the way."""

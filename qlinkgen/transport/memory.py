@@ -5,7 +5,8 @@ from __future__ import annotations
 from threading import Condition
 
 from qlinkgen.errors import PortLost
-from qlinkgen.transport.port import Ability, Capabilities, Port
+from qlinkgen.transport.forking import tell_of_forks
+from qlinkgen.transport.port import Ability, Capabilities, Port, closed_here
 from qlinkgen.transport.stream import CHUNK
 
 _CAPABILITIES = Capabilities(
@@ -21,44 +22,36 @@ _CAPABILITIES = Capabilities(
 class _Lane:
     """Bytes under way in one direction."""
 
-    __slots__ = ("data", "ended")
+    __slots__ = ("__weakref__", "changed", "data", "ended")
 
     def __init__(self) -> None:
         self.data = bytearray()
         self.ended = False
+        self.changed = Condition()
+        tell_of_forks(self)
+
+    def after_fork(self) -> None:
+        """Make a new lock: the old one may be held by a thread that does not exist in the child."""
+        self.changed = Condition()
 
 
 class MemoryPort(Port):
     """One end of a `memory_pair`. Both ends may be used by several threads at a time."""
 
-    def __init__(
-        self,
-        name: str,
-        baud: int,
-        incoming: _Lane,
-        outgoing: _Lane,
-        changed: Condition,
-        *,
-        told: Condition | None = None,
-    ) -> None:
-        """Make an end; `memory_pair` makes both, `memory_ring` a ring of them.
-
-        `changed` belongs to the incoming lane, `told` to the outgoing one if that has its own.
-        """
+    def __init__(self, name: str, baud: int, incoming: _Lane, outgoing: _Lane) -> None:
+        """Make an end; `memory_pair` makes both, `memory_ring` a ring of them."""
         self.name = name
         self.baud = baud
         self.capabilities = _CAPABILITIES
         self._incoming = incoming
         self._outgoing = outgoing
-        self._changed = changed
-        self._told = told or changed
         self._closed = False
 
     def read(self, timeout: float) -> bytes:
         """See `Port.read`. What the other end wrote before it closed is read before `PortLost` is raised."""
         lane = self._incoming
-        with self._changed:
-            self._changed.wait_for(lambda: lane.data or lane.ended, max(timeout, 0.0))
+        with lane.changed:
+            lane.changed.wait_for(lambda: lane.data or lane.ended, max(timeout, 0.0))
             self._check_open()
             if not lane.data and lane.ended:
                 raise self._lost()
@@ -69,16 +62,16 @@ class MemoryPort(Port):
     def write(self, data: bytes) -> None:
         """See `Port.write`. Nothing is ever held back, so this does not wait."""
         lane = self._outgoing
-        with self._told:
+        with lane.changed:
             self._check_open()
             if lane.ended:
                 raise self._lost()
             lane.data += data
-            self._told.notify_all()
+            lane.changed.notify_all()
 
     def _check_open(self) -> None:
         if self._closed:
-            raise PortLost(f"{self.name} was closed here; make a new pair to go on", port=self.name)
+            raise closed_here(self.name)
 
     def _lost(self) -> PortLost:
         return PortLost(f"{self.name} was lost: its other end was closed; make a new pair", port=self.name)
@@ -86,10 +79,10 @@ class MemoryPort(Port):
     def close(self) -> None:
         """Close this end; a read that waits at either end returns."""
         self._closed = True
-        for lane, changed in ((self._incoming, self._changed), (self._outgoing, self._told)):
-            with changed:
+        for lane in (self._incoming, self._outgoing):
+            with lane.changed:
                 lane.ended = True
-                changed.notify_all()
+                lane.changed.notify_all()
 
 
 def memory_pair(
@@ -101,12 +94,8 @@ def memory_pair(
         baud: speed that both say they have; only arithmetic uses it.
         names: how error texts call them.
     """
-    changed = Condition()
     there, back = _Lane(), _Lane()
-    return (
-        MemoryPort(names[0], baud, back, there, changed),
-        MemoryPort(names[1], baud, there, back, changed),
-    )
+    return MemoryPort(names[0], baud, back, there), MemoryPort(names[1], baud, there, back)
 
 
 def memory_ring(count: int, baud: int = 115200) -> list[MemoryPort]:
@@ -116,9 +105,8 @@ def memory_ring(count: int, baud: int = 115200) -> list[MemoryPort]:
         count: ports, at least 1.
         baud: speed that all say they have; only arithmetic uses it.
     """
-    lanes = [(_Lane(), Condition()) for _ in range(count)]
-    ports = []
-    for at, (incoming, changed) in enumerate(lanes):
-        outgoing, told = lanes[(at + 1) % count]
-        ports.append(MemoryPort(f"memory:{at}", baud, incoming, outgoing, changed, told=told))
-    return ports
+    lanes = [_Lane() for _ in range(count)]
+    return [
+        MemoryPort(f"memory:{at}", baud, incoming, lanes[(at + 1) % count])
+        for at, incoming in enumerate(lanes)
+    ]

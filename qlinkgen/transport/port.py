@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
 from types import TracebackType
 from typing import Self
+
+from qlinkgen.errors import PortLost
 
 
 class Ability(Enum):
@@ -87,11 +91,28 @@ class Port(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Give the port back. Closing twice does no harm."""
+        """Give the port back, whatever other threads do with it. Closing twice does no harm.
+
+        Calls that wait return at once with `PortLost`. A descriptor is closed when the last call has left it.
+        """
 
     def fileno(self) -> int | None:
-        """Return a descriptor that becomes readable when bytes come, None where there is none."""
+        """Return a descriptor that becomes readable when bytes come, None where there is none.
+
+        Another thread may close the port at any time; see `hold` for a descriptor to wait on.
+        """
         return None
+
+    def hold(self, wake: Callable[[], object]) -> AbstractContextManager[int | None]:  # noqa: ARG002
+        """Keep the descriptor, None where there is none, from being closed while a block waits on it.
+
+        Args:
+            wake: called by the thread that closes the port meanwhile; the block must then end soon.
+
+        Raises:
+            PortLost: the port was closed.
+        """
+        return nullcontext(self.fileno())
 
     def __enter__(self) -> Self:
         return self
@@ -100,3 +121,8 @@ class Port(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def closed_here(name: str) -> PortLost:
+    """Return the error for the use of a port that this program has closed."""
+    return PortLost(f"{name} was closed here; open it again to use it", port=name)

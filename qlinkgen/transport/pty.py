@@ -11,9 +11,10 @@ import os
 import sys
 from pathlib import Path
 
-from qlinkgen.errors import CapabilityMissing, PortError
+from qlinkgen.errors import CapabilityMissing, PortBusy, PortError
+from qlinkgen.transport import pty_lock
 from qlinkgen.transport.port import Ability, Capabilities
-from qlinkgen.transport.stream import CHUNK, DescriptorChannel, StreamPort, wait
+from qlinkgen.transport.stream import CHUNK, DescriptorChannel, StreamPort
 
 if sys.platform != "win32":
     import tty
@@ -46,13 +47,12 @@ class PtyChannel(DescriptorChannel):
         super().__init__(master, _STALL)
         self._master = master
         self._slave = slave
-        self._closed = False
         self.dropped = 0
 
     def _stalled(self, data: memoryview) -> memoryview:
         waiting = self._throw_away()
         self.dropped += waiting
-        if waiting or wait(self._master, 0, writable=True):
+        if waiting or self._wait(0, writable=True):
             return data
         self.dropped += len(data)  # a program has stopped the pty, so nothing can be taken out
         return data[:0]
@@ -67,10 +67,9 @@ class PtyChannel(DescriptorChannel):
 
     def close(self) -> None:
         """Close both ends."""
-        if not self._closed:
-            self._closed = True
-            os.close(self._slave)
-            os.close(self._master)
+        super().close()
+        os.close(self._slave)
+        os.close(self._master)
 
 
 class PtyPort(StreamPort):
@@ -93,23 +92,25 @@ class PtyPort(StreamPort):
             raise PortError(
                 f"the system gives no pty: {error.strerror}; close some, or raise its limit"
             ) from error
+        path = os.ttyname(slave)
+        super().__init__(path if link is None else str(link), baud)
         # Our own descriptor of the slave end stays open: without one the master would read EIO whenever no
         # program has the slave end.
-        self._pty = self._channel = PtyChannel(master, slave)
-        self.path = os.ttyname(slave)
+        self._pty = PtyChannel(master, slave)
+        self._use(self._pty)
+        self.path = path
         self.link: Path | None = None
-        self.name = self.path
-        self.baud = baud
         self.capabilities = _CAPABILITIES
         try:
             tty.setraw(slave)
             os.set_blocking(master, False)
             os.set_blocking(slave, False)
             if link is not None:
+                pty_lock.lock(slave, Path(link))  # before others can see the link
                 self.link = _make_link(Path(link), self.path)
-                self.name = str(link)
+                self._held.callback(self._unlink)
         except BaseException:
-            self._channel.close()
+            self.close()
             raise
 
     @property
@@ -117,26 +118,24 @@ class PtyPort(StreamPort):
         """Bytes that were thrown away because no program has read them in time."""
         return self._pty.dropped
 
-    def close(self) -> None:
-        """Close both ends and remove the link, unless it leads elsewhere by now."""
-        if self.link is not None:
-            with contextlib.suppress(OSError):
-                if str(self.link.readlink()) == self.path:
-                    self.link.unlink()
-            self.link = None
-        super().close()
+    def _unlink(self) -> None:
+        """Remove the link, unless it leads elsewhere by now."""
+        link, self.link = self.link, None
+        with contextlib.suppress(OSError):
+            if link is not None and str(link.readlink()) == self.path:
+                link.unlink()
 
 
 def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) -> PtyPort:
     """Open a new pty and return its master end, raw and without echo.
 
     Args:
-        link: path for a symbolic link to the slave end, so that its name is known beforehand. A link that is
-            there already is replaced if it leads to a pty or nowhere; anything else is left alone.
+        link: path for a symbolic link to the slave end, so that its name is known beforehand. A link that a
+            killed program has left behind is replaced; anything else is left alone.
         baud: speed that the port says it has; only arithmetic uses it.
 
     Raises:
-        PortError: the link cannot be made.
+        PortError: the link cannot be made; PortBusy: it is that of a running program.
         CapabilityMissing: this system has no ptys.
     """
     return PtyPort(link, baud=baud)
@@ -144,12 +143,8 @@ def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) 
 
 def _make_link(link: Path, target: str) -> Path:
     """Put a link in its place in one step, so that there is never a moment without one."""
-    if os.path.lexists(link) and not _replaceable(link):
-        raise PortError(
-            f"{link} is there already and is no link to a pty, so it is left alone; "
-            "remove it, or choose another path",
-            port=str(link),
-        )
+    if os.path.lexists(link):
+        _check_stale(link, target)
     new = link.with_name(f".{link.name}.{os.urandom(4).hex()}")
     try:
         new.symlink_to(target)
@@ -164,5 +159,18 @@ def _make_link(link: Path, target: str) -> Path:
     return link.absolute()
 
 
-def _replaceable(link: Path) -> bool:
-    return link.is_symlink() and (not link.exists() or link.resolve().parent == _SLAVES)
+def _check_stale(link: Path, target: str) -> None:
+    """Refuse to replace anything but the link of a killed program, whose number `target` may have got."""
+    if not link.is_symlink() or (link.exists() and link.resolve().parent != _SLAVES):
+        raise PortError(
+            f"{link} is there already and is no link to a pty, so it is left alone; "
+            "remove it, or choose another path",
+            port=str(link),
+        )
+    device = str(link.resolve())
+    if device != target and link.exists() and pty_lock.is_locked(device, link):
+        raise PortBusy(
+            f"{link} leads to {device} and belongs to a program that is running; end that program, or "
+            "choose another path",
+            port=str(link),
+        )

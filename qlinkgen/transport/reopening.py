@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Event, RLock
 
 from qlinkgen.errors import PortError, PortLost
-from qlinkgen.transport.port import Port
+from qlinkgen.transport.forking import tell_of_forks
+from qlinkgen.transport.port import Port, closed_here
 
 
 class ReopeningPort(Port):
@@ -15,7 +18,7 @@ class ReopeningPort(Port):
     away every use raises `PortLost`. The lost port is closed at once, because the kernel gives a replugged
     adapter a new number while the old one is held. After `close` it stays closed.
 
-    A descriptor from `fileno` is good until the next `PortLost`; ask again after it.
+    A descriptor from `fileno` or `hold` is good until the next `PortLost`; ask again after it.
 
     Attributes:
         reopened: how often the port has come back.
@@ -29,7 +32,10 @@ class ReopeningPort(Port):
                 adapter, as in /dev/serial/by-id, finds it at any plug.
         """
         self._opener = opener
-        self._closed = False
+        self._closed = Event()
+        self._loss = ""
+        self._lock = RLock()  # held while the port is opened; a signal handler may close it meanwhile
+        tell_of_forks(self)
         self.reopened = 0
         self._port: Port | None = None
         self._take(opener())
@@ -53,41 +59,68 @@ class ReopeningPort(Port):
         port = self._present()
         try:
             return port.read(timeout)
-        except PortLost:
-            self._drop()
-            raise
+        except PortLost as error:
+            raise self._drop(port, error) from error
 
     def write(self, data: bytes) -> None:
         """See `Port.write`."""
         port = self._present()
         try:
             port.write(data)
-        except PortLost:
-            self._drop()
-            raise
+        except PortLost as error:
+            raise self._drop(port, error) from error
+
+    @contextmanager
+    def hold(self, wake: Callable[[], object]) -> Iterator[int | None]:
+        """See `Port.hold`. Where another use finds the port lost, that closes it and wakes as well."""
+        with self._present().hold(wake) as descriptor:
+            yield descriptor
 
     def _present(self) -> Port:
-        if self._port is not None:
-            return self._port
-        if self._closed:
-            raise PortLost(f"{self.name} was closed here; open it again to use it", port=self.name)
-        try:
-            port = self._opener()
-        except PortError as error:
-            raise PortLost(f"{self.name} is still away: {error}", port=self.name) from error
-        self.reopened += 1
-        return self._take(port)
+        port = self._port
+        return self._reopen() if port is None else port
 
-    def _drop(self) -> None:
-        if self._port is not None:
-            self._port.close()
-            self._port = None
+    def _reopen(self) -> Port:
+        with self._lock:
+            if self._closed.is_set():
+                raise closed_here(self.name)
+            if self._port is not None:  # another thread was quicker
+                return self._port
+            try:
+                port = self._opener()
+            except PortError as error:
+                raise PortLost(f"{self.name} is still away: {error}", port=self.name) from error
+            self.reopened += 1
+            self._take(port)
+        if self._closed.is_set():  # by a signal handler meanwhile
+            port.close()
+        return port
+
+    def _drop(self, port: Port, error: PortLost) -> PortLost:
+        """Close a lost port, and return the error that says why it was lost.
+
+        Where another thread has closed the lost port before, this thread has only seen that.
+        """
+        with self._lock:
+            if self._port is port:
+                self._port = None
+                self._loss = str(error)
+        port.close()
+        return error if self._closed.is_set() else PortLost(self._loss, port=self.name)
 
     def close(self) -> None:
         """Close the port for good."""
-        self._closed = True
-        self._drop()
+        self._closed.set()
+        with self._lock:
+            port, self._port = self._port, None
+        if port is not None:
+            port.close()
+
+    def after_fork(self) -> None:
+        """Make a new lock: the old one may be held by a thread that does not exist in the child."""
+        self._lock = RLock()
 
     def fileno(self) -> int | None:
         """Return the descriptor of the port as it is open now, None while it is away."""
-        return None if self._port is None else self._port.fileno()
+        port = self._port
+        return None if port is None else port.fileno()

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from qlinkgen.link.ring import RingNode
+from qlinkgen.transport.forking import tell_of_forks
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring_driver import GIVE_WAY, NodeIo, OnEvent, RingDriver
 from qlinkgen.transport.ring_thread import NodeThread
@@ -39,6 +40,7 @@ class PumpedNode(RingDriver):
         self.on_event = on_event
         self._io = NodeIo(port, node)
         self._lock = threading.RLock()
+        tell_of_forks(self)
 
     def now(self) -> float:
         """Return the time on the port's clock."""
@@ -76,6 +78,10 @@ class PumpedNode(RingDriver):
     def _step(self, data: bytes) -> None:
         self._io.step(data)
         self._io.report(self.on_event)
+
+    def after_fork(self) -> None:
+        """Make a new lock: the old one may be held by a thread that does not exist in the child."""
+        self._lock = threading.RLock()
 
     def close(self) -> None:
         """Close the port."""

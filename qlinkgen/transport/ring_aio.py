@@ -13,10 +13,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TypeVar
 
-from qlinkgen.errors import PortLost
 from qlinkgen.link.ring import RingNode
 from qlinkgen.transport import aio
-from qlinkgen.transport.port import Port
+from qlinkgen.transport.port import Port, closed_here
 from qlinkgen.transport.ring_driver import FLUSH, GIVE_WAY, LOOK, LOOK_OFTEN, NodeIo, OnEvent
 
 T = TypeVar("T")
@@ -76,13 +75,13 @@ class AsyncNode(AsyncRingDriver):
         self._failure: BaseException | None = None
         self._closed = False
         self._timer: asyncio.TimerHandle | None = None
-        self._descriptor = port.fileno()
         self._task: asyncio.Task[None] | None = None
-        if self._descriptor is None:
-            self._task = self._loop.create_task(self._pump())
-        else:
-            self._loop.add_reader(self._descriptor, self._come)
+        descriptor, self._end_watch = aio.watch(port, self._come, self._closed_elsewhere)
+        self._watches = descriptor is not None
+        if self._watches:
             self._after(port.now())
+        else:
+            self._task = self._loop.create_task(self._pump())
 
     def now(self) -> float:
         """Return the time on the port's clock."""
@@ -107,7 +106,7 @@ class AsyncNode(AsyncRingDriver):
             self._timer.cancel()
             self._timer = None
         due = self.node.next_timer()
-        if due is not None and self._descriptor is not None:
+        if due is not None and self._watches:
             self._timer = self._loop.call_later(max(0.0, due - now), self._due)
         self._wake()
 
@@ -136,9 +135,12 @@ class AsyncNode(AsyncRingDriver):
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self._descriptor is not None:
-            self._loop.remove_reader(self._descriptor)
-            self._descriptor = None
+        self._watches = False
+        self._end_watch()
+
+    def _closed_elsewhere(self) -> None:
+        """Fail: the port was closed, and not by `close`."""
+        self._fail(closed_here(self.port.name))
 
     def _wake(self) -> None:
         for each in self._waiting:
@@ -203,7 +205,7 @@ class AsyncNode(AsyncRingDriver):
         if self._failure is not None:
             raise self._failure
         if self._closed:
-            raise PortLost(f"{self.port.name} was closed here; open it again to use it", port=self.port.name)
+            raise closed_here(self.port.name)
 
     async def close(self) -> None:
         """Send what is still to be sent, and close the port."""

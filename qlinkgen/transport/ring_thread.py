@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import sys
 import threading
@@ -13,9 +12,11 @@ from typing import Protocol, Self, TypeVar
 
 from qlinkgen.errors import PortError, PortLost
 from qlinkgen.link.ring import RingNode
+from qlinkgen.transport.forking import tell_of_forks
 from qlinkgen.transport.handing_over import HandOver
-from qlinkgen.transport.port import Port
+from qlinkgen.transport.port import Port, closed_here
 from qlinkgen.transport.ring_driver import FLUSH, GIVE_WAY, LOOK, LOOK_OFTEN, NodeIo, OnEvent, RingDriver
+from qlinkgen.transport.waker import Waker
 
 T = TypeVar("T")
 #: `select` takes no descriptor from here on (FD_SETSIZE).
@@ -51,6 +52,7 @@ class NodeThread(RingDriver):
         self._failure: BaseException | None = None
         self._closing = False
         self._waker: _Waker = _waker(port, self)
+        tell_of_forks(self)
         self._thread = threading.Thread(target=self._run, name=f"ring node at {port.name}", daemon=True)
         self._thread.start()
 
@@ -61,7 +63,7 @@ class NodeThread(RingDriver):
     # the thread of the node
 
     def _run(self) -> None:
-        with HandOver(self.fail):
+        with HandOver(self.fail), self.port.hold(self._waker.wake):
             data = b""
             while not self._closing:
                 with self._changed:
@@ -76,6 +78,16 @@ class NodeThread(RingDriver):
         with self._changed:
             self._failure = failure
             self._changed.notify_all()
+
+    def after_fork(self) -> None:
+        """Fail in a forked child, which has no thread that keeps the node at work."""
+        self._changed = threading.Condition()
+        if not self._closing:
+            self._failure = PortLost(
+                f"{self.port.name} belongs to the process that opened it, and this one was forked from it; "
+                "open the port here, after the fork",
+                port=self.port.name,
+            )
 
     # the threads of the program
 
@@ -133,7 +145,7 @@ class NodeThread(RingDriver):
         if self._failure is not None:
             raise self._failure
         if self._closing:
-            raise PortLost(f"{self.port.name} was closed here; open it again to use it", port=self.port.name)
+            raise closed_here(self.port.name)
 
     def close(self) -> None:
         """Send what is still to be sent, stop the thread, and close the port.
@@ -179,11 +191,8 @@ class _Pipe:
 
     def __init__(self, port: Port, descriptor: int) -> None:
         self._port = port
-        self._wake_out, self._wake_in = os.pipe()
-        os.set_blocking(self._wake_out, False)
-        os.set_blocking(self._wake_in, False)
-        self._watched = (descriptor, self._wake_out)
-        self._released = False
+        self._waker = Waker()
+        self._watched = (descriptor, self._waker.descriptor)
         self._poll = select.poll() if max(self._watched) >= _SELECT_LIMIT else None
         if self._poll is not None:
             for each in self._watched:
@@ -191,26 +200,22 @@ class _Pipe:
 
     def wait(self, timeout: float) -> bytes:
         if self._poll is not None:
-            ready = [each for each, _ in self._poll.poll(timeout * 1000)]
+            ready = bool(self._poll.poll(timeout * 1000))
         else:
-            ready = select.select(self._watched, (), (), timeout)[0]
-        if self._wake_out in ready:
-            os.read(self._wake_out, 4096)
-        return self._port.read(0) if self._watched[0] in ready else b""
+            ready = bool(select.select(self._watched, (), (), timeout)[0])
+        if not ready:
+            return b""
+        self._waker.clear()
+        return self._port.read(0)  # raises where the port was closed
 
     def wake(self) -> None:
-        if not self._released:
-            with contextlib.suppress(BlockingIOError):  # the pipe is full: that wakes as well
-                os.write(self._wake_in, b"!")
+        self._waker.wake()
 
     def stop(self) -> None:
-        self.wake()
+        self._waker.wake()
 
     def release(self) -> None:
-        if not self._released:
-            self._released = True
-            os.close(self._wake_in)
-            os.close(self._wake_out)
+        self._waker.close()
 
 
 class _Slices:

@@ -37,13 +37,14 @@ class PyserialChannel:
 
     def __init__(self, serial: Any) -> None:
         self._serial = serial
+        self._woken = False
 
     def read(self, timeout: float) -> bytes:
         """Return what is there, else what comes first."""
         limit = time.monotonic() + timeout
         while not self._serial.in_waiting:
             left = limit - time.monotonic()
-            if left <= 0:
+            if left <= 0 or self._woken:
                 return b""
             if left > _SLICE:
                 if first := bytes(self._serial.read(1)):
@@ -73,6 +74,13 @@ class PyserialChannel:
     def fileno(self) -> int | None:
         """Return None: there is nothing to wait on."""
         return None
+
+    def wake(self) -> None:
+        """End a read within a slice, and a write where pyserial can: on Windows."""
+        self._woken = True
+        if (cancel := getattr(self._serial, "cancel_write", None)) is not None:
+            with contextlib.suppress(*SYSTEM_ERRORS):  # a port that is gone waits for nothing
+                cancel()
 
     def close(self) -> None:
         """Do nothing: the port closes pyserial's object."""
@@ -116,15 +124,14 @@ class SerialPort(StreamPort):
             raise ValueError(
                 "rs485 and direction: either the driver or the caller switches, so give one of them"
             )
-        self.name = name
-        self.baud = baud
+        super().__init__(name, baud)
         self._direction = direction
         if direction is not None:
             direction(False)
-        self._shut_out: int | None = None
         self._serial = _open(name, baud, _PARITIES[parity], stop_bits)
+        self._held.callback(self._serial.close)
         try:
-            self._channel = self._make_channel()
+            self._use(self._make_channel())
             self.capabilities = self._set_up(low_latency=low_latency, rs485=rs485)
         except PortError:
             self.close()
@@ -151,7 +158,7 @@ class SerialPort(StreamPort):
         adapter = look_up(descriptor)  # afterwards: low latency changes what it finds
         if adapter.paced is not Ability.NO:
             settings.shut_out(descriptor)
-            self._shut_out = descriptor
+            self._held.callback(settings.let_in, descriptor)
         return _capabilities(adapter, accepted=accepted, rs485=settings.rs485_state(descriptor))
 
     def _set_up_remote(self, descriptor: int | None, rs485: bool | RS485Settings | None) -> Capabilities:
@@ -168,7 +175,7 @@ class SerialPort(StreamPort):
 
     def write(self, data: bytes) -> None:
         """See `Port.write`. With `direction` it returns when the last byte has left."""
-        if self._direction is None or self._gone:
+        if self._direction is None or self._gone or self._gate.is_shut:
             super().write(data)
             return
         self._direction(True)
@@ -177,21 +184,6 @@ class SerialPort(StreamPort):
             self._drain()
         finally:
             self._direction(False)
-
-    def _drain(self) -> None:
-        try:
-            self._channel.drain()
-        except SYSTEM_ERRORS as error:
-            raise self._lose(error) from error
-
-    def close(self) -> None:
-        """Give the port back, also one that was lost. Closing twice does no harm."""
-        self._gone = f"{self.name} was closed here; open it again to use it"
-        if self._shut_out is not None:
-            settings.let_in(self._shut_out)
-            self._shut_out = None
-        with contextlib.suppress(*SYSTEM_ERRORS):  # what is gone already needs no closing
-            self._serial.close()
 
 
 def _check(name: object, baud: object, parity: object, stop_bits: object) -> None:

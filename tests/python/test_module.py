@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from qlinkgen.codecs import mc1231a, qlink
 
 from qlinkgen.backends.base import OWN, Options
 from qlinkgen.backends.python import generate, load
+from qlinkgen.codecs import mc1231a, qlink
 from qlinkgen.schema import loads
 from tests.python.protocols import EVERY, defaults, module, protocol, text_of
 

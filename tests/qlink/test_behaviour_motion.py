@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import count, pairwise
+from typing import Any
 
 import pytest
 
 from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink import MotorStatus, PositionType
-from qlinkgen.errors import LinkError, NoReply
-from tests.qlink.behaviour_rig import Probe, Rig, Slave
+from qlinkgen.errors import CommandError, LinkError, NoReply
+from tests.qlink.behaviour_rig import CLEAN, Probe, Rig, Setting, Slave, make_rig
 from tests.qlink.conftest import MakeRig
 
 
@@ -195,10 +196,60 @@ def test_a_preset_is_refused_while_the_motor_runs(make: MakeRig) -> None:
     assert rig.sure(lambda: rig.bus.motor_position(1)).position == -(2**31)
     answer = rig.move(1, [1])
     assert answer.motor_status & MotorStatus.RUNNING
-    with pytest.raises(LinkError):
+    with pytest.raises(
+        CommandError, match=r"while the motor runs .* nothing was sent. Stop the node, or ask"
+    ) as told:
+        rig.bus.preset_motor_position(1, position=5)
+    assert (told.value.node, told.value.attempts) == (1, 0)
+    assert told.value.status & MotorStatus.RUNNING
+    assert rig.node.statistics.refused_presets == 0
+    rig.bus.memory.statuses.clear()  # as in a master that was just started
+    with pytest.raises(LinkError if rig.faulty else NoReply):
         rig.bus.preset_motor_position(1, position=5)
     assert rig.node.position == -(2**31)
-    assert rig.node.statistics.refused_presets >= (0 if rig.faulty else 3)
+    assert rig.node.statistics.refused_presets == 1 or rig.faulty  # not repeated
+
+
+on_a_virtual_clock = pytest.mark.parametrize(
+    "setting", [each for each in CLEAN if each.transport == "virtual"], ids=lambda setting: setting.name
+)
+STOPS: dict[str, Callable[[Any], object]] = {
+    "node_stop": lambda bus: bus.node_stop(1),
+    "node_stop for all": lambda bus: bus.node_stop(0),
+    "clear_fifo": lambda bus: bus.clear_fifo(1),
+    "node_reset": lambda bus: bus.node_reset(1),
+    "node_setup": lambda bus: bus.node_setup(1, node_number=1),
+}
+
+
+@pytest.mark.parametrize("stop", STOPS)
+@on_a_virtual_clock
+def test_a_preset_is_sent_once_a_request_has_outdated_the_status(setting: Setting, stop: str) -> None:
+    node = Probe(started=True, rate=0.0, position_type=PositionType.JVL_MACTALK)
+    with make_rig(setting, node) as rig:
+        rig.move(1, [1])
+        with pytest.raises(CommandError):
+            rig.bus.preset_motor_position(1, position=5)
+        STOPS[stop](rig.bus)
+        if stop == "node_setup":  # outdated, and running all the same
+            with pytest.raises(NoReply):
+                rig.bus.preset_motor_position(1, position=5)
+        else:
+            rig.bus.preset_motor_position(1, position=5)
+            assert rig.node.position == 5
+
+
+@on_a_virtual_clock
+def test_a_later_status_counts(setting: Setting) -> None:
+    node = Probe(started=True, rate=100.0, position_type=PositionType.JVL_MACTALK)
+    with make_rig(setting, node) as rig:
+        assert rig.move(1, [1, 2]).motor_status & MotorStatus.RUNNING
+        rig.sleep(1.0)
+        with pytest.raises(CommandError):
+            rig.bus.preset_motor_position(1, position=5)
+        assert not rig.move(1, []).motor_status & MotorStatus.RUNNING
+        rig.bus.preset_motor_position(1, position=5)
+        assert rig.node.position == 5
 
 
 @pytest.mark.parametrize("kind", list(range(4)))

@@ -76,7 +76,9 @@ def document(name: str) -> Any:
 
 
 def _write_out(data: Any, hint: Any) -> Any:
-    short = next((part for part in getattr(hint, "__metadata__", ()) if isinstance(part, kinds.ShortForm)), None)
+    short = next(
+        (part for part in getattr(hint, "__metadata__", ()) if isinstance(part, kinds.ShortForm)), None
+    )
     if short is not None and not isinstance(data, dict):
         data = {short.key: data}
     if isinstance(data, dict):
@@ -87,7 +89,9 @@ def _write_out(data: Any, hint: Any) -> Any:
 
 def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
     """Keys of a mapping with the annotation of what they hold."""
-    model = _first(hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False)
+    model = _first(
+        hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False
+    )
     if model is not None:
         hints = typing.get_type_hints(model, include_extras=True)
         yield from ((key, hints[key]) for key in data if key in hints)
@@ -133,7 +137,9 @@ def _slots(data: Any, hint: Any, path: tuple[str | int, ...], kind: Kind) -> Ite
         if any(map(_is_text, _parts(hint))):
             yield from (Slot((*path, index), kind) for index in range(len(data)))
     elif isinstance(data, dict):
-        model = _first(hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False)
+        model = _first(
+            hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False
+        )
         members = dict(_members(data, hint))
         if model is not None:
             texts = typing.get_type_hints(model, include_extras=True)
@@ -159,13 +165,19 @@ def put(name: str, places: Iterable[Slot], texts: str | Sequence[str]) -> Any:
         parent = data
         for step in slot.path[:-1]:
             parent = parent[step]
-        parent[slot.path[-1]] = turn[0] if "attributes" in slot.path and is_label(slot) else turn[index % len(turn)]
+        parent[slot.path[-1]] = (
+            turn[0] if "attributes" in slot.path and is_label(slot) else turn[index % len(turn)]
+        )
     return data
 
 
 def is_label(slot: Slot) -> bool:
     """Its text is a label: declared in one slot, used in others."""
-    return slot.kind in {("AttributeSpec", "values"), ("DefaultsSpec", "attributes"), ("CommandSpec", "attributes")}
+    return slot.kind in {
+        ("AttributeSpec", "values"),
+        ("DefaultsSpec", "attributes"),
+        ("CommandSpec", "attributes"),
+    }
 
 
 def text_of(data: Any) -> str:

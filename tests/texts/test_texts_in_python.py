@@ -36,7 +36,7 @@ def sources(protocol: Protocol) -> dict[str, str]:
 class _Bare(ast.NodeTransformer):
     """Leaves the structure of a module: no docstring, and every other string empty."""
 
-    def visit_Constant(self, node: ast.Constant) -> ast.Constant:  # noqa: N802
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
         return ast.Constant("") if isinstance(node.value, str) else node
 
 
@@ -72,7 +72,7 @@ def test_the_code_is_that_of_harmless_texts_and_the_docstrings_say_the_text(name
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_the_code_is_that_of_harmless_texts_in_each_slot_alone(name: str) -> None:
-    text = f"'\"\"\"\\ {{{{ x }}}} */ ??/ {HOSTILE[0]} {HOSTILE[3]}"
+    text = f'\'"""\\ {{{{ x }}}} */ ??/ {HOSTILE[0]} {HOSTILE[3]}'
     first = {slot.kind: slot for slot in slots(name)}
     for slot in first.values():
         places = tuple(each for each in slots(name) if is_label(each)) if is_label(slot) else (slot,)

@@ -229,7 +229,7 @@ def test_what_came_before_is_no_answer(kind: str) -> None:
 def _other_end(port: Port) -> MemoryPort:
     """A port that writes what `port` reads."""
     assert isinstance(port, MemoryPort)
-    return MemoryPort("tap", port.baud, port._outgoing, port._incoming, port._changed)
+    return MemoryPort("tap", port.baud, port._outgoing, port._incoming)
 
 
 class TestOneTransactionAtATime:

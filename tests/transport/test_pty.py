@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from qlinkgen.errors import PortError, PortLost
+from qlinkgen.errors import PortBusy, PortError, PortLost
 from qlinkgen.transport import Ability, PtyPort, SerialPort, open_pty
 from tests.transport.conftest import PATIENCE, descriptors
 
@@ -75,7 +75,7 @@ def test_close(pty: PtyPort) -> None:
     before = descriptors()
     assert pty.fileno() is not None
     pty.close()
-    assert descriptors() == before - 2
+    assert descriptors() == before - 4  # two ends of the pty, and of the pipe that wakes
     with open_pty() as other:  # takes over the numbers of the descriptors
         pty.close()
         assert descriptors() == before
@@ -124,12 +124,75 @@ def test_a_stale_link_is_replaced(tmp_path: Path, stale: str) -> None:
     assert not os.path.lexists(link)
 
 
-def test_the_link_of_another_pty_is_replaced_and_not_removed_by_it(tmp_path: Path) -> None:
+def test_a_link_that_leads_elsewhere_by_now_is_not_removed(tmp_path: Path) -> None:
     link = tmp_path / "bus"
     first = open_pty(link)
+    link.unlink()
     with open_pty(link) as second:
         first.close()
         assert link.readlink() == Path(second.path)
+
+
+def test_the_same_link_by_other_ways_to_write_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "alias").symlink_to("folder")
+    monkeypatch.chdir(tmp_path / "folder")
+    with open_pty("bus"):
+        for path in (tmp_path / "folder" / "bus", tmp_path / "alias" / "bus", Path("../folder/bus")):
+            with pytest.raises(PortBusy):
+                open_pty(path)
+
+
+@pytest.mark.parametrize("clients", [0, 1])
+def test_the_link_of_a_running_program_is_left_alone(tmp_path: Path, clients: int) -> None:
+    """Here and from another process, also after a client has opened and closed the port."""
+    link = tmp_path / "bus"
+    code = (
+        "import sys; from qlinkgen.errors import PortBusy; from qlinkgen.transport import open_pty\n"
+        "try:\n    open_pty(sys.argv[1])\nexcept PortBusy as error:\n    print(error)"
+    )
+    with open_pty(link) as first:
+        for _ in range(clients):
+            SerialPort(str(link)).close()
+        before = descriptors()
+        with pytest.raises(PortBusy, match=f"{link} leads to {first.path} and belongs to a program that"):
+            open_pty(link)
+        assert descriptors() == before
+        other = subprocess.run(
+            [sys.executable, "-c", code, str(link)],
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
+        assert "belongs to a program that is running; end that program" in other.stdout
+        assert link.readlink() == Path(first.path)
+        with SerialPort(str(link)) as client:
+            client.write(b"hi")
+            assert first.read(PATIENCE) == b"hi"
+
+
+def test_the_link_of_a_killed_program_is_replaced(tmp_path: Path) -> None:
+    """Also where a terminal, or the pty of another link, has got the number of its pty by then."""
+    link = tmp_path / "bus"
+    with open_pty(tmp_path / "other") as other:
+        link.symlink_to(other.path)
+        with open_pty(link) as port:
+            assert link.readlink() == Path(port.path)
+    master, slave = os.openpty()
+    try:
+        link.symlink_to(os.ttyname(slave))
+        with open_pty(link) as port:
+            assert link.readlink() == Path(port.path)
+    finally:
+        os.close(master)
+        os.close(slave)
+    code = "import os, sys; from qlinkgen.transport import open_pty\n"
+    code += "port = open_pty(sys.argv[1]); os.kill(os.getpid(), 9)"
+    subprocess.run([sys.executable, "-c", code, str(link)], check=False, timeout=PATIENCE)
+    assert link.is_symlink()
+    with open_pty(link) as port:
+        assert link.readlink() == Path(port.path)
 
 
 @pytest.mark.parametrize("kind", ["file", "folder", "link"])

@@ -341,8 +341,10 @@ def test_a_port_that_takes_nothing(pty: PtyPort) -> None:
     with SerialPort(pty.path) as port:
         number = port.fileno()
         assert number is not None
+        channel = DescriptorChannel(number, stall=0.01)
         with pytest.raises(OSError, match=r"took no byte for 0\.0 s, and \d+ are still to be sent"):
-            DescriptorChannel(number, stall=0.01).write(bytes(100_000))
+            channel.write(bytes(100_000))
+        channel.close()
 
 
 def test_descriptors_beyond_those_of_select(pty: PtyPort) -> None:
@@ -360,6 +362,7 @@ def test_descriptors_beyond_those_of_select(pty: PtyPort) -> None:
             assert channel.read(PATIENCE) == b"high"
             channel.write(b"up")
             assert pty.read(PATIENCE) == b"up"
+            channel.close()
         finally:
             os.close(high)
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

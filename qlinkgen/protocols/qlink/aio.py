@@ -14,6 +14,7 @@ from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
+from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink import survey
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
@@ -71,18 +72,26 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         port = open_port(name, baud=baud or BAUD)
         return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
 
+    async def transact(
+        self, request: qlink.Message, *, attempts: int | None = None, trial: bool = False
+    ) -> Reply:
+        """As `Bus.transact`."""
+        self.memory.check(request)
+        response = None
+        try:
+            reply = await super().transact(request, attempts=attempts, trial=trial)
+            response = reply.response
+            return reply
+        finally:
+            self.memory.note(request, response)
+
     def node(self, number: int) -> AsyncNode:
         """Return one node, 1..16."""
         return AsyncNode(self, number)
 
     async def ask(self, request: qlink.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
         """Send a request and return its answer."""
-        try:
-            reply = await self.transact(request)
-        finally:
-            if type(request) is qlink.NodeSetupRequest:
-                self.memory.set_up(request)
-        answer: R = reply.response
+        answer: R = (await self.transact(request)).response
         return answer
 
     async def tell(self, request: qlink.Message) -> None:

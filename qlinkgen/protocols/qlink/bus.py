@@ -72,6 +72,11 @@ class Bus(BlockingMaster, MasterCalls):
         self.memory = Memory()
         self._moving: defaultdict[int, threading.Lock] = defaultdict(threading.Lock)
 
+    def after_fork(self) -> None:
+        """See `BlockingMaster.after_fork`."""
+        super().after_fork()
+        self._moving = defaultdict(threading.Lock)
+
     @classmethod
     def open(
         cls,
@@ -94,17 +99,28 @@ class Bus(BlockingMaster, MasterCalls):
         port = open_port(name, baud=baud or BAUD)
         return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
 
+    def transact(self, request: qlink.Message, *, attempts: int | None = None, trial: bool = False) -> Reply:
+        """As `BlockingMaster.transact`.
+
+        Raises:
+            CommandError: the position of a motor is to be preset that runs, as its node has told last.
+        """
+        self.memory.check(request)
+        response = None
+        try:
+            reply = super().transact(request, attempts=attempts, trial=trial)
+            response = reply.response
+            return reply
+        finally:
+            self.memory.note(request, response)
+
     def node(self, number: int) -> Node:
         """Return one node, 1..16."""
         return Node(self, number)
 
     def ask(self, request: qlink.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
         """Send a request and return its answer."""
-        try:
-            answer: R = self.transact(request).response
-        finally:
-            if type(request) is qlink.NodeSetupRequest:
-                self.memory.set_up(request)
+        answer: R = self.transact(request).response
         return answer
 
     def tell(self, request: qlink.Message) -> None:

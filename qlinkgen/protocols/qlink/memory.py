@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 
 from qlinkgen.codecs import qlink
+from qlinkgen.errors import CommandError
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.health import HealthPolicy
@@ -17,11 +18,14 @@ from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import Procedure
 from qlinkgen.protocols.qlink import loading, motion, pacing
 from qlinkgen.protocols.qlink.arguments import positive, whole
+from qlinkgen.protocols.qlink.facts import BROADCAST
 from qlinkgen.protocols.qlink.hexfile import read_hex
 from qlinkgen.protocols.qlink.matching import ACCEPTS
 from qlinkgen.transport.conversation import timing_of
 from qlinkgen.transport.port import Port
 
+#: Requests after which a motor may have stopped, so that its last status is outdated.
+_STOPPING = {qlink.NodeStopRequest, qlink.ClearFifoRequest, qlink.NodeResetRequest}
 #: Syncs of one run: more than a bus can send in its life.
 MOST_SYNCS = 1 << 62
 
@@ -47,9 +51,11 @@ class Memory:
     Attributes:
         motions: state of the motions, by node.
         syncs: number of the next sync.
+        statuses: motor status that each node told last, without those that a request has outdated.
     """
 
     def __init__(self) -> None:
+        self.statuses: dict[int, int] = {}
         self.motions: defaultdict[int, motion.MotionState] = defaultdict(motion.MotionState)
         self.syncs = pacing.SyncState()
 
@@ -59,11 +65,47 @@ class Memory:
         self.syncs.counter = (number + 1) & 0xFF
         return number
 
-    def set_up(self, request: qlink.NodeSetupRequest) -> None:
-        """A node was given a number, or perhaps: nothing is known of who has it, nor of who had it before."""
-        if request.node != request.node_number:
-            self.motions[request.node].unknown()
-            self.motions[request.node_number].unknown()
+    def check(self, request: qlink.Message) -> None:
+        """Refuse a request that the node is going to refuse, as far as its last status says.
+
+        Raises:
+            CommandError: the motor runs, and the position cannot be preset.
+        """
+        if type(request) is not qlink.PresetMotorPositionRequest:
+            return
+        node: int = request.node
+        status = self.statuses.get(node, 0)
+        if status & qlink.MotorStatus.RUNNING:
+            raise CommandError(
+                f"node {node}: the position cannot be preset while the motor runs (section 7.13), and the "
+                "last status of the node says that it does; nothing was sent. Stop the node, or ask with "
+                f"motion({node}) whether it still runs",
+                node=node,
+                status=status,
+            )
+
+    def note(self, request: qlink.Message, response: qlink.Message | None) -> None:
+        """Learn from a request that was sent, perhaps, and from its response where one came."""
+        kind = type(request)
+        if kind is qlink.MotionRequest:
+            if isinstance(response, qlink.MotionResponse):
+                self.statuses[response.node] = response.motor_status
+        elif kind in _STOPPING:
+            if request.node == BROADCAST:
+                self.statuses.clear()
+            else:
+                self.statuses.pop(request.node, None)
+        elif isinstance(request, qlink.NodeSetupRequest):
+            self._set_up(request)
+
+    def _set_up(self, request: qlink.NodeSetupRequest) -> None:
+        """Forget what is known of the number that a node was perhaps given, and of the one before."""
+        if request.node == BROADCAST:
+            self.statuses.clear()
+        for number in {request.node, request.node_number}:
+            self.statuses.pop(number, None)
+            if request.node != request.node_number:
+                self.motions[number].unknown()
 
     def stream(
         self,

@@ -1,0 +1,57 @@
+"""A pipe that ends the wait of another thread in `select` or `poll`."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from threading import RLock
+
+from qlinkgen.transport.forking import tell_of_forks
+
+
+class Waker:
+    """Wakes a thread that waits for `descriptor` beside others. For any thread and for signal handlers.
+
+    Attributes:
+        descriptor: can be read after `wake`, until `clear`. Good until `close`.
+    """
+
+    def __init__(self) -> None:
+        self.descriptor, self._write_end = os.pipe()
+        os.set_blocking(self.descriptor, False)
+        os.set_blocking(self._write_end, False)
+        self._open = True
+        self._lock = RLock()  # a handler may interrupt a call of its own thread
+        tell_of_forks(self)
+
+    def wake(self) -> None:
+        """Make the descriptor readable. Does nothing after `close`."""
+        with self._lock:
+            if self._open:
+                with contextlib.suppress(BlockingIOError):  # a full pipe wakes as well
+                    os.write(self._write_end, b"!")
+
+    def clear(self) -> None:
+        """Forget every `wake` so far."""
+        with self._lock:
+            if self._open:
+                with contextlib.suppress(BlockingIOError):  # not woken
+                    os.read(self.descriptor, 4096)
+
+    def close(self) -> None:
+        """Close the pipe, once no thread waits for it any more. Closing twice does no harm."""
+        with self._lock:
+            if self._open:
+                self._open = False
+                os.close(self._write_end)
+                os.close(self.descriptor)
+
+    def after_fork(self) -> None:
+        """Part from the parent: its pipe would wake it, and a thread that is not here may hold the lock."""
+        self._lock = RLock()
+        if self._open:
+            ends = os.pipe()
+            for new, old in zip(ends, (self.descriptor, self._write_end), strict=True):
+                os.set_blocking(new, False)
+                os.dup2(new, old, inheritable=False)
+                os.close(new)
