@@ -60,8 +60,8 @@ bench: .venv/.user  ## Measure the generated code beside its peers
 	@$(BIN)/python benchmarks/run.py
 
 soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 20 000 with each firmware; writes docs/soak.md (40 minutes)
-	@$(BIN)/python benchmarks/soak.py --output docs/soak.md
-	@$(BIN)/python benchmarks/firmware_soak.py --output docs/soak.md
+	@$(BIN)/python -m tests.soak.bus --output docs/soak.md
+	@$(BIN)/python -m tests.soak.firmware --output docs/soak.md
 
 clean:  ## Remove everything that make and the tools made
 	rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
