@@ -7,11 +7,14 @@ PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --editable
 # Scripts are checked like the package; a folder without any would be an error to mypy.
 TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py generated/python/*/*.py)))
 
+# Half of what a start of Python takes is compiling, and the tests start it some hundred times.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint generate bench soak clean
+.PHONY: help setup demo test test-fast lint generate bench soak clean
 
 help:  ## Show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' tools
 
