@@ -7,11 +7,14 @@ PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --editable
 # Scripts are checked like the package; a folder without any would be an error to mypy.
 TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py)))
 
+# Half of what a start of Python takes is compiling, and the tests start it some hundred times.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint generate bench soak clean
+.PHONY: help setup demo test test-fast lint generate bench soak clean
 
 help:  ## Show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' tools
 
@@ -60,8 +63,8 @@ bench: .venv/.user  ## Measure the generated code beside its peers
 	@$(BIN)/python benchmarks/run.py
 
 soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 20 000 with each firmware; writes docs/soak.md (40 minutes)
-	@$(BIN)/python benchmarks/soak.py --output docs/soak.md
-	@$(BIN)/python benchmarks/firmware_soak.py --output docs/soak.md
+	@$(BIN)/python -m tests.soak.bus --output docs/soak.md
+	@$(BIN)/python -m tests.soak.firmware --output docs/soak.md
 
 clean:  ## Remove everything that make and the tools made
 	rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

@@ -14,6 +14,7 @@ import shutil
 import signal
 from collections import Counter
 from collections.abc import Callable, Generator
+from pathlib import Path
 from typing import NoReturn
 
 import pytest
@@ -84,6 +85,13 @@ def optional_tool() -> Callable[..., str]:
         return shutil.which(tool) or pytest.skip(OPTIONAL_NOTICE.format(tool=tool, how=how))
 
     return find
+
+
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder that all workers of this session have in common: see `tests.support.sharing`."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
 
 def _reason(report: pytest.TestReport | pytest.CollectReport) -> str:

@@ -30,17 +30,22 @@ def protocol_of(name: str) -> Protocol:
 
 
 @pytest.fixture(scope="session")
-def drivers(
-    tmp_path_factory: pytest.TempPathFactory, require_tool: Callable[..., str]
-) -> Iterator[Callable[[str], Driver]]:
+def drivers(shared: Path, require_tool: Callable[..., str]) -> Iterator[Callable[[str], Driver]]:
     """Give the driver of a protocol, under address and undefined-behaviour sanitizers."""
     compiler = require_tool("gcc", package="gcc")
     running: dict[str, Driver] = {}
 
     def get(name: str) -> Driver:
         if name not in running:
-            folder = tmp_path_factory.mktemp(f"c_{name}")
-            running[name] = Driver(build(protocol_of(name), folder, compiler, SANITIZED))
+            flags = (
+                "-O1",
+                "-g",
+                "-std=c99",
+                *WARNINGS,
+                "-fsanitize=address,undefined",
+                "-fno-sanitize-recover=all",
+            )
+            running[name] = Driver(build(protocol_of(name), shared / "drivers", compiler, flags))
         return running[name]
 
     yield get

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from qlinkgen.cli import cli
+from qlinkgen.cli import cli, wire_options
 from qlinkgen.cli.boundary import run
+from qlinkgen.sim import VirtualPort, Wire
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,27 @@ def qlinkgen(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
         return Result(code, captured.out, captured.err)
 
     return call
+
+
+#: Gives the name of a port at which a simulated line is.
+OnLine = Callable[[Wire], str]
+
+
+@pytest.fixture
+def on_line(monkeypatch: pytest.MonkeyPatch) -> OnLine:
+    """Return a function that puts a line at a port with a virtual clock: no timeout takes real time."""
+
+    def put(wire: Wire) -> str:
+        ports = [VirtualPort(wire)]
+
+        def opened(name: str, *, baud: int, **_: object) -> VirtualPort:
+            ports.append(VirtualPort(wire, baud=baud, start=ports[-1].now()))
+            return ports[-1]
+
+        monkeypatch.setattr(wire_options, "open_port", opened)
+        return ports[0].name
+
+    return put
 
 
 @pytest.fixture

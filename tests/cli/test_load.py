@@ -12,8 +12,8 @@ from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.protocols.qlink.hexfile import read_hex
 from qlinkgen.sim import FaultPlan
-from tests.cli.conftest import Run
-from tests.cli.wire import CALM, PATIENCE, bus, call, end, on_terminal, started, wait_for
+from tests.cli.conftest import OnLine, Run
+from tests.cli.wire import CALM, PATIENCE, bus, call, end, line, on_terminal, started, wait_for
 
 
 def record(address: int, kind: int, data: bytes) -> str:
@@ -51,10 +51,10 @@ def test_a_program_arrives(program: Path) -> None:
     assert node.program.segments == read_hex(program).segments
 
 
-def test_lost_answers_are_repeats(program: Path, qlinkgen: Run) -> None:
+def test_lost_answers_are_repeats(program: Path, qlinkgen: Run, on_line: OnLine) -> None:
     node = VirtualNode(3)
-    with bus(node, faults=FaultPlan(drop=0.2, seed=4)) as running:
-        result = qlinkgen("load", running.path, "--node", "3", program, "--slack", "0.05", "--patience", "60")
+    port = on_line(line(node, faults=FaultPlan(drop=0.2, seed=4)))
+    result = qlinkgen("load", port, "--node", "3", program, "--patience", "60")
     assert result.code == 0
     found = re.search(r" (\d+) repeats?,", result.out)
     assert found
@@ -63,11 +63,8 @@ def test_lost_answers_are_repeats(program: Path, qlinkgen: Run) -> None:
     assert node.program.segments == read_hex(program).segments
 
 
-def test_a_silent_node(program: Path, qlinkgen: Run) -> None:
-    with bus(VirtualNode(3)) as running:
-        result = qlinkgen(
-            "load", running.path, "--node", "4", program, "--slack", "0.01", "--patience", "0.1"
-        )
+def test_a_silent_node(program: Path, qlinkgen: Run, on_line: OnLine) -> None:
+    result = qlinkgen("load", on_line(line(VirtualNode(3))), "--node", "4", program)
     assert (result.code, result.out) == (1, "")
     assert f"node 4: 0 of {size(program)} bytes were acknowledged" in result.err
 

@@ -46,20 +46,20 @@ def finish(process: subprocess.Popen[bytes]) -> tuple[int, str, str]:
     return process.returncode, out.decode(), err.decode()
 
 
-def send(path: str, *words: str) -> None:
-    assert call("send", path, "qlink", *words, *CALM).returncode == 0
+def send(qlinkgen: Run, path: str, *words: str) -> None:
+    assert qlinkgen("send", path, "qlink", *words, *CALM).code == 0
 
 
-def test_a_bus_on_which_others_talk() -> None:
+def test_a_bus_on_which_others_talk(qlinkgen: Run) -> None:
     with (
         bus() as running,
         tapped(running) as ear,
         started("monitor", ear, "--json", "--count", "5", "--raw", *SLACK) as monitor,
     ):
         listening(monitor)
-        send(running.path, "motion", "--node", "3", "counter=1", "segments=7,8")
-        send(running.path, "node_start", "--node", "0")
-        send(running.path, "read", "--node", "1", "size=2")
+        send(qlinkgen, running.path, "motion", "--node", "3", "counter=1", "segments=7,8")
+        send(qlinkgen, running.path, "node_start", "--node", "0")
+        send(qlinkgen, running.path, "read", "--node", "1", "size=2")
         code, out, err = finish(monitor)
     assert code == 0
     assert (
@@ -163,7 +163,7 @@ def test_the_same_as_json() -> None:
     ]
 
 
-def test_faults_make_repeats_visible() -> None:
+def test_faults_make_repeats_visible(qlinkgen: Run) -> None:
     plan = FaultPlan(drop=0.4, to="master", seed=2)
     with (
         bus(VirtualNode(1), faults=plan) as running,
@@ -172,8 +172,8 @@ def test_faults_make_repeats_visible() -> None:
     ):
         listening(monitor)
         for _ in range(4):
-            request = ("qlink", "motor_position", "--node", "1", "--attempts", "50", "--slack", "0.3")
-            assert call("send", running.path, *request, "--echo", "none").returncode == 0
+            request = ("qlink", "motor_position", "--node", "1", "--attempts", "200", "--slack", "0.05")
+            assert qlinkgen("send", running.path, *request, "--echo", "none").code == 0
         read_until(monitor.stdout, '"repeat": true')
         assert end(monitor, signal.SIGTERM)[0] == 0
     assert plan.counts["drop"] > 0
@@ -240,24 +240,24 @@ def test_a_port_that_goes_away() -> None:
 
 
 @FULL_DISK
-def test_a_full_disk(tmp_path: Path) -> None:
+def test_a_full_disk(qlinkgen: Run) -> None:
     with bus() as running, tapped(running) as ear:
         with Path("/dev/full").open("wb") as full, started("monitor", ear, stdout=full) as monitor:
             listening(monitor)
-            send(running.path, "motor_position", "--node", "1")
+            send(qlinkgen, running.path, "motor_position", "--node", "1")
             _, err = monitor.communicate(timeout=PATIENCE)
         assert monitor.returncode == 1
         assert b"No space left on device" in err
         assert b"Traceback" not in err
-        send(running.path, "motor_position", "--node", "1")
+        send(qlinkgen, running.path, "motor_position", "--node", "1")
 
 
-def test_a_reader_that_goes_away() -> None:
+def test_a_reader_that_goes_away(qlinkgen: Run) -> None:
     with bus() as running, tapped(running) as ear, started("monitor", ear) as monitor:
         listening(monitor)
         assert monitor.stdout is not None
         monitor.stdout.close()
-        send(running.path, "motor_position", "--node", "1")
+        send(qlinkgen, running.path, "motor_position", "--node", "1")
         assert monitor.wait(PATIENCE) == 141
 
 

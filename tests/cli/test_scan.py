@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
 import pytest
 
 from qlinkgen.protocols.qlink import VirtualNode
-from tests.cli.conftest import Run
+from tests.cli.conftest import OnLine, Run
 from tests.cli.full_disk import FULL_DISK
-from tests.cli.wire import CALM, bus, call, on_terminal, simulated
+from tests.cli.wire import CALM, call, line, objects, on_terminal, simulated
 
 
 def test_table() -> None:
@@ -26,15 +25,13 @@ def test_table() -> None:
     assert [row and row.groups() for row in found] == [("1", "1001"), ("3", "1003"), ("16", "1016")]
 
 
-def test_json_and_a_node_without_node_info() -> None:
+def test_json_and_a_node_without_node_info(qlinkgen: Run, on_line: OnLine) -> None:
     mute = VirtualNode(5, unsupported=["node_info"])
     known = VirtualNode(2, version=(2, 7), product_id=99, serial_number=12345, t1_delay=0.3, position_type=77)
-    with bus(mute, known) as running:
-        done = call("scan", running.path, "--nodes", "2,4-5", "--json", "--slack", "1")
-        table = call("scan", running.path, "--nodes", "5", "--slack", "1")
-    found = [json.loads(line) for line in done.stdout.splitlines()]
+    port = on_line(line(mute, known))
+    found = objects(qlinkgen("scan", port, "--nodes", "2,4-5", "--json").out)
     seconds = [each.pop("seconds") for each in found]
-    assert all(0 <= each < 2 for each in seconds)
+    assert seconds == [0, 0]
     assert found[0] == {
         "node": 2,
         "version": "2.7",
@@ -45,14 +42,14 @@ def test_json_and_a_node_without_node_info() -> None:
         "position_type": 77,
     }
     assert found[1] == {**dict.fromkeys(found[0]), "node": 5}
-    assert "does not support node_info" in table.stdout
+    assert "does not support node_info" in qlinkgen("scan", port, "--nodes", "5").out
 
 
-def test_nobody(qlinkgen: Run) -> None:
-    with bus(VirtualNode(3)) as running:
-        result = qlinkgen("scan", running.path, "--nodes", "1-2", "--slack", "0.05")
+def test_nobody(qlinkgen: Run, on_line: OnLine) -> None:
+    port = on_line(line(VirtualNode(3)))
+    result = qlinkgen("scan", port, "--nodes", "1-2")
     assert (result.code, result.out) == (1, "")
-    assert f"no node answers on {running.path}; check power, wiring and --baud" in result.err
+    assert f"no node answers on {port}; check power, wiring and --baud" in result.err
 
 
 def test_progress_on_a_terminal() -> None:

@@ -22,6 +22,7 @@ from tests.cli.wire import (
     ENVIRONMENT,
     PATIENCE,
     REPOSITORY,
+    SLACK,
     call,
     end,
     objects,
@@ -64,7 +65,7 @@ def test_ends_with_a_shell_that_ignores_ctrl_c(tmp_path: Path) -> None:
 
 def test_nodes_behave_as_the_document_says() -> None:
     with simulated("qlink", "--nodes", "2,4-5") as (path, process):
-        with Bus(open_port(path), slack=10) as bus:
+        with Bus(open_port(path), slack=10, echo="none") as bus:
             assert [bus.node(number).node_info().serial_number for number in (2, 4, 5)] == [1002, 1004, 1005]
             bus.node(4).motion(segments=[3, 4, 5])
             assert bus.node(4).motor_position().position == 0
@@ -82,7 +83,7 @@ def test_faults_are_counted_and_the_seed_decides_them() -> None:
     for _ in range(2):
         options = ("--nodes", "1", "--faults", "drop=0.3,to=master", "--seed", "5")
         with simulated("qlink", *options) as (path, process):
-            with Bus(open_port(path), slack=0.2, attempts=30, echo="none", health=None) as bus:
+            with Bus(open_port(path), slack=0.05, attempts=200, echo="none", health=None) as bus:
                 for _ in range(20):
                     bus.node(1).motor_position()
                 total = bus.engine.total
@@ -103,7 +104,10 @@ def test_faults_are_counted_and_the_seed_decides_them() -> None:
 
 
 def test_baud_paces() -> None:
-    with simulated("qlink", "--baud", "1200") as (path, _), Bus(open_port(path, baud=1200), slack=10) as bus:
+    with (
+        simulated("qlink", "--baud", "1200") as (path, _),
+        Bus(open_port(path, baud=1200), slack=10, echo="none") as bus,
+    ):
         request = qlink.LoopBackRequest(node=1, data=bytes(20))
         reply = bus.transact(request)
     size = len(reply.response.to_frame()) + len(request.to_frame())
@@ -116,16 +120,16 @@ def test_echo() -> None:
         assert bus.engine._echo.mode == "expect"
 
 
-def test_another_checksum() -> None:
+def test_another_checksum(qlinkgen: Run) -> None:
     with simulated("qlink", "--set", "crc=crc-16/xmodem") as (path, _):
-        request = ("send", path, "qlink", "motor_position", "--node", "1", *CALM)
-        done = call(*request, "--set", "crc=crc-16/xmodem")
-        assert objects(done.stdout) == [
-            {"message": "motor_position.response", "node": 1, "fields": {"position": 0}}
-        ]
-        other = call(*request[:6], "--slack", "0.2")
-        assert other.returncode == 1
-        assert "no answer" in other.stderr
+        request = ("send", path, "qlink", "motor_position", "--node", "1", "--echo", "none")
+        other = qlinkgen(*request, "--slack", "0.1", "--attempts", "1")
+        assert other.code == 1
+        assert "no answer" in other.err
+        done = call(*request, *SLACK, "--set", "crc=crc-16/xmodem")  # a process: all of it has one checksum
+    assert objects(done.stdout) == [
+        {"message": "motor_position.response", "node": 1, "fields": {"position": 0}}
+    ]
 
 
 @pytest.mark.parametrize(
@@ -140,12 +144,12 @@ def test_another_checksum() -> None:
         ("dynamixel", "ping --node 7", {"error": "none", "model": 0, "firmware": 0}),
     ],
 )
-def test_a_schema_of_the_user(schema: str, request_: str, answer: dict[str, object]) -> None:
+def test_a_schema_of_the_user(schema: str, request_: str, answer: dict[str, object], qlinkgen: Run) -> None:
     file = REPOSITORY / "tests" / "schemas" / f"{schema}.yaml"
     with simulated(file, "--nodes", "7") as (path, _):
-        done = call("send", path, file, *request_.split(), *CALM)
-    assert (done.returncode, done.stderr) == (0, "")
-    (found,) = objects(done.stdout)
+        done = qlinkgen("send", path, file, *request_.split(), *CALM)
+    assert (done.code, done.err) == (0, "")
+    (found,) = objects(done.out)
     command, address = request_.partition(" ")[0], "id" if schema == "dynamixel" else "address"
     assert found == {"message": f"{command}.response", address: 7, "fields": answer}
 
@@ -171,8 +175,8 @@ def test_frames_without_addresses(tmp_path: Path, qlinkgen: Run) -> None:
     assert refused.code == 2
     assert "have no address; leave out --nodes 1" in refused.err
     with simulated(file) as (path, _):
-        done = call("send", path, file, "get", *CALM)
-    assert objects(done.stdout) == [{"message": "get.response", "fields": {"value": 0}}]
+        done = qlinkgen("send", path, file, "get", *CALM)
+    assert objects(done.out) == [{"message": "get.response", "fields": {"value": 0}}]
 
 
 @pytest.mark.parametrize(

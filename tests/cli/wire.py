@@ -126,6 +126,16 @@ def simulated(*arguments: str | Path) -> Iterator[tuple[str, subprocess.Popen[by
         yield json.loads(first)["port"], process
 
 
+def line(
+    *stations: Station, codec: Codec = qlink, baud: int | None = None, faults: FaultPlan | None = None
+) -> Wire:
+    """A simulated line; nodes 1 and 3 of Q.link unless others are given."""
+    wire = Wire(baud=baud, faults=faults)
+    for station in stations or (VirtualNode(1), VirtualNode(3, position_type=1, serial_number=77)):
+        wire.attach(SlaveEngine(codec, station))
+    return wire
+
+
 @contextlib.contextmanager
 def bus(
     *stations: Station,
@@ -133,11 +143,8 @@ def bus(
     baud: int | None = None,
     faults: FaultPlan | None = None,
 ) -> Iterator[PtyBus]:
-    """A bus in a thread; nodes 1 and 3 of Q.link unless others are given."""
-    wire = Wire(baud=baud, faults=faults)
-    for station in stations or (VirtualNode(1), VirtualNode(3, position_type=1, serial_number=77)):
-        wire.attach(SlaveEngine(codec, station))
-    with PtyBus(wire) as running:
+    """The same line behind a pty, run by a thread."""
+    with PtyBus(line(*stations, codec=codec, baud=baud, faults=faults)) as running:
         yield running
 
 

@@ -8,18 +8,20 @@ from pathlib import Path
 import pytest
 
 from tests.conformance import kits
+from tests.support.sharing import made_once
 
 Write = Callable[[str], Path]
 
 
 @pytest.fixture(scope="session")
-def kit(tmp_path_factory: pytest.TempPathFactory) -> Write:
+def kit(shared: Path) -> Write:
     """Give the kit of a protocol, with its header beside it; nobody changes them."""
-    written: dict[str, Path] = {}
 
     def get(name: str) -> Path:
-        if name not in written:
-            written[name] = kits.write(name, tmp_path_factory.mktemp(f"kit_{name}"))
-        return written[name]
+        folder = shared / "kits" / name
+        with made_once(folder) as first:
+            if first:
+                kits.write(name, folder)
+        return folder / f"{name}_conformance.c"
 
     return get

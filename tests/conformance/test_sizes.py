@@ -47,8 +47,7 @@ def write(folder: Path, *, most: int, bits: int = 8, values: int = 1) -> Path:
     (folder / "wide.yaml").write_text(text)
     protocol = load(folder / "wide.yaml")
     for target in ("c", "conformance"):
-        generate, _ = TARGETS[target].load()
-        for path, made in generate(protocol, Options()).items():
+        for path, made in TARGETS[target](protocol, Options()).items():
             (folder / Path(path).name).write_text(made, "utf-8")
     return folder / "wide_conformance.c"
 

@@ -6,7 +6,6 @@ No pytest in here: the soak uses it as well.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import re
 import select
@@ -18,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
+
+from tests.support.sharing import locked
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / "examples" / "firmware"
@@ -140,14 +141,6 @@ def has_header(header: str, compiler: str) -> bool:
         [compiler, "-E", "-M", "-MG", "-x", "c", "-"], input=source, capture_output=True, check=False
     )
     return run.returncode == 0 and f"/{header}".encode() in run.stdout
-
-
-@contextlib.contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Let one process at a time in here."""
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
 
 
 class Firmware:

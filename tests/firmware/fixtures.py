@@ -26,11 +26,9 @@ FirmwareLines = Callable[[str], FirmwareLine]
 def build_firmware(
     require_tool: Callable[..., str],
     missing_tool: Callable[..., NoReturn],
-    tmp_path_factory: pytest.TempPathFactory,
+    shared: Path,
 ) -> BuildFirmware:
     """Return a function that builds, once for all workers, or skips where a tool is missing."""
-    base = tmp_path_factory.getbasetemp()
-    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
     def make(target: str, app: str = "qlink_node", options: str = "") -> Path:
         for tool, package in (("make", "make"), *TARGETS[target].tools):

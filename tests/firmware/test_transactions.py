@@ -7,15 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import firmware_soak, firmware_soak_run
-from benchmarks.firmware_soak_model import Model
-from benchmarks.firmware_soak_page import TITLE, as_text, put_into
-from benchmarks.firmware_soak_run import Result, Soak, WrongAnswer
-from benchmarks.firmware_soak_traffic import REQUESTS, Traffic, Unit
 from qlinkgen.codecs import qlink
 from tests.firmware.firmware import PROGRAM_SIZE, TARGETS
 from tests.firmware.fixtures import BuildFirmware, FirmwareLines
 from tests.firmware.line import FirmwareLine
+from tests.soak import firmware as soak
+from tests.soak import firmware_run
+from tests.soak.firmware_model import Model
+from tests.soak.firmware_page import TITLE, as_text, put_into
+from tests.soak.firmware_run import Result, Soak, WrongAnswer
+from tests.soak.firmware_traffic import REQUESTS, Traffic, Unit
 
 TRANSACTIONS = 5_000
 
@@ -31,7 +32,7 @@ def test_mixed_transactions_among_damage_strays_and_noise(target: str, firmware_
     for kind, least in (("corrupted", 500), ("malformed", 250), ("stray", 250), ("noise", 250)):
         assert result.sent[kind] > least
     assert result.effective < 0.2 * sum(result.sent.values()) - result.sent["request"] / 10
-    assert result.comparisons >= TRANSACTIONS // firmware_soak_run.COMPARED
+    assert result.comparisons >= TRANSACTIONS // firmware_run.COMPARED
 
 
 def unit_stream(seed: int, count: int) -> tuple[list[Unit], Model]:
@@ -43,7 +44,7 @@ def unit_stream(seed: int, count: int) -> tuple[list[Unit], Model]:
         for unit in (*traffic.disturbances(model.node), traffic.request(model.node, model.motion_counter)):
             units.append(unit)
             acknowledged = bool(model.hear(unit.data))
-            if unit.kind == "request" and unit.name == firmware_soak_run.PROGRAM_LOAD:
+            if unit.kind == "request" and unit.name == firmware_run.PROGRAM_LOAD:
                 traffic.loader.told(acknowledged=acknowledged)
     return units, model
 
@@ -150,7 +151,7 @@ class Lost(Faulty):
 def test_what_is_wrong_is_found_and_shown(
     kind: type[FirmwareLine], complaint: str, firmware_line: FirmwareLines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(firmware_soak_run, "HANGS", 1.0)
+    monkeypatch.setattr(firmware_run, "HANGS", 1.0)
     monkeypatch.setattr("tests.firmware.line.HANGS", 1.0)
     usual = firmware_line("posix")
     line = kind(usual.port)
@@ -178,12 +179,12 @@ def test_the_program_writes_a_section_and_only_that(
     page = tmp_path / "soak.md"
     page.write_text("# Soak\n\nText.\n")
     arguments = [*posix, "--transactions", "200", "--output", str(page)]
-    assert firmware_soak.main(arguments) == 0
+    assert soak.main(arguments) == 0
     first = page.read_text()
     assert first.startswith(f"# Soak\n\nText.\n\n{TITLE}\n")
     assert "| transactions | 20" in first
     assert "all well" in capsys.readouterr().out
-    assert firmware_soak.main(arguments) == 0
+    assert soak.main(arguments) == 0
     assert page.read_text().count(TITLE) == 1
     page.write_text(page.read_text() + "\n## Another\n\nStays.\n")
     assert put_into(page.read_text(), [Result("posix", 1)]).endswith("\n\n## Another\n\nStays.\n")
@@ -196,9 +197,9 @@ def test_the_program_says_no_where_something_is_wrong(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     page = tmp_path / "soak.md"
-    assert firmware_soak.main([*posix, "--output", str(page)]) == 2
+    assert soak.main([*posix, "--output", str(page)]) == 2
     page.write_text("# Soak\n")
     monkeypatch.setattr("tests.firmware.line.FirmwareLine", Secret)
-    assert firmware_soak.main([*posix, "--transactions", "600", "--output", str(page)]) == 1
+    assert soak.main([*posix, "--transactions", "600", "--output", str(page)]) == 1
     assert page.read_text() == "# Soak\n"
     assert "posix, seed 1, after" in capsys.readouterr().err

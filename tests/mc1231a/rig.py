@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 from qlinkgen.codecs.mc1231a import AxisStatus
-from qlinkgen.errors import PortLost
 from qlinkgen.protocols.mc1231a import AsyncAxis, AsyncHost, ChipEngine, ChipSet, Host
 from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen.transport import MemoryPort, Port, memory_pair, open_port
+from qlinkgen.transport import Port, open_port
+from tests.support.memory_line import MemoryLine
 
 BAUD = 115200
 #: Seconds of host slack; in real time what a busy machine needs.
@@ -155,48 +155,6 @@ class Rig:
         return self.until(axis, AxisStatus.IN_MOTION, value=0)
 
 
-class Pump(threading.Thread):
-    """Runs a line at the other end of a memory pair, in real time."""
-
-    def __init__(self, wire: Wire, port: MemoryPort) -> None:
-        super().__init__(daemon=True)
-        self._wire = wire
-        self._port = port
-        self._lock = threading.Lock()
-        self._stopping = False
-        self._failure: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            while not self._stopping:
-                self._once()
-        except PortLost:  # the near end was closed first
-            return
-        except BaseException as failure:  # noqa: BLE001  # raised again where the pump is stopped
-            self._failure = failure
-
-    def _once(self) -> None:
-        due = self._wire.next_timer()
-        now = self._port.now()
-        data = self._port.read(0.005 if due is None else min(max(0.0, due - now), 0.005))
-        with self._lock:
-            now = self._port.now()
-            self._wire.transmit(data, now)
-            heard = self._wire.take(now)
-        if heard:
-            self._port.write(heard)
-
-    def do(self, action: Callable[[], Any]) -> Any:
-        with self._lock:
-            return action()
-
-    def stop(self) -> None:
-        self._stopping = True
-        self.join()
-        if self._failure is not None:
-            raise self._failure
-
-
 def _by_line(line: PtyBus) -> Callable[[Callable[[], Any]], Any]:
     """How to do something in the thread that runs a line."""
 
@@ -223,14 +181,8 @@ def _line(setting: Setting, wire: Wire) -> Iterator[tuple[Port, Callable[[Callab
         with PtyBus(wire) as line, open_port(line.path) as port:
             yield port, _by_line(line)
     else:
-        near, far = memory_pair(BAUD)
-        pump = Pump(wire, far)
-        pump.start()
-        try:
-            yield near, pump.do
-        finally:
-            pump.stop()
-            near.close()
+        with MemoryLine(wire, BAUD) as port:
+            yield port, port.do
 
 
 @contextlib.contextmanager

@@ -1,13 +1,13 @@
-"""A random session against a model of the registers, in short; `benchmarks/host_soak.py` is the long one."""
+"""A random session against a model of the registers; `python -m tests.soak.host` is the long run."""
 
 from __future__ import annotations
 
 import pytest
 
-from benchmarks import host_soak
-from benchmarks.host_soak_model import Model
-from benchmarks.host_soak_run import Session
 from qlinkgen.sim import FaultPlan
+from tests.soak import host
+from tests.soak.host_model import Model
+from tests.soak.host_run import Session
 
 KINDS = ("drop", "flip", "truncate", "delay", "late", "duplicate", "stray", "noise", "silent")
 
@@ -57,5 +57,5 @@ def test_a_fresh_model_is_a_fresh_chip_set() -> None:
 
 
 def test_the_program(capsys: pytest.CaptureFixture[str]) -> None:
-    assert host_soak.main(["--commands", "100", "--faults", "drop=0.02"]) == 0
+    assert host.main(["--commands", "100", "--faults", "drop=0.02"]) == 0
     assert capsys.readouterr().out.count("host and chip set agree") == 2

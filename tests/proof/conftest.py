@@ -16,7 +16,7 @@ Make = Callable[[str, str], Output]
 
 
 @pytest.fixture(scope="session")
-def make(tmp_path_factory: pytest.TempPathFactory, require_tool: Callable[..., str]) -> Iterator[Make]:
+def make(shared: Path, require_tool: Callable[..., str]) -> Iterator[Make]:
     """Give a function that gives an output of a protocol, and makes it once."""
     made: dict[tuple[str, str], Output] = {}
     programs = contextlib.ExitStack()
@@ -24,8 +24,7 @@ def make(tmp_path_factory: pytest.TempPathFactory, require_tool: Callable[..., s
     def compiled(name: str, output: str) -> Output:
         compiler, flags = COMPILED[output]
         path = require_tool(compiler, package=compiler)
-        folder: Path = tmp_path_factory.mktemp(f"{name}-{output}".replace(", ", "-"))
-        program = build(cases.protocol(name), folder, path, flags)
+        program = build(cases.protocol(name), shared / "drivers", path, flags)
         return COutput(cases.protocol(name), programs.enter_context(Driver(program)))
 
     def get(name: str, output: str) -> Output:

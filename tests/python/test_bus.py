@@ -21,6 +21,7 @@ from qlinkgen.backends.python import bus, load
 from qlinkgen.backends.python import generate as generate_codec
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
+from qlinkgen.plan.build import plan_of
 from qlinkgen.schema import loads
 from tests.python.protocols import build, defaults, module, protocol
 
@@ -35,7 +36,7 @@ def loaded(model: Protocol, codec: ModuleType, options: Options | None = None) -
     made = ModuleType(f"wire.{model.name}_bus")
     made.__package__ = "wire"
     with mock.patch.dict(sys.modules, {"wire": ModuleType("wire"), f"wire.{model.name}": codec}):
-        exec(compile(bus.render(model, options or Options()), made.__name__, "exec"), made.__dict__)
+        exec(compile(bus.render(plan_of(model, options or Options())), made.__name__, "exec"), made.__dict__)
     return made
 
 

@@ -1,17 +1,13 @@
-"""What makes an AsyncBus look like a Bus, and what runs a simulated line in real time."""
+"""What makes an AsyncBus look like a Bus."""
 
 from __future__ import annotations
 
 import asyncio
 import inspect
-import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from qlinkgen.errors import PortLost
 from qlinkgen.protocols.qlink import AsyncNode
-from qlinkgen.sim import Wire
-from qlinkgen.transport import MemoryPort
 
 
 class AsyncFace:
@@ -44,38 +40,3 @@ class AsyncFace:
             return
         finally:
             self._loop.run_until_complete(steps.aclose())
-
-
-class Pump(threading.Thread):
-    """Runs a line at the other end of a memory pair, in real time."""
-
-    def __init__(self, wire: Wire, port: MemoryPort) -> None:
-        super().__init__(daemon=True)
-        self._wire = wire
-        self._port = port
-        self._stopping = False
-        self._failure: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            while not self._stopping:
-                self._once()
-        except PortLost:  # the near end was closed first
-            return
-        except BaseException as failure:  # noqa: BLE001  # raised again where the pump is stopped
-            self._failure = failure
-
-    def _once(self) -> None:
-        wire, port = self._wire, self._port
-        due = wire.next_timer()
-        wait = 0.01 if due is None else min(max(0.0, due - port.now()), 0.01)
-        if data := port.read(wait):
-            wire.transmit(data, port.now())
-        if heard := wire.take(port.now()):
-            port.write(heard)
-
-    def stop(self) -> None:
-        self._stopping = True
-        self.join()
-        if self._failure is not None:
-            raise self._failure

@@ -21,10 +21,11 @@ from qlinkgen.protocols.qlink import AsyncBus, Bus, VirtualNode
 from qlinkgen.sim import Echo, FaultPlan, VirtualPort, Wire
 from qlinkgen.sim.fault_kinds import RateLike
 from qlinkgen.sim.pty_bus import PtyBus
-from qlinkgen.transport import Port, memory_pair, open_port
+from qlinkgen.transport import Port, open_port
 from tests.firmware.firmware import TARGETS
 from tests.firmware.node import FirmwareNode, RealPauses
-from tests.qlink.behaviour_drivers import AsyncFace, Pump
+from tests.qlink.behaviour_drivers import AsyncFace
+from tests.support.memory_line import MemoryLine
 
 T = TypeVar("T")
 #: Seconds of host slack: more than the longest answer takes; in real time what a busy machine needs.
@@ -282,14 +283,8 @@ def _port(setting: Setting, wire: Wire) -> Iterator[Port]:
         with PtyBus(wire) as line, open_port(line.path) as port:
             yield port
     else:
-        near, far = memory_pair()
-        pump = Pump(wire, far)
-        pump.start()
-        try:
-            yield near
-        finally:
-            pump.stop()
-            near.close()
+        with MemoryLine(wire) as port:
+            yield port
 
 
 def _stray(chance: random.Random) -> bytes:

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import soak_run
-from benchmarks.soak_page import as_page, as_text
-from benchmarks.soak_run import LATE, Result, Soak
 from qlinkgen.sim import VirtualPort
 from qlinkgen.sim.fault_kinds import KINDS, RateLike
+from tests.soak import bus_run
+from tests.soak.bus_page import as_page, as_text
+from tests.soak.bus_run import LATE, Result, Soak
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_on_the_virtual_clock() -> None:
-    result = soak_run.virtual(12_000, seed=11)
+    result = bus_run.virtual(12_000, seed=11)
     assert result.complaints == []
     assert result.account.asked >= 12_000
     assert all(result.counts[kind] > 30 for kind in KINDS), "every kind of fault was there"
@@ -34,7 +34,7 @@ def test_on_the_virtual_clock() -> None:
 
 
 def test_over_a_pty() -> None:
-    result = soak_run.pty(600, seed=11, slack=0.15)  # the machine may be busy with other tests
+    result = bus_run.pty(600, seed=11, slack=0.15)  # the machine may be busy with other tests
     assert result.complaints == []
     assert result.counts.total > 20
     assert result.words > 100
@@ -42,8 +42,9 @@ def test_over_a_pty() -> None:
 
 
 def digest(seed: int, hash_seed: str) -> str:
-    code = f"from benchmarks import soak_run; print(soak_run.virtual(1500, {seed}).account.digest)"
-    environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": str(ROOT)}
+    code = f"from tests.soak import bus_run; print(bus_run.virtual(1500, {seed}).account.digest)"
+    path = os.pathsep.join((str(ROOT), str(ROOT / "generated" / "python")))
+    environment = {**os.environ, "PYTHONHASHSEED": hash_seed, "PYTHONPATH": path}
     run = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, check=True, text=True
     )
@@ -51,14 +52,14 @@ def digest(seed: int, hash_seed: str) -> str:
 
 
 def test_a_seed_always_gives_the_same_log() -> None:
-    here = soak_run.virtual(1500, seed=5)
-    assert here.account.digest == soak_run.virtual(1500, seed=5).account.digest == digest(5, "1")
-    assert here.account.digest != soak_run.virtual(1500, seed=6).account.digest
+    here = bus_run.virtual(1500, seed=5)
+    assert here.account.digest == bus_run.virtual(1500, seed=5).account.digest == digest(5, "1")
+    assert here.account.digest != bus_run.virtual(1500, seed=6).account.digest
 
 
 def test_the_page_is_made_of_the_figures() -> None:
-    result = soak_run.virtual(500, seed=3)
-    page = as_page([result], [1.0], "python benchmarks/soak.py")
+    result = bus_run.virtual(500, seed=3)
+    page = as_page([result], [1.0], "python -m tests.soak.bus")
     assert f"{result.total.requests:,}".replace(",", " ") in page
     assert result.account.digest in page
     assert result.account.digest in as_text(result, 1.0)
@@ -67,7 +68,7 @@ def test_the_page_is_made_of_the_figures() -> None:
 def alone(rates: dict[str, RateLike]) -> Result:
     """Soak with one kind of fault, and cables that are never cut: then every timeout has one cause."""
     soak = Soak(rates, baud=115200, seed=4, steady=True)
-    return soak.run("alone", VirtualPort(soak.wire), soak_run.SLACK, 4000)
+    return soak.run("alone", VirtualPort(soak.wire), bus_run.SLACK, 4000)
 
 
 class TestEachFaultAlone:

@@ -25,6 +25,7 @@ is not understood is answered by `usage`.
 
 from __future__ import annotations
 
+import hashlib
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
@@ -37,6 +38,7 @@ from qlinkgen.model.message import Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Blob, Scalar
 from tests.support.cdriver_source import source
+from tests.support.sharing import made_once
 
 #: The flags under which every generated header has to be clean.
 WARNINGS = (
@@ -48,14 +50,21 @@ WARNINGS = (
 def build(
     protocol: Protocol, folder: Path, compiler: str, flags: Sequence[str] = ("-O1", "-std=c99")
 ) -> Path:
-    """Write header and program into a folder and compile them; returns the program."""
-    for name, text in c.generate(protocol, Options()).items():
-        (folder / Path(name).name).write_text(text, "utf-8")
-    program = folder / f"{protocol.name}_driver"
-    program.with_suffix(".c").write_text(source(protocol), "utf-8")
-    command = [compiler, *flags, "-I", str(folder), str(program.with_suffix(".c")), "-o", str(program)]
-    subprocess.run(command, check=True, timeout=300)
-    return program
+    """Write header and program into a folder of their own in `folder` and compile them; returns the program.
+
+    Where the same was built before, by whatever process, it is not built again.
+    """
+    files = {Path(name).name: text for name, text in c.generate(protocol, Options()).items()}
+    files["driver.c"] = source(protocol)
+    content = repr((compiler, *flags, *sorted(files.items())))
+    place = folder / f"{protocol.name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
+    with made_once(place) as first:
+        if first:
+            for name, text in files.items():
+                (place / name).write_text(text, "utf-8")
+            command = [compiler, *flags, "driver.c", "-o", "driver"]
+            subprocess.run(command, cwd=place, check=True, timeout=300)
+    return place / "driver"
 
 
 class Driver:

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from decimal import Decimal
 from itertools import combinations
 
-from benchmarks.ring_soak import sent_crc
 from qlinkgen.codecs import trio
+from tests.soak.ring import sent_crc
 
 PAYLOAD = bytes(range(12))
 #: Seven bits of each of 12 payload bytes, and of the two bytes of the checksum.

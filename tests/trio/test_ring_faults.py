@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.ring_soak import FAULTS, Soak
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring_events import Broken, NetStat
 from qlinkgen.protocols.trio import CoordinatorNode, MotionCoordinator
@@ -12,6 +11,7 @@ from qlinkgen.protocols.trio.face import engine_of
 from qlinkgen.sim import FaultPlan, SimulationError
 from qlinkgen.sim.ring import RingWire
 from qlinkgen.sim.virtual_ring import VirtualRing
+from tests.soak.ring import FAULTS, Soak
 
 
 def ring_of(size: int, **options: object) -> tuple[VirtualRing, list[MotionCoordinator]]:

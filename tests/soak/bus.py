@@ -1,4 +1,4 @@
-"""Soak the Q.link master: `python benchmarks/soak.py [--transactions N] [--pty-transactions N] [--seed N]`.
+"""Soak the Q.link master: `python -m tests.soak.bus [--transactions N] [--pty-transactions N] [--seed N]`.
 
 A random mix of all commands goes to five simulated nodes over a line with faults of every kind, and a plain
 model says what each node must hold and what the master must have been told. With `--output PATH` the figures
@@ -8,21 +8,17 @@ become a page.
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.soak import bus_page as page
+from tests.soak import bus_run as run
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run both soaks; 1 where something is wrong."""
     options = _options(arguments)
-    # Works in a bare checkout too: this package, the runtime and the generated code are found from here.
-    sys.path.insert(0, str(ROOT))
-    run = importlib.import_module("benchmarks.soak_run")
-    page = importlib.import_module("benchmarks.soak_page")
     results, seconds = [], []
     for soak, count in ((run.virtual, options.transactions), (run.pty, options.pty_transactions)):
         if count:
@@ -40,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _command(options: argparse.Namespace) -> str:
     return (
-        f"python benchmarks/soak.py --transactions {options.transactions} "
+        f"python -m tests.soak.bus --transactions {options.transactions} "
         f"--pty-transactions {options.pty_transactions} --seed {options.seed} --output docs/soak.md"
     )
 

@@ -16,12 +16,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.host_soak_model import AXES, CHOOSES, FIELD, REGISTERS, Model
 from qlinkgen.codecs import mc1231a
 from qlinkgen.errors import LinkError
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet, Host, UnconfirmedCommand
 from qlinkgen.sim import FaultPlan, VirtualPort
 from qlinkgen.sim.chip_bus import chip_wire
+from tests.soak.host_model import AXES, CHOOSES, FIELD, REGISTERS, Model
 
 #: Seconds that the host may add.
 SLACK = 0.002

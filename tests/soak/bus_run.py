@@ -7,10 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from benchmarks.soak_account import Account, Equation
-from benchmarks.soak_ledger import Ledger, Station, WitnessNode
-from benchmarks.soak_model import Held, Mismatch
-from benchmarks.soak_traffic import NOBODY, NUMBERS, UNSUPPORTED, Traffic
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
 from qlinkgen.link import LinkCounters
@@ -21,6 +17,10 @@ from qlinkgen.sim.fault_kinds import KINDS, RateLike
 from qlinkgen.sim.faults import FaultCounts
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import Port, open_port
+from tests.soak.bus_account import Account, Equation
+from tests.soak.bus_ledger import Ledger, Station, WitnessNode
+from tests.soak.bus_model import Held, Mismatch
+from tests.soak.bus_traffic import NOBODY, NUMBERS, UNSUPPORTED, Traffic
 
 #: Numbers of the nodes at the beginning.
 NODES = (1, 2, 3, 4, 5)

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from benchmarks.firmware_soak_program import Loader
 from qlinkgen.codecs import qlink
 from qlinkgen.protocols.qlink import VirtualNode
+from tests.soak.firmware_program import Loader
 
 Kind = Literal["request", "corrupted", "malformed", "stray", "noise"]
 

@@ -114,7 +114,7 @@ class Model:
     @property
     def motion_counter(self) -> int | None:
         """Counter of the motion taken last."""
-        return self.node._motion_counter  # noqa: SLF001  # what a master would know
+        return self.node._motion_counter  # what a master would know
 
     @property
     def places(self) -> list[tuple[int, int]]:

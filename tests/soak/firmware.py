@@ -1,4 +1,4 @@
-"""Soak the example firmware: `python benchmarks/firmware_soak.py [--transactions N] [--targets NAME...]`.
+"""Soak the example firmware: `python -m tests.soak.firmware [--transactions N] [--targets NAME...]`.
 
 Each port of the Q.link node is built, runs as a process or on an emulator, and gets a random mix of all
 requests among damaged frames, foreign ones and noise; every answer has to be that of a model. With
@@ -8,48 +8,45 @@ requests among damaged frames, foreign ones and noise; every answer has to be th
 from __future__ import annotations
 
 import argparse
-import importlib
 import shutil
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
+from qlinkgen.transport import open_port
+from tests.firmware import firmware, line
+from tests.soak import firmware_page as page
+from tests.soak import firmware_run as run
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the soak on each port; 1 where something is wrong, 2 where a tool is missing."""
-    # Works in a bare checkout too: this package, the runtime and the generated code are found from here.
-    sys.path.insert(0, str(ROOT))
-    firmware = importlib.import_module("tests.firmware.firmware")
-    page = importlib.import_module("benchmarks.firmware_soak_page")
     options = _options(arguments, list(firmware.TARGETS))
     if options.output and not Path(options.output).exists():
         print(
-            f"firmware_soak: {options.output} is not there; it has to have a page to put into",
+            f"soak.firmware: {options.output} is not there; it has to have a page to put into",
             file=sys.stderr,
         )
         return 2
-    missing = [_missing(firmware, firmware.TARGETS[target]) for target in options.targets]
+    missing = [_missing(firmware.TARGETS[target]) for target in options.targets]
     if packages := sorted(set().union(*missing)):
-        print(f"firmware_soak: to build and run these ports install {' '.join(packages)}", file=sys.stderr)
+        print(f"soak.firmware: to build and run these ports install {' '.join(packages)}", file=sys.stderr)
         return 2
     results = []
     with tempfile.TemporaryDirectory(prefix="qlinkgen-firmware-") as folder:
         for target in options.targets:
-            results.append(_soak(firmware, target, Path(options.build or folder), options))
+            results.append(_soak(target, Path(options.build or folder), options))
             print(page.as_text(results[-1]), flush=True)
     complaints = [result.complaint for result in results if result.complaint]
     if options.output and not complaints:
         output = Path(options.output)
         output.write_text(page.put_into(output.read_text(encoding="utf-8"), results), encoding="utf-8")
     for complaint in complaints:
-        print(f"firmware_soak: {complaint}", file=sys.stderr)
+        print(f"soak.firmware: {complaint}", file=sys.stderr)
     return 1 if complaints else 0
 
 
-def _missing(firmware: Any, target: Any) -> set[str]:
+def _missing(target: firmware.Target) -> set[str]:
     """Return the Debian packages that a port lacks."""
     tools = {package for tool, package in (("make", "make"), *target.tools) if shutil.which(tool) is None}
     headers = {
@@ -60,12 +57,9 @@ def _missing(firmware: Any, target: Any) -> set[str]:
     return tools | headers
 
 
-def _soak(firmware: Any, target: str, folder: Path, options: argparse.Namespace) -> Any:
-    run = importlib.import_module("benchmarks.firmware_soak_run")
-    line = importlib.import_module("tests.firmware.line")
-    transport = importlib.import_module("qlinkgen.transport")
+def _soak(target: str, folder: Path, options: argparse.Namespace) -> run.Result:
     program = firmware.build(target, "qlink_node", folder, firmware.TARGETS[target].options)
-    with firmware.Firmware(target, program) as running, transport.open_port(running.path) as port:
+    with firmware.Firmware(target, program) as running, open_port(running.path) as port:
         up = line.FirmwareLine(port)
         up.wait_until_up()
         soak = run.Soak(target, up, options.seed)

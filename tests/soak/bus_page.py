@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.report import as_markdown
-from benchmarks.soak_run import LATE, PTY_LATE, PTY_SLACK, SHARE, SLACK, Result
 from qlinkgen.sim.fault_kinds import KINDS
+from tests.soak.bus_run import LATE, PTY_LATE, PTY_SLACK, SHARE, SLACK, Result
 
 _SEEN_AS = {
     "drop": "a timeout; of a request that nothing answers, not at all",

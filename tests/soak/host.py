@@ -1,4 +1,4 @@
-"""Soak the MC1231A host: `python benchmarks/host_soak.py [--commands N] [--faults PLAN] [--seed N]`.
+"""Soak the MC1231A host: `python -m tests.soak.host [--commands N] [--faults PLAN] [--seed N]`.
 
 A random session over a line with faults of every kind, against a plain model of the registers: host and chip
 set must agree at the end, and no call may have sent an action twice. Once with a chip set that waits for the
@@ -8,13 +8,12 @@ rest of a packet for ever, and once with one that forgets it after a silence.
 from __future__ import annotations
 
 import argparse
-import importlib
 import sys
 import time
-from pathlib import Path
-from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
+from qlinkgen.sim import FaultPlan
+from tests.soak.host_run import Result, Session
+
 #: Seconds of silence after which the second chip set forgets.
 FORGETS = 0.005
 
@@ -22,23 +21,19 @@ FORGETS = 0.005
 def main(arguments: list[str] | None = None) -> int:
     """Run both sessions; 1 where something is wrong."""
     options = _options(arguments)
-    # Works in a bare checkout too: this package, the runtime and the generated code are found from here.
-    sys.path.insert(0, str(ROOT))
-    run = importlib.import_module("benchmarks.host_soak_run")
-    plan = importlib.import_module("qlinkgen.sim").FaultPlan
     complaints = []
     for title, forgets in (("chip set that never forgets", 0.0), ("chip set that forgets", FORGETS)):
         began = time.monotonic()
-        faults = plan.parse(f"{options.faults},seed={options.seed}")
-        result = run.Session(faults, seed=options.seed, forgets=forgets).run(options.commands)
+        faults = FaultPlan.parse(f"{options.faults},seed={options.seed}")
+        result = Session(faults, seed=options.seed, forgets=forgets).run(options.commands)
         print(as_text(title, result, time.monotonic() - began), flush=True)
         complaints += [f"{title}: {complaint}" for complaint in result.complaints]
     for complaint in complaints:
-        print(f"host_soak: {complaint}", file=sys.stderr)
+        print(f"soak.host: {complaint}", file=sys.stderr)
     return 1 if complaints else 0
 
 
-def as_text(title: str, result: Any, seconds: float) -> str:
+def as_text(title: str, result: Result, seconds: float) -> str:
     """The account of one session."""
     count = result.counters
     facts = {

@@ -1,6 +1,6 @@
 """Messages round a simulated ring of 15 nodes with faults on every hop, each one accounted for.
 
-Run as `python -m benchmarks.ring_soak [--messages N] [--seed S]`. Every variable and every text that is sent
+Run as `python -m tests.soak.ring [--messages N] [--seed S]`. Every variable and every text that is sent
 names itself, so what arrives is held against what was sent: to the right node, once, and unchanged. What is
 lost or changed must be explained by a fault that was injected, and a fault that a node can see must be in its
 counters. A message that was dropped as a whole leaves no trace on any node; only the simulation counts it.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from benchmarks.firmware_soak_run import COMPARED, PHASE, Result
 from benchmarks.report import as_markdown
+from tests.soak.firmware_run import COMPARED, PHASE, Result
 
 TITLE = "## Firmware on emulated chips"
 _SECTION = re.compile(rf"\n*{re.escape(TITLE)}\n.*?(?=\n\n## |\Z)", re.DOTALL)
@@ -82,7 +82,7 @@ compared from inside: all counters, outputs, inputs, FIFO, position, path words,
 node is configured anew. The last time it was
 
 ```
-python benchmarks/firmware_soak.py --transactions {count} --seed {seed} --output docs/soak.md
+python -m tests.soak.firmware --transactions {count} --seed {seed} --output docs/soak.md
 ```
 
 {figures}

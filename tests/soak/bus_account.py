@@ -7,12 +7,12 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from benchmarks.soak_ledger import FORGED, STALE, Ledger, Station
 from qlinkgen.codecs import qlink
 from qlinkgen.link import LinkCounters, events
 from qlinkgen.sim import FaultPlan, Wire
 from qlinkgen.sim.faults import TO_SLAVES, Injected
 from qlinkgen.sim.wire import LINE, OUTSIDE
+from tests.soak.bus_ledger import FORGED, STALE, Ledger, Station
 
 #: Seconds for which a fault may go on to disturb: noise that comes alone does so within 10 ms, an extra copy
 #: within 1 ms, and a frame takes up to 6 ms more.

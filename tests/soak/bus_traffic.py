@@ -1,5 +1,4 @@
 """A random mix of everything that can be asked of a bus, each outcome held against the model."""
-# ruff: noqa: ARG002 -- all operations take a node, whether they look at it or not
 
 from __future__ import annotations
 
@@ -7,12 +6,12 @@ import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from benchmarks.soak_ledger import Station
-from benchmarks.soak_model import Held, Mismatch
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError, LoadError
 from qlinkgen.protocols.qlink import Bus
 from qlinkgen.transport import Ability
+from tests.soak.bus_ledger import Station
+from tests.soak.bus_model import Held, Mismatch
 
 #: Numbers that the nodes take in turn, and one that stays free for a node to move to; nobody has the others.
 NUMBERS = range(1, 9)

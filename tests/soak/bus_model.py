@@ -6,8 +6,8 @@ are possible, until the next call that ends well says more.
 
 from __future__ import annotations
 
-from benchmarks.soak_ledger import WitnessNode
 from qlinkgen.codecs import qlink
+from tests.soak.bus_ledger import WitnessNode
 
 Settings = tuple[float, float, int]
 

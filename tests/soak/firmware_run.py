@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from typing import Any, NoReturn
 from zlib import crc32
 
-from benchmarks.firmware_soak_model import Model, look_into
-from benchmarks.firmware_soak_traffic import ALWAYS, REQUESTS, Traffic, Unit
 from tests.firmware.firmware import FIFO, HANGS, PROGRAM_SIZE
 from tests.firmware.line import FirmwareLine, Garbage
 from tests.firmware.node import MOTORS, FirmwareNode
+from tests.soak.firmware_model import Model, look_into
+from tests.soak.firmware_traffic import ALWAYS, REQUESTS, Traffic, Unit
 
 #: Transactions until the node is configured anew, and until its state is compared.
 PHASE = 500
