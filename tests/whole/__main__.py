@@ -25,7 +25,7 @@ _HOSTILE = 4
 
 @dataclass(frozen=True)
 class _Arguments:
-    seeds: range
+    seeds: Sequence[int]
     jobs: int
     names: str
     effort: Effort
@@ -42,11 +42,13 @@ def main(words: Sequence[str] | None = None) -> int:
         return 0
     begun = time.monotonic()
     trial = partial(_trial, names=arguments.names, effort=arguments.effort)
+    outcomes = []
     with ProcessPoolExecutor(arguments.jobs) as pool:
-        outcomes = list(pool.map(trial, arguments.seeds))
-    if arguments.report:
-        different = [each.report() for each in outcomes if each.differences]
-        arguments.report.write_text("\n\n".join(different), "utf-8")
+        for outcome in pool.map(trial, arguments.seeds):
+            outcomes.append(outcome)
+            if arguments.report:
+                different = [each.report() for each in outcomes if each.differences]
+                arguments.report.write_text("\n\n".join(different), "utf-8")
     print(summary(outcomes))
     print(f"{time.monotonic() - begun:.0f} s")
     return int(any(each.differences for each in outcomes))
@@ -90,23 +92,29 @@ def _parsed(words: Sequence[str] | None) -> _Arguments:
     parser = argparse.ArgumentParser(
         prog="python -m tests.whole", description="Trials of whole random schemas."
     )
-    parser.add_argument("--seeds", type=_range, required=True, help="first..last, or one seed")
+    parser.add_argument(
+        "--seeds", type=_seeds_of, required=True, help="first..last, or numbers and ranges with commas"
+    )
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--names", choices=("ordinary", "hostile", "mixed"), default="mixed")
     parser.add_argument("--messages", type=int, default=Effort.messages, help="of each kind, for each schema")
     parser.add_argument(
         "--streams", type=int, default=Effort.streams, help="of each direction, for each schema"
     )
+    parser.add_argument("--uncompiled", action="store_true", help="leave out the compilers and the kit")
     parser.add_argument("--report", type=Path, help="file for every difference with its schema")
     parser.add_argument("--show", action="store_true", help="print the schemas alone")
     given = parser.parse_args(words)
-    effort = Effort(given.messages, given.streams)
+    effort = Effort(given.messages, given.streams, uncompiled=given.uncompiled)
     return _Arguments(given.seeds, given.jobs, given.names, effort, given.report, given.show)
 
 
-def _range(text: str) -> range:
-    first, _, last = text.partition("..")
-    return range(int(first), int(last or first) + 1)
+def _seeds_of(text: str) -> Sequence[int]:
+    seeds: list[int] = []
+    for each in text.split(","):
+        first, _, last = each.partition("..")
+        seeds += range(int(first), int(last or first) + 1)
+    return seeds
 
 
 if __name__ == "__main__":

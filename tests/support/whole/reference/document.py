@@ -14,14 +14,19 @@ Doc = dict[str, Any]
 Role = Literal["value", "constant", "reserved", "count"]
 
 
-class _Loader(yaml.SafeLoader):
-    """Numbers with a point stay exact."""
+class _Loader(yaml.CSafeLoader):
+    """Numbers with a point stay exact; on, off, yes and no are text."""
 
     def exact(self, node: yaml.ScalarNode) -> Fraction:
         """The number as it is written."""
         return Fraction(node.value)
 
 
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in pairs if tag != "tag:yaml.org,2002:bool"]
+    for first, pairs in _Loader.yaml_implicit_resolvers.items()
+}
+_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"true\Z|false\Z"), list("tf"))
 _Loader.add_constructor("tag:yaml.org,2002:float", _Loader.exact)
 
 
