@@ -1,0 +1,121 @@
+"""Random values, frames that are wrong in one way, and streams that are damaged."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+
+from tests.support.whole.reference import Raw, Reference
+from tests.support.whole.reference.document import Message, Number, Run
+
+
+def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
+    """Legal values; bounds and the stuffed byte come often."""
+    return {name: _run(kind, rng, mark) if isinstance(kind, Run) else _number(kind, rng, mark)
+            for name, kind in message.values()}  # fmt: skip
+
+
+def _run(kind: Run, rng: random.Random, mark: int) -> Raw:
+    count = rng.choice((kind.low, kind.most, rng.randint(kind.low, kind.most), min(kind.most, kind.low + 2)))
+    if kind.item:
+        return [_number(kind.item, rng, mark) for _ in range(count)]
+    limit = 0x7F if kind.text else 0xFF
+    return bytes(rng.choice((rng.randint(0, limit), mark & limit, 0, limit)) for _ in range(count))
+
+
+def _number(kind: Number, rng: random.Random, mark: int) -> int:
+    low, high = kind.low, kind.high
+    number = rng.choice(
+        (low, high, rng.randint(low, high), rng.randint(low, high), min(high, max(low, mark)))
+    )
+    return number & ~kind.forbidden if kind.forbidden else number
+
+
+def address(message: Message, rng: random.Random) -> int:
+    """An address that the message may carry."""
+    if not message.addresses:
+        return 0
+    low, high = rng.choice(message.addresses)
+    return rng.choice((low, high, rng.randint(low, high)))
+
+
+def wrong_frames(
+    reference: Reference, message: Message, payload: bytes, wire: bytes, rng: random.Random, *, request: bytes
+) -> list[bytes]:
+    """Frames with a byte changed, lost or added, and good frames around payloads that are wrong."""
+    place = rng.choice(message.addresses)[0] if message.addresses else 0
+    found = [_spoilt(wire, rng) for _ in range(3)]
+    found += [wire[: rng.randrange(len(wire) + 1)], wire + bytes([rng.randrange(256)])]
+    for _ in range(4):
+        spoilt = _spoilt(payload, rng)
+        if _fits(reference, spoilt):
+            found.append(reference.seal(message.name, spoilt, place, request))
+    return found
+
+
+def _fits(reference: Reference, payload: bytes) -> bool:
+    most = getattr(reference.frame, "most", None)
+    return most is None or len(payload) <= most
+
+
+def _spoilt(data: bytes, rng: random.Random) -> bytes:
+    spoilt, at = bytearray(data), rng.randrange(len(data) + 1)
+    noise = rng.choice((rng.randrange(256), 0, 0xFF, 0x80, 1))
+    action = rng.choice(("change", "change", "lose", "add"))
+    if action == "add" or not data:
+        spoilt.insert(at, noise)
+    elif action == "lose":
+        del spoilt[at : at + rng.choice((1, 1, 2))]
+    else:
+        spoilt[at % len(data)] = rng.choice((noise, spoilt[at % len(data)] ^ 1 << rng.randrange(8)))
+    return bytes(spoilt)
+
+
+def stream(frames: Sequence[bytes], alphabet: bytes, rng: random.Random) -> bytes:
+    """Frames, pieces of them and noise, damaged in a few places or none."""
+    data = bytearray()
+    for _ in range(rng.randint(1, 6)):
+        frame = rng.choice(frames)
+        data += rng.choice(
+            (frame, frame, frame, frame[: rng.randrange(len(frame) + 1)], _noise(alphabet, rng))
+        )
+    for _ in range(rng.choice((0, 1, 1, 2, 4))):
+        at = rng.randrange(len(data) + 1)
+        action = rng.choice(("change", "lose", "double", "add"))
+        if action == "add":
+            data[at:at] = _noise(alphabet, rng)
+        elif action == "change":
+            data[at : at + 1] = _noise(alphabet, rng)[:1]
+        elif action == "lose":
+            del data[at : at + rng.choice((1, 1, 2, 9))]
+        else:
+            data[at:at] = data[max(0, at - 4) : at]
+    return bytes(data)
+
+
+def _noise(alphabet: bytes, rng: random.Random) -> bytes:
+    return bytes(
+        rng.choice((rng.randrange(256), rng.choice(alphabet))) for _ in range(rng.choice((1, 1, 2, 5)))
+    )
+
+
+def pieces(data: bytes, rng: random.Random) -> list[bytes]:
+    """The data in pieces of any size."""
+    cuts = sorted(rng.randrange(len(data) + 1) for _ in range(rng.randint(0, 5)))
+    return [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
+
+
+def smallest(data: bytes, fails: Callable[[bytes], bool], tries: int = 150) -> bytes:
+    """The data with everything taken out that a failure does not need."""
+    size = max(1, len(data) // 2)
+    while size:
+        at = 0
+        while at < len(data) and tries:
+            shorter = data[:at] + data[at + size :]
+            tries -= 1
+            if fails(shorter):
+                data = shorter
+            else:
+                at += size
+        size //= 2
+    return data

@@ -1,0 +1,409 @@
+"""Random fields of every kind, in any order that the language allows."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, Protocol
+
+from tests.support.whole.frames import Shape
+
+Doc = dict[str, Any]
+_INTEGERS = ("u8", "u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u40", "i48", "u56", "u64", "i64")
+_SCALES = (("1/10", 10), ("1/2^8", 256), ("0.5", 2), ("5", 1), ("-1/4", 4), ("1/1000", 1000), ("1/3", 3))
+
+
+class _Words(Protocol):
+    def name(self, taken: set[str]) -> str: ...
+    def text(self) -> str: ...
+    def unit(self) -> str: ...
+
+
+@dataclass
+class Room:
+    """What is left of a payload."""
+
+    least: int
+    left: int
+    open_end: bool
+    fixed: bool = False
+
+    @classmethod
+    def of(cls, shape: Shape) -> Room:
+        """An empty payload."""
+        return cls(shape.least, shape.most, shape.has_length, bool(shape.word or shape.kind == "packet"))
+
+
+@dataclass
+class FieldMaker:
+    """Makes the fields of one schema's messages."""
+
+    rng: random.Random
+    words: _Words
+    shape: Shape
+    taken: set[str] = field(default_factory=set)
+    enums: Doc = field(default_factory=dict)
+    flags: Doc = field(default_factory=dict)
+    named: Doc = field(default_factory=dict)
+
+    def types(self) -> Doc:
+        """Enums, flags and named types."""
+        rng = self.rng
+        self.taken |= {"bool", "bytes", "text"}
+        for _ in range(rng.randint(0, 3)):
+            self.enums[self.words.name(self.taken)] = self._enum(
+                rng.choice(("u8", "u8", "u16", "i8", "u24", "u32"))
+            )
+        self.enums[self.words.name(self.taken)] = {"type": "u3", "values": self._members(8)}
+        for _ in range(rng.randint(0, 2)):
+            self.flags[self.words.name(self.taken)] = self._flags(
+                rng.choice(("u8", "u16", "u24", "u32", "u64"))
+            )
+        for _ in range(rng.randint(0, 3)):
+            name = self.words.name(self.taken)
+            self.named[name] = self._scalar()[0]
+        return {
+            key: value
+            for key, value in (("enums", self.enums), ("flags", self.flags), ("types", self.named))
+            if value
+        }
+
+    def forget_unused(self, document: Doc) -> None:
+        """Take out what no field has, so that lint has nothing to warn of."""
+        text = repr({key: document.get(key) for key in ("commands", "messages")})
+        for group in ("types", "enums", "flags"):
+            for name in reversed(list(document.get(group, {}))):
+                if f"'{name}'" not in text:
+                    del document[group][name]
+                elif group == "types":
+                    text += repr(document[group][name])
+            if not document.get(group, True):
+                del document[group]
+
+    def _members(self, limit: int, low: int = 0) -> Doc:
+        rng = self.rng
+        names: set[str] = set()
+        numbers = {low, limit - 1, *(rng.randrange(low, limit) for _ in range(rng.randint(0, 3)))}
+        return {self.words.name(names): number for number in sorted(numbers)}
+
+    def _enum(self, kind: str) -> Doc:
+        bits = int(kind[1:])
+        low, limit = (-(1 << bits - 1), 1 << bits - 1) if kind[0] == "i" else (0, 1 << bits)
+        return {"type": kind, "doc": self.words.text(), "values": self._members(limit, low)}
+
+    def _flags(self, kind: str) -> Doc:
+        rng, names, bits = self.rng, set[str](), int(kind[1:])
+        numbers = {0, bits - 1, *(rng.randrange(bits) for _ in range(2))}
+        spec: Doc = {"type": kind, "values": {self.words.name(names): bit for bit in sorted(numbers)}}
+        return spec | ({"reserved": "zero"} if rng.random() < 0.5 else {})
+
+    # The fields of a message
+
+    def fields(self, room: Room, begun: Doc | None = None) -> Doc:
+        """The fields of one message, those `begun` in front."""
+        rng = self.rng
+        taken = {self.shape.address_name, *(begun or {})}
+        made: list[tuple[str, Any]] = []
+        for name, spec in (begun or {}).items():
+            size = self._bytes_of(spec["type"], spec)
+            if size <= room.left:
+                made.append((name, spec))
+                room.left -= size
+        count = rng.choice((0, 1, 1, 2, 3, 3, 4, 5, 7))
+        for _ in range(count):
+            self._add_field(made, taken, room)
+        if room.least and not any(self._least(spec) for _, spec in made):
+            made.append((self.words.name(taken), "u8"))
+        if self.shape.word > 1:
+            self._fill_words(made, taken)
+        return dict(made)
+
+    def _add_field(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
+        roll = self.rng.random()
+        name = self.words.name(taken)
+        if roll < 0.3 and not room.fixed:
+            self._variable(name, made, taken, room)
+            return
+        if roll < 0.42:
+            spec, size = self._fixed_run()
+        elif roll < 0.52:
+            spec, size = self._packed(taken)
+        else:
+            spec, size = self._scalar()
+            if isinstance(spec, dict) and self.rng.random() < 0.3:
+                spec["doc"] = self.words.text()
+        if spec is not None and size <= room.left - room.least:
+            made.append((name, spec))
+            room.left -= size
+
+    def _bytes_of(self, kind: str, spec: Doc) -> int:
+        bits, groups = int(kind[1:]), spec.get("groups") or self.shape.groups
+        parts = [each.split("..") for each in spec.get("parts", [f"0..{bits - 1}"])]
+        width = groups["bits"] if groups else 8
+        return sum(-(-(int(last) + 1 - int(first)) // width) for first, last in parts)
+
+    @staticmethod
+    def _least(spec: Any) -> bool:
+        kind = str(spec["type"] if isinstance(spec, dict) else spec)
+        return "[" not in kind and kind not in ("bytes", "text")
+
+    def _fill_words(self, made: list[tuple[str, Any]], taken: set[str]) -> None:
+        """Reserved bytes up to a whole word."""
+        size = sum(self._packet_size(spec) for _, spec in made)
+        while size % self.shape.word:
+            made.append((self.words.name(taken), {"type": "u8", "reserved": True}))
+            size += 1
+        while made and size > self.shape.most:
+            size -= self._packet_size(made.pop()[1])
+        while size % self.shape.word:
+            size -= self._packet_size(made.pop()[1])
+
+    def _packet_size(self, spec: Any) -> int:
+        written: Doc = {"type": spec} if isinstance(spec, str) else spec
+        base, _, count = written["type"].partition("[")
+        named = self.named.get(base)
+        if named is not None:
+            return self._packet_size(
+                {
+                    **(named if isinstance(named, dict) else {"type": named}),
+                    **{key: value for key, value in written.items() if key != "type"},
+                }
+            )
+        base = self.enums.get(base, self.flags.get(base, {"type": base}))["type"]
+        if base in ("bool", "bytes", "text"):
+            size = 1
+        elif "fixed" in base:
+            size = sum(map(int, base.lstrip("u").removeprefix("fixed").split("."))) // 8
+        else:
+            size = self._bytes_of(base, written)
+        return size * int(count.rstrip("]") or 1)
+
+    # Kinds
+
+    def _scalar(self) -> tuple[Any, int]:
+        rng = self.rng
+        made: Callable[[], tuple[Any, int]] = rng.choice(
+            (self._plain, self._plain, self._plain, self._ranged, self._truth, self._of_enum, self._of_flags,
+             self._scaled, self._fixed_point, self._constant, self._reserved, self._grouped, self._of_named)
+        )  # fmt: skip
+        return made()
+
+    def _integer(self) -> tuple[str, Doc, int]:
+        """An integer type, its byte order where that differs, its bytes."""
+        if self.shape.groups:
+            bits = self.rng.choice((1, 6, 7, 8, 13, 14, 16, 20, 28, 32, 64))
+            kind = f"{'i' if bits > 1 and self.rng.random() < 0.3 else 'u'}{bits}"
+            return kind, {}, self._bytes_of(kind, {})
+        kind = self.rng.choice(_INTEGERS)
+        order: Doc = {"byteorder": self.rng.choice(("big", "little"))} if self.rng.random() < 0.3 else {}
+        return kind, order, int(kind[1:]) // 8
+
+    def _plain(self) -> tuple[Any, int]:
+        kind, order, size = self._integer()
+        if not order and self.rng.random() < 0.5:
+            return kind, size
+        spec: Doc = {"type": kind, **order}
+        low, high = _limits(kind)
+        if self.rng.random() < 0.5:
+            spec["default"] = self.rng.choice((low, high, self.rng.randint(low, high)))
+        if self.rng.random() < 0.3:
+            spec["unit"] = self.words.unit()
+        return spec, size
+
+    def _ranged(self) -> tuple[Any, int]:
+        kind, order, size = self._integer()
+        low, high = _limits(kind)
+        first = self.rng.choice((low, high, min(high, low + 1), self.rng.randint(low, high)))
+        last = self.rng.choice((first, high, self.rng.randint(first, high)))
+        spec: Doc = {"type": kind, **order, self.rng.choice(("range", "raw_range")): f"{first}..{last}"}
+        if self.rng.random() < 0.6:
+            spec["default"] = self.rng.choice((first, last))
+        return spec, size
+
+    def _truth(self) -> tuple[Any, int]:
+        return self.rng.choice(("bool", {"type": "bool", "default": True})), 1
+
+    def _of_enum(self) -> tuple[Any, int]:
+        name = self.rng.choice(list(self.enums))
+        enum = self.enums[name]
+        if enum["type"] == "u3" and not self.shape.groups:
+            return self._truth()
+        member = self.rng.choice(list(enum["values"]))
+        spec = self.rng.choice((name, {"type": name, "default": member}))
+        return spec, self._bytes_of(enum["type"], {})
+
+    def _of_flags(self) -> tuple[Any, int]:
+        if not self.flags:
+            return self._truth()
+        name = self.rng.choice(list(self.flags))
+        bit = next(iter(self.flags[name]["values"].values()))
+        spec = self.rng.choice((name, {"type": name, "default": 1 << bit}))
+        return spec, self._bytes_of(self.flags[name]["type"], {})
+
+    def _scaled(self) -> tuple[Any, int]:
+        kind, order, size = self._integer()
+        scale, below = self.rng.choice(_SCALES)
+        if scale == "1/3" and int(kind[1:]) > 53:
+            scale, below = "1/10", 10
+        spec: Doc = {"type": kind, **order, "scale": scale, "unit": self.words.unit()}
+        if self.rng.random() < 0.4:
+            spec["offset"] = self.rng.choice((-40, 100, 1))
+        if self.rng.random() < 0.4 and below in (1, 2, 4):
+            low, high = _limits(kind)
+            raw = self.rng.choice((low, high, self.rng.randint(low, high)))
+            if abs(raw) < 1 << 40:
+                spec["default"] = _decimal(raw * Fraction(scale) + spec.get("offset", 0))
+        return spec, size
+
+    def _fixed_point(self) -> tuple[Any, int]:
+        kinds = (
+            ("fixed16.16", 32),
+            ("ufixed8.8", 16),
+            ("fixed4.4", 8),
+            ("fixed32.32", 64),
+            ("ufixed1.15", 16),
+        )
+        kind, bits = self.rng.choice(kinds)
+        return kind, self._bytes_of(f"u{bits}", {})
+
+    def _constant(self) -> tuple[Any, int]:
+        kind, order, size = self._integer()
+        low, high = _limits(kind)
+        return {
+            "type": kind,
+            **order,
+            "const": self.rng.choice((high, low, self.rng.randint(low, high))),
+        }, size
+
+    def _reserved(self) -> tuple[Any, int]:
+        kind, order, size = self._integer()
+        spec: Doc = {"type": kind, **order, "reserved": True}
+        return spec | ({"const": _limits(kind)[1]} if self.rng.random() < 0.3 else {}), size
+
+    def _grouped(self) -> tuple[Any, int]:
+        """Integers in groups of bits of their own."""
+        if self.shape.groups:
+            return self._plain()
+        bits, size = self.rng.choice((4, 6, 7)), self.rng.choice((7, 10, 13, 16, 24, 32, 64))
+        kind = f"{self.rng.choice('ui')}{size}"
+        spec: Doc = {"type": kind, "groups": {"bits": bits, "first": self.rng.choice(("least", "most"))}}
+        if size >= 16 and self.rng.random() < 0.5:
+            spec["parts"] = [f"{size // 2}..{size - 1}", f"0..{size // 2 - 1}"]
+        return spec, self._bytes_of(kind, spec)
+
+    def _of_named(self) -> tuple[Any, int]:
+        if not self.named:
+            return self._plain()
+        name = self.rng.choice(list(self.named))
+        return name, self._packet_size(name)
+
+    def _item(self) -> tuple[str, Doc, int]:
+        kind, order, size = self._integer()
+        return kind, order, size
+
+    def _fixed_run(self) -> tuple[Any, int]:
+        rng, number = self.rng, self.rng.choice((1, 2, 3, 4, 9))
+        roll = rng.random()
+        if roll < 0.3 and not self.shape.groups:
+            spec: Doc = {"type": f"bytes[{number}]"}
+            return spec | ({"default": "01" * number} if rng.random() < 0.5 else {}), number
+        if roll < 0.5 and self.shape.text:
+            spec = {"type": f"text[{number}]"}
+            return spec | ({"default": "a" * number} if rng.random() < 0.5 else {}), number
+        kind, order, size = self._item()
+        return {"type": f"{kind}[{number}]", **order}, size * number
+
+    def _packed(self, taken: set[str]) -> tuple[Any, int]:
+        """Bit fields of every kind inside an integer."""
+        rng = self.rng
+        kind, order, size = self._integer()
+        bits: Doc = {}
+        at, width = rng.randint(0, 2), int(kind[1:])
+        while at < width and len(bits) < 6:
+            wide = min(width - at, rng.choice((1, 1, 2, 3, 4, 8, 9, 16, 32, 64)))
+            bits[self.words.name(taken)] = self._bit(at, wide)
+            at += wide + rng.choice((0, 0, 1, 5))
+        if not bits:
+            return self._plain()
+        return {"type": "u" + kind[1:], **order, "bits": bits}, size
+
+    def _bit(self, at: int, wide: int) -> Any:
+        rng, place = self.rng, f"{at}..{at + wide - 1}"
+        roll = rng.random()
+        small = next((name for name, enum in self.enums.items() if enum["type"] == "u3"), "")
+        if wide == 1:
+            return rng.choice((at, {"at": at, "type": "bool", "default": True}))
+        if wide >= 3 and roll < 0.15 and small:
+            return {"at": place, "type": small}
+        if roll < 0.45:
+            return {"at": place, "signed": True}
+        if roll < 0.6:
+            return {"at": place, "scale": "1/2", "unit": self.words.unit()}
+        if roll < 0.75:
+            top = (1 << wide) - 1
+            return {"at": place, "range": f"0..{rng.choice((top, top // 2, 1))}"}
+        return place
+
+    def _variable(self, name: str, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
+        """A field of variable size: with one or two counts in front, or as what is left."""
+        rng = self.rng
+        kind, spec, step = self._variable_kind()
+        most = min(rng.choice((1, 3, 8, 40, 250)), (room.left - room.least - 4) // step)
+        if most < 1:
+            return
+        low = rng.choice((0, 0, 0, 1, most))
+        open_before = any(self._is_open(each, made) for _, each in made)
+        counted = not room.open_end or open_before or rng.random() < 0.5
+        if counted and open_before:
+            return
+        if counted:
+            low = min(low, most - 1)
+        spec = {"type": f"{kind}[{low}..{most}]", **spec}
+        if counted:
+            for unit in rng.choice((("items",), ("items",), ("bytes",), ("items", "bytes"))):
+                self._count(name, unit, most * (step if unit == "bytes" else 1), made, taken=taken, room=room)
+        elif low == 0 and rng.random() < 0.3 and kind in ("bytes", "text"):
+            spec["type"] = kind
+            most = 0
+        made.append((name, spec))
+        room.left -= most * step
+        room.open_end = room.open_end and counted
+
+    def _is_open(self, spec: Any, made: list[tuple[str, Any]]) -> bool:
+        names = {each["counts"] for _, each in made if isinstance(each, dict) and "counts" in each}
+        kind = str(spec["type"] if isinstance(spec, dict) else spec)
+        own = next(name for name, each in made if each is spec)
+        return (kind in ("bytes", "text") or ".." in kind) and own not in names
+
+    def _variable_kind(self) -> tuple[str, Doc, int]:
+        rng = self.rng
+        kinds = ["array", *(["text"] if self.shape.text else []), *([] if self.shape.groups else ["bytes"])]
+        kind = rng.choice(kinds)
+        if kind != "array":
+            return kind, {}, 1
+        return self._item()
+
+    def _count(
+        self, name: str, unit: str, most: int, made: list[tuple[str, Any]], *, taken: set[str], room: Room
+    ) -> None:
+        """A count somewhere in front of its field, and behind an open-ended one never."""
+        rng = self.rng
+        kind = "u8" if most < 256 and rng.random() < 0.75 else "u16"
+        spec: Doc = {"type": kind, "counts": name, "counts_in": unit}
+        if unit == "items" and rng.random() < 0.5:
+            del spec["counts_in"]
+        if kind == "u16" and not self.shape.groups and rng.random() < 0.4:
+            spec["byteorder"] = rng.choice(("big", "little"))
+        made.insert(rng.randint(0, len(made)), (self.words.name(taken), spec))
+        room.left -= self._bytes_of(kind, {})
+
+
+def _limits(kind: str) -> tuple[int, int]:
+    bits = int(kind[1:])
+    return (-(1 << bits - 1), (1 << bits - 1) - 1) if kind[0] == "i" else (0, (1 << bits) - 1)
+
+
+def _decimal(number: Fraction) -> float | int:
+    return int(number) if number.denominator == 1 else float(number)

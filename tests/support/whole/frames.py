@@ -1,0 +1,300 @@
+"""Random frames, put together from every part that the language has."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from tests.support.whole.reference import checks
+
+Doc = dict[str, Any]
+_LEADS = ("7E", "A5 A5", "AA AA", "02 02", "02", "FF FF FD 00", "AA 55", "10 02", "68", "3A", "A5 A5 A5")
+_ENDS = ("03", "0D 0A", "16", "10 03", "0D", "A5")
+_LENGTHS = ("u8", "u8", "u8", "u16", "u16", "u24", "u32")
+_SIZES = (4, 8, 16, 32, 64, 120, 200, 255, 300, 600)
+_WIDTHS = {8: "u8", 16: "u16", 24: "u24", 32: "u32", 64: "u64"}
+
+
+class _Words(Protocol):
+    def name(self, taken: set[str]) -> str: ...
+
+
+@dataclass
+class Shape:
+    """A frame, and what it demands of the messages in it."""
+
+    kind: str
+    frame: Doc
+    least: int
+    most: int
+    id_bits: int
+    bus: str
+    has_length: bool = True
+    address_bits: int = 0
+    address_name: str = ""
+    mark: int = 0xA5
+    end_id: int = -1
+    groups: Doc = field(default_factory=dict)
+    #: Text fits beside the marker bit.
+    text: bool = True
+    #: Payloads are whole words of so many bytes, all fields of fixed size.
+    word: int = 0
+    #: The checksum of a marked frame names the messages that have it.
+    only: bool = False
+
+
+def choose(rng: random.Random, words: _Words) -> Shape:
+    """A frame of any kind."""
+    kind = rng.choices(("hunted", "parts", "marked", "packet"), (16, 66, 10, 8))[0]
+    if kind == "marked":
+        return _marked(rng)
+    return _packet(rng) if kind == "packet" else _Parts(rng, words).make(hunted=kind == "hunted")
+
+
+def _algorithm(rng: random.Random) -> tuple[str, int]:
+    """A checksum and its width; sums and the CRCs of eight and sixteen bits come most."""
+    name: str = rng.choice(
+        (
+            rng.choice(("sum8", "sum8-inverted", "sum16")),
+            rng.choice(_crcs(8)),
+            rng.choice(_crcs(16)),
+            rng.choice(_crcs(16)),
+            rng.choice(_crcs(rng.choice((24, 32, 64)))),
+        )
+    )
+    return name, checks.width(name)
+
+
+def _crcs(bits: int) -> Sequence[str]:
+    return [name for name, row in checks.catalogue().items() if int(row["width"]) == bits]
+
+
+def _order(rng: random.Random) -> Doc:
+    return {"byteorder": rng.choice(("big", "little"))} if rng.random() < 0.4 else {}
+
+
+@dataclass
+class _Parts:
+    rng: random.Random
+    words: _Words
+    parts: Doc = field(default_factory=dict)
+    taken: set[str] = field(default_factory=set)
+
+    def _chance(self, probability: float) -> bool:
+        return self.rng.random() < probability
+
+    def _add(self, name: str, spec: Doc) -> str:
+        """A part, in most schemas under the name that its role suggests."""
+        if self._chance(0.15):
+            name = self.words.name(self.taken)
+        while name in self.parts:
+            name += "_"
+        self.taken.add(name)
+        self.parts[name] = spec
+        return name
+
+    def make(self, *, hunted: bool) -> Shape:
+        lead = self.rng.choice(("A5 A5", "AA AA", "02 02")) if hunted else self._lead()
+        names = {"lead": self._add("start", {"role": "constant", "value": lead})} if lead else {}
+        roles = self._header(hunted=hunted)
+        for role in roles:
+            names[role] = self._add(*self._header_part(role))
+        if self._chance(0.08) and not hunted:
+            self._add("gap", {"role": "constant", "value": "55"})
+        names["payload"] = self._add("data", {"role": "payload"})
+        if self._chance(0.08):
+            self._add("fence", {"role": "constant", "value": "5A"})
+        self._checked(names)
+        if self._chance(0.3):
+            names["end"] = self._add("end", {"role": "constant", "value": self.rng.choice(_ENDS)})
+        if "length" in names:
+            self._counts(names, hunted=hunted)
+        frame: Doc = {"parts": self.parts}
+        stuffing = self._stuffing(names, lead, hunted=hunted)
+        if stuffing:
+            frame["stuffing"] = stuffing
+        return self._shape(frame, names, stuffing)
+
+    def _lead(self) -> str:
+        return self.rng.choice(_LEADS) if self._chance(0.75) else ""
+
+    def _header(self, *, hunted: bool) -> list[str]:
+        roles = ["message"]
+        roles += ["address"] if self._chance(0.55) else []
+        roles += ["constant"] if self._chance(0.1) and not hunted else []
+        has_length = hunted or self._chance(0.62)
+        self.rng.shuffle(roles)
+        if has_length:
+            roles.insert(0 if hunted else self.rng.randint(0, len(roles)), "length")
+        if roles[0] == "constant":
+            roles.append(roles.pop(0))
+        return roles
+
+    def _header_part(self, role: str) -> tuple[str, Doc]:
+        rng = self.rng
+        if role == "constant":
+            return "version", {"role": "constant", "value": "01"}
+        if role == "length":
+            kind = rng.choice(_LENGTHS)
+        else:
+            kind = rng.choices(("u8", "u16", "u24", "u32", "u64"), (30, 5, 1, 2, 1))[0]
+        name = {"message": "code", "address": "node", "length": "length"}[role]
+        return name, {"role": role, "type": kind, **_order(rng)}
+
+    def _checked(self, names: Doc) -> None:
+        if not self._chance(0.78):
+            return
+        rng, covered = self.rng, list(self.parts)
+        algorithm, width = _algorithm(rng)
+        if self._chance(0.35):
+            covered = [name for name in covered if rng.random() < 0.7] or [names["payload"]]
+        spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
+        spec |= _order(rng)
+        if width == 16 and self._chance(0.15):
+            spec["sent"] = rng.choice(
+                (["0..6", "8..14"], ["8..15"], ["0..3", "4..7", "8..11", "12..15"], ["7..14", "0..6"])
+            )
+        names["checksum"] = self._add("crc", spec)
+
+    def _counts(self, names: Doc, *, hunted: bool) -> None:
+        counted = [
+            name
+            for name in self.parts
+            if name == names["payload"] or self.rng.random() < (0.3 if hunted else 0.5)
+        ]
+        self.parts[names["length"]]["counts"] = counted
+        if hunted:
+            self.parts[names["length"]]["type"] = "u8"
+
+    def _stuffing(self, names: Doc, lead: str, *, hunted: bool) -> Doc:
+        rng = self.rng
+        if not hunted and not self._chance(0.35 if lead else 0.05):
+            return {}
+        first = lead.split()
+        if hunted or self._chance(0.4):
+            after = first[0] if first else "A5"
+        else:
+            after = rng.choice((" ".join(first[:2]), " ".join(first[:1]), " ".join(first[:3]))) or "10"
+        insert = rng.choice(("00", "00", "FD", "10", after.split()[-1]))
+        spec: Doc = {"after": after, "insert": "00" if hunted else insert}
+        if not hunted and self._chance(0.4):
+            return spec | {"checksum": "after"}
+        front = [names["lead"]] if lead and not self._chance(0.04) else []
+        if front and self._chance(0.1) and list(self.parts)[1] == names.get("length"):
+            front.append(names["length"])
+        tail = [names["end"]] if "end" in names and self._chance(0.15) else []
+        if front or tail:
+            spec["exempt"] = front + tail
+        return spec
+
+    def _shape(self, frame: Doc, names: Doc, stuffing: Doc) -> Shape:
+        rng, parts = self.rng, self.parts
+        most, least = rng.choice(_SIZES), rng.choice((0,) * 7 + (1,))
+        if "length" in names:
+            most = self._longest(names, stuffing, most)
+        parts[names["payload"]]["size"] = f"{least}..{most}"
+        address = parts.get(names.get("address", ""), {})
+        return Shape(
+            "parts",
+            frame,
+            least,
+            most,
+            int(parts[names["message"]]["type"][1:]),
+            rng.choices(("master_slave", "ring", "host"), (8, 1, 1))[0],
+            "length" in names,
+            int(address["type"][1:]) if address else 0,
+            names.get("address", ""),
+            int(stuffing["after"].split()[0], 16) if stuffing else 0xA5,
+        )
+
+    def _longest(self, names: Doc, stuffing: Doc, most: int) -> int:
+        """As much payload as the length can count."""
+        length = parts_length = self.parts[names["length"]]
+        bias = sum(_size(self.parts[name]) for name in length["counts"])
+        top = (1 << int(parts_length["type"][1:])) - 1 - bias
+        if stuffing.get("checksum") == "after":
+            top = top * len(stuffing["after"].split()) // (len(stuffing["after"].split()) + 1)
+        # Lengths below, around and above the byte that is stuffed.
+        mark = int(stuffing["after"].split()[0], 16) - bias if stuffing else 0
+        if mark > 4 and self._chance(0.5):
+            most = self.rng.choice((mark - 1, mark, mark + 40))
+        return max(4, min(most, top))
+
+
+def _size(part: Doc) -> int:
+    if part["role"] == "payload":
+        return 0
+    if part["role"] == "constant":
+        return len(bytes.fromhex(part["value"]))
+    return len(part["sent"]) if "sent" in part else int(part["type"][1:]) // 8
+
+
+def _marked(rng: random.Random) -> Shape:
+    bits = rng.choices((7, 6), (4, 1))[0]
+    ids = rng.randint(2, 4)
+    rest = 7 - ids
+    # With six bits in a group the marker is bit 6, and bit 7 belongs to the header.
+    places = {7: (f"{ids}..6", f"0..{ids - 1}"), 6: ("7" if rest == 1 else f"{ids}..5", f"0..{ids - 1}")}
+    marker, address = 0x80, rest
+    header = {"address": places[bits][0], "message": places[bits][1]}
+    if bits == 6:
+        # The address takes bit 7 alone, the id everything below the marker.
+        header, marker, ids, address = {"address": "7", "message": "0..5"}, 0x40, 6, 1
+    elif rng.random() < 0.4:
+        header = {"address": f"0..{rest - 1}", "message": f"{rest}..6"}
+    end, most = rng.randrange(1 << ids), rng.choice((8, 24, 64))
+    spec: Doc = {"marker": marker, "header": header, "end": end, "payload": f"0..{most}"}
+    only = False
+    if rng.random() < 0.6:
+        name = rng.choice((rng.choice(_crcs(16)), rng.choice(_crcs(8)), "sum8", "sum16"))
+        sent = ["0..5", "8..13"] if checks.width(name) == 16 else [rng.choice(("0..5", "2..7"))]
+        spec["checksum"] = {
+            "role": "checksum",
+            "type": f"u{checks.width(name)}",
+            "algorithm": name,
+            "over": ["payload"],
+            "sent": sent,
+        }
+        only = rng.random() < 0.5
+    return Shape(
+        "marked",
+        {"marked": spec},
+        0,
+        most,
+        ids,
+        rng.choice(("ring", "ring", "master_slave")),
+        address_bits=address,
+        address_name="address",
+        end_id=end,
+        groups={"bits": bits, "first": rng.choice(("least", "most"))},
+        text=bits == 7,
+        only=only,
+    )
+
+
+def _packet(rng: random.Random) -> Shape:
+    word, most = rng.choice((1, 2, 2, 4)), rng.choice((4, 8, 16))
+    parts: Doc = {
+        "code": {"role": "message", "type": "u8"},
+        "data": {"role": "payload", "size": f"0..{most}"},
+    }
+    if rng.random() < 0.8:
+        name = rng.choice(("sum16", "sum16", "sum8", "sum8-inverted"))
+        check: Doc = {"role": "checksum", "type": f"u{checks.width(name)}", "algorithm": name, "words": word}
+        if rng.random() < 0.6:
+            check["rejected"] = rng.choice((0, 0, 0xFF))
+        parts["check"] = check | _order(rng)
+    else:
+        word = 1
+    return Shape(
+        "packet",
+        {"packet": parts},
+        0,
+        most,
+        8,
+        rng.choice(("host", "host", "master_slave")),
+        has_length=False,
+        word=word,
+    )

@@ -1,0 +1,115 @@
+"""One schema's reference: encodes, decodes, and says what a stream delivers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tests.support.whole.reference import document, values
+from tests.support.whole.reference.document import Fields, Message, whole_span
+from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.receivers import (
+    Event,
+    Hunter,
+    MarkedReceiver,
+    PacketReceiver,
+    Receiver,
+    Searcher,
+)
+from tests.support.whole.reference.special import Marked, Packets
+from tests.support.whole.reference.values import Raw, Wrong
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a whole frame says."""
+
+    name: str
+    address: int | None
+    values: Mapping[str, Raw]
+
+
+class Reference:
+    """Everything that is known of a schema's wire bytes."""
+
+    def __init__(self, text: str) -> None:
+        """Read the text of a schema."""
+        data = document.load(text)
+        shape = data["frame"]
+        self.frame: Frame | Marked | Packets = (
+            Frame(data) if "parts" in shape else Marked(data) if "marked" in shape else Packets(data)
+        )
+        parts = {**shape.get("parts", {}), **shape.get("packet", {})}
+        sizes = [spec["size"] for spec in parts.values() if spec["role"] == "payload"]
+        most = whole_span(sizes[0] if sizes else shape["marked"]["payload"])[1]
+        addressed = [name for name, spec in parts.items() if spec["role"] == "address"]
+        self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None
+        self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
+        self.by_name = {message.name: message for message in self.messages}
+        used = {message.direction for message in self.messages}
+        self.directions = ("message",) if used == {"message"} else ("request", "response")
+
+    def known(self, direction: str) -> dict[int, Message]:
+        """The messages that can come in a direction."""
+        return {each.number: each for each in self.messages if each.direction in (direction, "message")}
+
+    def hears(self, message: Message) -> str:
+        """A direction in which a message can come."""
+        return message.direction if message.direction in self.directions else "request"
+
+    def encode(
+        self, name: str, given: Mapping[str, Raw], address: int = 0, request: bytes = b""
+    ) -> tuple[bytes, bytes]:
+        """Payload and wire bytes. Raises Wrong."""
+        message = self.by_name[name]
+        if not message.allows(address):
+            raise Wrong("range", "address")
+        payload = values.encode(message, given)
+        return payload, self.seal(name, payload, address, request)
+
+    def seal(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
+        """The wire bytes around a payload, whatever it is."""
+        message, frame = self.by_name[name], self.frame
+        if isinstance(frame, Frame):
+            return frame.seal(message.number, payload, address)
+        if isinstance(frame, Marked):
+            return frame.seal(message, payload, address)
+        return frame.seal(message, payload, request)
+
+    def decode(self, direction: str, wire: bytes, request: bytes = b"") -> Seen:
+        """What exactly one frame says. Raises Wrong."""
+        if request:
+            assert isinstance(self.frame, Packets)
+            message = self.known("response").get(request[0])
+            if message is None:
+                raise Wrong("unknown")
+            payload = self.frame.opened(message, wire, request)
+            return Seen(message.name, None, values.decode(message, payload))
+        if isinstance(self.frame, Frame):
+            return self._one(Searcher(self.frame, self.known(direction)), wire)
+        return self._one(self.receiver(direction), wire)
+
+    def _one(self, receiver: Receiver, wire: bytes) -> Seen:
+        """A frame is whole if it is all that a receiver finds; one inserted byte may follow it."""
+        events = receiver.run(wire)
+        first = events[0] if events else Event("truncated", 0, 0, wire)
+        if first.kind != "message":
+            raise Wrong(first.kind)
+        rest = wire[len(first.raw) :]
+        swallowed = isinstance(receiver, Searcher) and receiver.swallowed == len(rest) == 1
+        if first.offset or (rest and not swallowed):
+            raise Wrong("length", "bytes follow the frame")
+        return Seen(first.name, first.address, first.values)
+
+    def receiver(self, direction: str) -> Receiver:
+        """A new receiver."""
+        known = self.known(direction)
+        if isinstance(self.frame, Marked):
+            return MarkedReceiver(self.frame, known)
+        if isinstance(self.frame, Packets):
+            return PacketReceiver(self.frame, known)
+        return Hunter(self.frame, known) if self.frame.unique else Searcher(self.frame, known)
+
+    def events(self, direction: str, stream: bytes) -> list[Event]:
+        """What a receiver delivers, the end of the stream included."""
+        return self.receiver(direction).run(stream)

@@ -1,0 +1,392 @@
+"""What a schema file says of its fields and messages."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, Literal
+
+import yaml
+
+Doc = dict[str, Any]
+Role = Literal["value", "constant", "reserved", "count"]
+
+
+class _Loader(yaml.CSafeLoader):
+    """Numbers with a point stay exact; on, off, yes and no are text."""
+
+    def exact(self, node: yaml.ScalarNode) -> Fraction:
+        """The number as it is written."""
+        return Fraction(node.value)
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in pairs if tag != "tag:yaml.org,2002:bool"]
+    for first, pairs in _Loader.yaml_implicit_resolvers.items()
+}
+_Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"true\Z|false\Z"), list("tf"))
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.exact)
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """An integer; `pieces` are the (lowest bit, bits) of its wire bytes in their order."""
+
+    bits: int
+    signed: bool
+    pieces: tuple[tuple[int, int], ...]
+    low: int
+    high: int
+    default: int = 0
+    scale: Fraction | None = None
+    offset: Fraction = Fraction(0)
+    truth: bool = False
+    #: Bits that must be zero.
+    forbidden: int = 0
+
+    def native(self, raw: int) -> Fraction | int | bool:
+        """The value in the unit, exactly."""
+        if self.truth:
+            return bool(raw)
+        return raw if self.scale is None else raw * self.scale + self.offset
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """Bytes, text, or integers in a row; `high` is None until the room that is left is known."""
+
+    item: Number | None
+    text: bool
+    low: int
+    high: int | None
+    default: tuple[int, ...]
+
+    @property
+    def step(self) -> int:
+        """Bytes of an item."""
+        return len(self.item.pieces) if self.item else 1
+
+    @property
+    def most(self) -> int:
+        """Most items."""
+        assert self.high is not None
+        return self.high
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """An integer divided into bit fields: (name, lowest bit, number)."""
+
+    pieces: tuple[tuple[int, int], ...]
+    bits: int
+    members: tuple[tuple[str, int, Number], ...]
+
+
+Kind = Number | Run | Packed
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A field."""
+
+    name: str
+    kind: Kind
+    role: Role = "value"
+    counts: str = ""
+    counts_in: str = "items"
+
+    @property
+    def fixed(self) -> bool:
+        """Always of one size."""
+        return not isinstance(self.kind, Run) or self.kind.low == self.kind.high
+
+    @property
+    def most_bytes(self) -> int:
+        """Most bytes on the wire; 0 of a run without a bound."""
+        return self.kind.step * (self.kind.high or 0) if isinstance(self.kind, Run) else len(self.kind.pieces)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message in one direction."""
+
+    name: str
+    number: int
+    direction: str
+    slots: tuple[Slot, ...]
+    addresses: tuple[tuple[int, int], ...]
+    default_address: int
+    empty_is_default: bool = False
+    checked: bool = True
+
+    def values(self) -> Iterator[tuple[str, Number | Run]]:
+        """What a caller sets and reads, in wire order."""
+        for slot in self.slots:
+            if isinstance(slot.kind, Packed):
+                yield from ((name, number) for name, _, number in slot.kind.members)
+            elif slot.role == "value":
+                yield slot.name, slot.kind
+
+    def counter(self, name: str) -> Slot | None:
+        """The first count of a field."""
+        return next((slot for slot in self.slots if slot.counts == name), None)
+
+    def allows(self, address: int) -> bool:
+        """The message may carry the address."""
+        return not self.addresses or any(low <= address <= high for low, high in self.addresses)
+
+
+def load(text: str) -> Doc:
+    """The plain data of a schema file."""
+    document: Doc = yaml.load(text, _Loader)
+    return document
+
+
+def exact(given: object) -> Fraction:
+    """A number in any of its notations."""
+    text = str(given).replace(" ", "").replace("_", "")
+    if text.lower().startswith("0x"):
+        return Fraction(int(text, 16))
+    if "^" in text:
+        top, base, power = re.split(r"[/^]", text)
+        return Fraction(int(top), int(base) ** int(power))
+    if "/" in text:
+        top, below = text.split("/")
+        return Fraction(top) / int(below)
+    return Fraction(text)
+
+
+def span(given: object) -> tuple[Fraction, Fraction]:
+    """A range, or one number."""
+    first, _, last = str(given).partition("..")
+    return exact(first), exact(last or first)
+
+
+def whole_span(given: object) -> tuple[int, int]:
+    """A range of whole numbers."""
+    first, last = span(given)
+    return int(first), int(last)
+
+
+def octets(given: object) -> bytes:
+    """One number, or pairs of hex digits."""
+    return bytes([given]) if isinstance(given, int) else bytes.fromhex(str(given))
+
+
+def byte_pieces(size: int, order: str) -> tuple[tuple[int, int], ...]:
+    """An integer of whole bytes."""
+    pieces = tuple((8 * index, 8) for index in range(size))
+    return pieces if order == "little" else pieces[::-1]
+
+
+class Fields:
+    """Builds fields out of what a file says of them."""
+
+    def __init__(self, document: Doc, payload_most: int) -> None:
+        """`payload_most` is what a field without a bound may fill."""
+        self._document = document
+        self._most = payload_most
+        self._order = document.get("byteorder", "big")
+
+    def build(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
+        """The fields of one message."""
+        slots = tuple(self._slot(name, self._resolved(spec)) for name, spec in fields.items())
+        room = self._most - sum(slot.most_bytes for slot in slots)
+        counts = {slot.counts: slot for slot in slots[::-1] if slot.counts}
+        return tuple(_bounded(slot, room, counts.get(slot.name)) for slot in slots)
+
+    def _resolved(self, spec: Any) -> Doc:
+        """A field with everything that its named types say."""
+        written: Doc = {"type": spec} if isinstance(spec, str) else dict(spec)
+        base, brackets, count = written["type"].partition("[")
+        named = self._document.get("types", {}).get(base.strip())
+        if named is None:
+            return written
+        below = self._resolved(named)
+        return {**below, **written, "type": below["type"] + brackets + count}
+
+    def _slot(self, name: str, spec: Doc) -> Slot:
+        base, bracket, count = spec["type"].replace(" ", "").partition("[")
+        if base in ("bytes", "text") or bracket:
+            return Slot(name, self._run(base, count.rstrip("]"), spec))
+        number = self._number(base, spec)
+        if "bits" in spec:
+            members = tuple(self._member(*each) for each in spec["bits"].items())
+            return Slot(name, Packed(number.pieces, number.bits, members))
+        if "counts" in spec:
+            return Slot(name, number, "count", spec["counts"], spec.get("counts_in", "items"))
+        number = _quantified(number, spec)
+        if spec.get("reserved"):
+            return Slot(name, self._with_default(number, base, spec, "const"), "reserved")
+        key = "const" if "const" in spec else "default"
+        role: Role = "constant" if "const" in spec else "value"
+        return Slot(name, self._with_default(number, base, spec, key), role)
+
+    def _run(self, base: str, count: str, spec: Doc) -> Run:
+        item = None if base in ("bytes", "text") else self._number(base, spec)
+        low, high = whole_span(count) if count else (0, None)
+        default: tuple[int, ...] = ()
+        if "default" in spec and item is not None:
+            default = tuple(spec["default"])
+        elif "default" in spec:
+            text = str(spec["default"])
+            default = tuple(text.encode("ascii") if base == "text" else bytes.fromhex(text))
+        fill = ord(" ") if base == "text" else 0
+        return Run(item, base == "text", low, high, default + (fill,) * (low - len(default)))
+
+    def _number(self, base: str, spec: Doc) -> Number:
+        bits, signed, scale, truth, forbidden = self._carrier(base)
+        pieces = self._pieces(bits, spec)
+        low = 0 if not signed else -(1 << bits - 1)
+        high = 1 if truth else (1 << bits - signed) - 1
+        return Number(bits, signed, pieces, low, high, 0, scale, Fraction(0), truth, forbidden)
+
+    def _carrier(self, base: str) -> tuple[int, bool, Fraction | None, bool, int]:
+        if base == "bool":
+            return self._document.get("groups", {}).get("bits", 8), False, None, True, 0
+        if enum := self._document.get("enums", {}).get(base):
+            return int(enum["type"][1:]), enum["type"][0] == "i", None, False, 0
+        if flags := self._document.get("flags", {}).get(base):
+            bits = int(flags["type"][1:])
+            free = flags.get("reserved") != "zero"
+            return bits, False, None, False, 0 if free else (1 << bits) - 1 & ~_named_bits(flags)
+        if "fixed" in base:
+            whole, fraction = base.lstrip("u").removeprefix("fixed").split(".")
+            return int(whole) + int(fraction), base[0] != "u", Fraction(1, 1 << int(fraction)), False, 0
+        return int(base[1:]), base[0] == "i", None, False, 0
+
+    def _pieces(self, bits: int, spec: Doc) -> tuple[tuple[int, int], ...]:
+        groups = spec.get("groups") or self._document.get("groups")
+        if groups is None:
+            return byte_pieces(bits // 8, spec.get("byteorder") or self._order)
+        pieces: list[tuple[int, int]] = []
+        for first, last in map(whole_span, spec.get("parts", [f"0..{bits - 1}"])):
+            starts = range(first, last + 1, groups["bits"])
+            inside = [(at, min(groups["bits"], last + 1 - at)) for at in starts]
+            pieces += inside if groups["first"] == "least" else inside[::-1]
+        return tuple(pieces)
+
+    def _member(self, name: str, spec: Any) -> tuple[str, int, Number]:
+        written: Doc = spec if isinstance(spec, dict) else {"at": spec}
+        first, last = whole_span(written["at"])
+        bits, signed = last + 1 - first, written.get("signed", False)
+        base = written.get("type", "")
+        numeric = signed or "scale" in written or "offset" in written
+        truth = base == "bool" or (not base and bits == 1 and not numeric)
+        flags = self._document.get("flags", {}).get(base, {})
+        forbidden = (1 << bits) - 1 & ~_named_bits(flags) if flags.get("reserved") == "zero" else 0
+        low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
+        number = Number(bits, signed, (), low, high, truth=truth, forbidden=forbidden)
+        number = _quantified(number, written)
+        return name, first, self._with_default(number, base, written, "default")
+
+    def _with_default(self, number: Number, base: str, spec: Doc, key: str) -> Number:
+        """Without a default the number nearest to 0 is meant."""
+        given = spec.get(key)
+        if given is None:
+            return replace(number, default=min(max(0, number.low), number.high))
+        if isinstance(given, bool):
+            return replace(number, default=int(given))
+        names = self._document.get("enums", {}).get(base, {}).get("values", {})
+        if given in names:
+            member = names[given]
+            return replace(number, default=member["value"] if isinstance(member, dict) else member)
+        return replace(number, default=int((exact(given) - number.offset) / (number.scale or 1)))
+
+
+def _named_bits(flags: Doc) -> int:
+    members = flags["values"].values()
+    return sum(1 << (each["bit"] if isinstance(each, dict) else each) for each in members)
+
+
+def _quantified(number: Number, spec: Doc) -> Number:
+    """The number with its scale and range."""
+    if "scale" in spec or "offset" in spec:
+        scale = exact(spec["scale"]) if "scale" in spec else number.scale or Fraction(1)
+        number = replace(number, scale=scale, offset=exact(spec.get("offset", 0)))
+    if "range" in spec:
+        ends = [(end - number.offset) / (number.scale or 1) for end in span(spec["range"])]
+        number = replace(number, low=int(min(ends)), high=int(max(ends)))
+    if "raw_range" in spec:
+        low, high = whole_or_negative(spec["raw_range"])
+        number = replace(number, low=low, high=high)
+    return number
+
+
+def whole_or_negative(given: object) -> tuple[int, int]:
+    """A range of integers."""
+    first, last = span(given)
+    return int(first), int(last)
+
+
+def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
+    kind = slot.kind
+    if not isinstance(kind, Run) or kind.high is not None:
+        return slot
+    most = max(0, room) // kind.step
+    if counter is not None:
+        assert isinstance(counter.kind, Number)
+        most = min(most, counter.kind.high // (kind.step if counter.counts_in == "bytes" else 1))
+    return replace(slot, kind=replace(kind, high=max(1, most)))
+
+
+def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
+    """Every message of a file, in its order."""
+    found: list[Message] = []
+    for name, spec in document.get("commands", {}).items():
+        found += _of_command(name, {**document.get("defaults", {}), **spec}, document, fields, addressed)
+    nodes = _nodes(document) if addressed else None
+    for name, spec in document.get("messages", {}).items():
+        found.append(
+            Message(
+                name,
+                spec["id"],
+                spec.get("direction", "message"),
+                fields.build(spec["fields"]),
+                (nodes,) if nodes else (),
+                nodes[0] if nodes else 0,
+                checked=_checked(document, name),
+            )
+        )
+    return tuple(found)
+
+
+def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Iterator[Message]:
+    for direction in ("request", "response"):
+        if spec[direction] == "none":
+            continue
+        ranges, default = (
+            _addresses(spec.get("addressing", "node"), direction, document) if addressed else ((), 0)
+        )
+        empty = direction == "request" and spec.get("empty_request") == "defaults"
+        slots = fields.build(spec[direction])
+        yield Message(
+            f"{name}.{direction}",
+            spec["id"],
+            direction,
+            slots,
+            ranges,
+            default,
+            empty,
+            _checked(document, name),
+        )
+
+
+def _checked(document: Doc, name: str) -> bool:
+    only = (document["frame"].get("marked") or {}).get("checksum", {}).get("only")
+    return only is None or name in only
+
+
+def _nodes(document: Doc) -> tuple[int, int]:
+    return whole_span(document["bus"]["nodes"])
+
+
+def _addresses(addressing: str, direction: str, document: Doc) -> tuple[tuple[tuple[int, int], ...], int]:
+    nodes, everybody = _nodes(document), document["bus"].get("broadcast")
+    if direction == "response" or addressing == "node":
+        return (nodes,), nodes[0]
+    if addressing == "broadcast":
+        return ((everybody, everybody),), everybody
+    return (nodes, (everybody, everybody)), nodes[0]

@@ -1,0 +1,333 @@
+"""Frames of parts: built, and cut out of wire bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from tests.support.whole.reference import checks
+from tests.support.whole.reference.document import Doc, Message, Run, byte_pieces, octets, whole_span
+from tests.support.whole.reference.values import Wrong, get, items_of, put
+
+
+class NeedMore(Exception):
+    """The bytes may still become a frame; nothing new can be told before there are `size` of them."""
+
+    def __init__(self, size: int = 0) -> None:
+        """Note how many."""
+        super().__init__(size)
+        self.size = size
+
+
+class Refused(Exception):
+    """No frame begins here: kind of fault, "" where none is reported, and its wire bytes."""
+
+    def __init__(self, kind: str, size: int = 1) -> None:
+        """Note what a fault tells."""
+        super().__init__(kind)
+        self.kind, self.size = kind, size
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a frame; the size of a payload is 0."""
+
+    name: str
+    role: str
+    size: int
+    spec: Doc
+    constant: bytes = b""
+    pieces: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Stuffing:
+    """A byte inserted after others."""
+
+    after: bytes
+    insert: int
+    exempt: tuple[str, ...]
+    #: Only the payload is stuffed, and length and checksum are those of the stuffed bytes.
+    payload_alone: bool
+
+    def stuff(self, data: bytes) -> bytes:
+        """Insert; an occurrence begins behind the byte inserted last."""
+        return data.replace(self.after, self.after + bytes([self.insert]))
+
+    def unstuff(self, data: bytes) -> bytes:
+        """Drop what was inserted. Raises Wrong."""
+        plain, rest = b"", data
+        while self.after in rest:
+            front, _, rest = rest.partition(self.after)
+            if rest[:1] != bytes([self.insert]):
+                raise Wrong("stuffing")
+            plain, rest = plain + front + self.after, rest[1:]
+        return plain + rest
+
+
+def part_of(name: str, spec: Doc, order: str) -> Part:
+    """A part as the file says."""
+    if spec["role"] == "constant":
+        constant = octets(spec["value"])
+        return Part(name, "constant", len(constant), spec, constant)
+    if spec["role"] == "payload":
+        return Part(name, "payload", 0, spec)
+    pieces = byte_pieces(int(spec["type"][1:]) // 8, spec.get("byteorder", order))
+    if "sent" in spec:
+        pieces = tuple((first, last + 1 - first) for first, last in map(whole_span, spec["sent"]))
+    return Part(name, spec["role"], len(pieces), spec, pieces=pieces)
+
+
+class Frame:
+    """A frame of parts."""
+
+    def __init__(self, document: Doc) -> None:
+        """Read the parts."""
+        frame, order = document["frame"], document.get("byteorder", "big")
+        self.parts = [part_of(name, spec, order) for name, spec in frame["parts"].items()]
+        self.by_role: Mapping[str, Part] = {part.role: part for part in self.parts[::-1]}
+        self.payload_at = self.parts.index(self.by_role["payload"])
+        self.least, self.most = whole_span(self.by_role["payload"].spec["size"])
+        self.overhead = sum(part.size for part in self.parts)
+        self.stuffing = _stuffing(frame.get("stuffing"))
+        length = self.by_role.get("length")
+        self.bias = sum(part.size for part in self.parts if length and part.name in length.spec["counts"])
+        #: No constant in front: a candidate begins where a known message and an allowed address stand.
+        self.bare = self.parts[0].role != "constant"
+        most, stuffing = self.most, self.stuffing
+        #: Most payload bytes on the wire, inserted ones included where the length counts them.
+        self.most_sent = most + most // len(stuffing.after) if stuffing and stuffing.payload_alone else most
+
+    @property
+    def unique(self) -> bool:
+        """The preamble cannot appear inside a frame, so a receiver hunts for it and never looks back."""
+        stuffing, length = self.stuffing, self.by_role.get("length")
+        if stuffing is None or stuffing.payload_alone or length is None or len(stuffing.after) != 1:
+            return False
+        first = self.parts[0]
+        lengths = range(self.bias + self.least, self.bias + self.most + 1)
+        return (
+            first.constant == stuffing.after * 2
+            and stuffing.insert != stuffing.after[0]
+            and stuffing.exempt == (first.name,)
+            and self.parts[1] is length
+            and length.size == 1
+            and stuffing.after[0] not in lengths
+        )
+
+    def stuffed(self, part: Part) -> bool:
+        """The finished frame is stuffed, and this part with it."""
+        return (
+            self.stuffing is not None
+            and not self.stuffing.payload_alone
+            and part.name not in self.stuffing.exempt
+        )
+
+    # Building
+
+    def seal(self, number: int, payload: bytes, address: int) -> bytes:
+        """The wire bytes around a payload, whatever it is."""
+        if self.stuffing and self.stuffing.payload_alone:
+            payload = self.stuffing.stuff(payload)
+        cut: dict[str, bytes] = {}
+        numbers = {"length": self.bias + len(payload), "message": number, "address": address}
+        for part in self.parts:
+            if part.role in numbers:
+                cut[part.name] = put(part.pieces, numbers[part.role])
+            else:
+                cut[part.name] = payload if part.role == "payload" else part.constant
+        if check := self.by_role.get("checksum"):
+            cut[check.name] = put(check.pieces, self.check_value(check, cut))
+        return self._stuffed(cut)
+
+    def _stuffed(self, cut: Mapping[str, bytes]) -> bytes:
+        wire, run = b"", b""
+        for part in self.parts:
+            if self.stuffed(part):
+                run += cut[part.name]
+                continue
+            wire += self._run(run) + cut[part.name]
+            run = b""
+        return wire + self._run(run)
+
+    def _run(self, data: bytes) -> bytes:
+        return self.stuffing.stuff(data) if self.stuffing and data else data
+
+    @staticmethod
+    def check_value(check: Part, cut: Mapping[str, bytes]) -> int:
+        """The check value over the parts that it covers."""
+        covered = b"".join(cut[name] for name in check.spec["over"])
+        return checks.compute(check.spec["algorithm"], covered)
+
+    def check_fails(self, cut: Mapping[str, bytes]) -> bool:
+        """The check value is wrong."""
+        check = self.by_role.get("checksum")
+        return check is not None and cut[check.name] != put(check.pieces, self.check_value(check, cut))
+
+    def bad_constant(self, cut: Mapping[str, bytes]) -> bool:
+        """A constant is not what it must be."""
+        return any(part.role == "constant" and cut[part.name] != part.constant for part in self.parts)
+
+    def number(self, role: str, cut: Mapping[str, bytes]) -> int | None:
+        """The integer of a part; None where the frame has none, or its bytes are not there yet."""
+        part = self.by_role.get(role)
+        return get(part.pieces, cut[part.name]) if part and part.name in cut else None
+
+
+def _stuffing(spec: Any) -> Stuffing | None:
+    if spec is None:
+        return None
+    exempt = tuple(spec.get("exempt", ()))
+    return Stuffing(octets(spec["after"]), octets(spec["insert"])[0], exempt, spec.get("checksum") == "after")
+
+
+class Cursor:
+    """Takes a frame's bytes from wire bytes, without what stuffing inserted, each as soon as it is there."""
+
+    def __init__(self, wire: bytes, frame: Frame) -> None:
+        """Begin in front."""
+        self._wire, self._frame = wire, frame
+        self._recent = b""
+        self.at = 0
+        #: What is inserted behind the byte taken last has still to come.
+        self.pending = False
+
+    def take(self, part: Part) -> int:
+        """The next byte of a part. Raises NeedMore or Refused."""
+        if self.pending:
+            assert self._frame.stuffing
+            if self._byte() != self._frame.stuffing.insert:
+                raise Refused("stuffing", self.at)
+            self.pending, self._recent = False, b""
+        byte = self._byte()
+        if self._frame.stuffed(part):
+            assert self._frame.stuffing
+            self._recent += bytes([byte])
+            self.pending = self._recent.endswith(self._frame.stuffing.after)
+        else:
+            self._recent = b""
+        return byte
+
+    def run(self, part: Part, size: int) -> bytes:
+        """The next bytes of a part; where nothing is stuffed, all of them at once."""
+        if self.pending or self._frame.stuffed(part):
+            return bytes(self.take(part) for _ in range(size))
+        if len(self._wire) < self.at + size:
+            raise NeedMore(self.at + size)
+        self.at += size
+        return self._wire[self.at - size : self.at]
+
+    def _byte(self) -> int:
+        if self.at == len(self._wire):
+            raise NeedMore
+        self.at += 1
+        return self._wire[self.at - 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A frame's parts, and what it takes on the wire."""
+
+    parts: Mapping[str, bytes]
+    size: int
+    pending: bool
+
+
+class Splitter:
+    """Cuts the frame out of the front of wire bytes."""
+
+    def __init__(self, frame: Frame, known: Mapping[int, Message]) -> None:
+        """`known` are the messages that can come, by their number."""
+        self._frame, self._known = frame, known
+
+    def split(self, wire: bytes) -> Cut:
+        """The frame that begins here. Raises NeedMore or Refused; every byte is judged as it comes."""
+        frame, cursor, cut = self._frame, Cursor(wire, self._frame), dict[str, bytes]()
+        for part in frame.parts[: frame.payload_at]:
+            self._take(part, cursor, cut)
+            self._judge(part, cursor, cut)
+        payload = frame.by_role["payload"]
+        cut[payload.name] = self._payload(payload, cursor, cut)
+        for part in frame.parts[frame.payload_at + 1 :]:
+            cut[part.name] = cursor.run(part, part.size)
+        if frame.bad_constant(cut):
+            raise Refused("")
+        return Cut(cut, cursor.at, cursor.pending)
+
+    def _take(self, part: Part, cursor: Cursor, cut: dict[str, bytes]) -> None:
+        data = b""
+        while len(data) < part.size:
+            data += bytes([cursor.take(part)])
+            if part.role == "constant" and not part.constant.startswith(data):
+                raise Refused("")
+        cut[part.name] = data
+
+    def _judge(self, part: Part, cursor: Cursor, cut: Mapping[str, bytes]) -> None:
+        frame = self._frame
+        if part.role == "length":
+            announced = (frame.number("length", cut) or 0) - frame.bias
+            if not frame.least <= announced <= frame.most_sent:
+                raise Refused("length", cursor.at)
+        if frame.bare and part.role in ("message", "address"):
+            number, address = frame.number("message", cut), frame.number("address", cut)
+            if number is None:
+                return
+            message = self._known.get(number)
+            if message is None or (address is not None and not message.allows(address)):
+                raise Refused("")
+
+    def _payload(self, part: Part, cursor: Cursor, cut: Mapping[str, bytes]) -> bytes:
+        frame = self._frame
+        announced = frame.number("length", cut)
+        if announced is not None:
+            return cursor.run(part, announced - frame.bias)
+        message = self._known.get(frame.number("message", cut) or 0)
+        if message is None:
+            raise Refused("unknown", cursor.at)
+        if frame.stuffing and frame.stuffing.payload_alone:
+            return _measured_stuffed(message, part, cursor, frame.stuffing)
+        return _measured(message, lambda size: cursor.run(part, size), cursor)
+
+
+def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) -> bytes:
+    """The bytes of a payload that tells by its counts where it ends."""
+    counted: dict[str, int] = {}
+    payload = b""
+    for slot in message.slots:
+        kind = slot.kind
+        size = kind.step * counted.get(slot.name, kind.most) if isinstance(kind, Run) else len(kind.pieces)
+        data = take(size)
+        payload += data
+        if slot.counts and slot.counts not in counted:
+            assert not isinstance(kind, Run)
+            try:
+                counted[slot.counts] = items_of(message, slot, get(kind.pieces, data))
+            except Wrong:
+                raise Refused("length", cursor.at) from None
+    return payload
+
+
+def _measured_stuffed(message: Message, part: Part, cursor: Cursor, stuffing: Stuffing) -> bytes:
+    """The same where the payload alone is stuffed: the inserted bytes are part of what is covered."""
+    sent, recent = bytearray(), bytearray()
+
+    def settle() -> None:
+        if recent.endswith(stuffing.after):
+            sent.append(cursor.take(part))
+            if sent[-1] != stuffing.insert:
+                raise Refused("stuffing", cursor.at)
+            recent.clear()
+
+    def take(size: int) -> bytes:
+        data = bytearray()
+        for _ in range(size):
+            settle()
+            data.append(cursor.take(part))
+            sent.append(data[-1])
+            recent.append(data[-1])
+        return bytes(data)
+
+    _measured(message, take, cursor)
+    settle()
+    return bytes(sent)

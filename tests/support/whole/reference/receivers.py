@@ -1,0 +1,306 @@
+"""What a receiver delivers for a stream, as docs/receiver.md has it: four machines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from tests.support.whole.reference import values
+from tests.support.whole.reference.document import Message
+from tests.support.whole.reference.frames import Frame, NeedMore, Refused, Splitter
+from tests.support.whole.reference.special import Marked, Packets
+from tests.support.whole.reference.values import Raw, Wrong
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A frame (`kind` is "message") or a fault; `at` is the byte with which it comes."""
+
+    kind: str
+    at: int
+    offset: int
+    raw: bytes
+    name: str = ""
+    address: int | None = None
+    values: Mapping[str, Raw] = field(default_factory=dict)
+
+
+class Receiver:
+    """What all machines share."""
+
+    def __init__(self, known: Mapping[int, Message]) -> None:
+        """`known` are the messages that can come, by their number."""
+        self.known = known
+        self.at = -1
+
+    def run(self, stream: bytes) -> list[Event]:
+        """The events of a whole stream; those at its end come at the number of its bytes."""
+        events: list[Event] = []
+        for byte in stream:
+            self.at += 1
+            events += self.take(byte)
+        self.at += 1
+        return [*events, *self.finish()]
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """Take one byte."""
+        raise NotImplementedError
+
+    def finish(self) -> Iterator[Event]:
+        """Nothing more follows."""
+        raise NotImplementedError
+
+    def carried(
+        self,
+        message: Message | None,
+        address: int | None,
+        payload: Callable[[], bytes],
+        offset: int,
+        raw: bytes,
+    ) -> Event:
+        """The message of an intact frame, or what is wrong with what it carries."""
+        if message is None:
+            return Event("unknown", self.at, offset, raw)
+        try:
+            found = values.decode(message, payload())
+            if address is not None and not message.allows(address):
+                raise Wrong("range")
+        except Wrong as wrong:
+            return Event(wrong.kind, self.at, offset, raw)
+        return Event("message", self.at, offset, raw, message.name, address, found)
+
+
+class Hunter(Receiver):
+    """The preamble is found nowhere else: each byte is looked at once."""
+
+    def __init__(self, frame: Frame, known: Mapping[int, Message]) -> None:
+        """Hunt."""
+        super().__init__(known)
+        assert frame.stuffing
+        self.frame = frame
+        self.mark, self.insert = frame.stuffing.after[0], frame.stuffing.insert
+        self.preamble = frame.parts[0].constant
+        self.marks, self.raw, self.body, self.escaped = 0, b"", b"", False
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """One step."""
+        if not self.raw:
+            yield from self._hunt(byte)
+        elif self.escaped:
+            yield from self._behind_mark(byte)
+        else:
+            yield from self._inside(byte)
+
+    def _hunt(self, byte: int) -> Iterator[Event]:
+        if byte == self.mark:
+            self.marks += 1
+            return
+        begun, self.marks = self.marks >= 2, 0
+        if begun:
+            self.raw, self.body = self.preamble, b""
+            if self.frame.least <= byte - self.frame.bias <= self.frame.most:
+                yield from self._inside(byte)
+            else:
+                yield self._fault("length", byte)
+
+    def _fault(self, kind: str, byte: int) -> Event:
+        raw, self.raw, self.escaped = self.raw + bytes([byte]), b"", False
+        return Event(kind, self.at, self.at + 1 - len(raw), raw)
+
+    def _behind_mark(self, byte: int) -> Iterator[Event]:
+        if byte == self.insert:
+            self.raw += bytes([byte])
+            self.escaped = False
+        elif byte == self.mark:
+            raw, self.raw, self.escaped, self.marks = self.raw[:-1], b"", False, 2
+            yield Event("truncated", self.at, self.at - 1 - len(raw), raw)
+        else:
+            yield self._fault("stuffing", byte)
+
+    def _inside(self, byte: int) -> Iterator[Event]:
+        self.raw += bytes([byte])
+        self.body += bytes([byte])
+        self.escaped = byte == self.mark
+        payload = self.body[0] - self.frame.bias
+        if len(self.preamble) + len(self.body) < self.frame.overhead + payload:
+            return
+        raw, offset = self.raw, self.at + 1 - len(self.raw)
+        self.raw, self.escaped, self.marks = b"", False, int(byte == self.mark)
+        yield self._complete(self._parts(payload), offset, raw)
+
+    def _parts(self, payload: int) -> Mapping[str, bytes]:
+        data, cut = self.preamble + self.body, dict[str, bytes]()
+        for part in self.frame.parts:
+            size = payload if part.role == "payload" else part.size
+            cut[part.name], data = data[:size], data[size:]
+        return cut
+
+    def _complete(self, cut: Mapping[str, bytes], offset: int, raw: bytes) -> Event:
+        if self.frame.bad_constant(cut):
+            return Event("frame", self.at, offset, raw)
+        if self.frame.check_fails(cut):
+            return Event("crc", self.at, offset, raw)
+        payload = cut[self.frame.by_role["payload"].name]
+        message = self.known.get(self.frame.number("message", cut) or 0)
+        return self.carried(message, self.frame.number("address", cut), lambda: payload, offset, raw)
+
+    def finish(self) -> Iterator[Event]:
+        """An unfinished frame is truncated."""
+        raw = self.raw or (self.preamble if self.marks >= 2 else b"")
+        if raw:
+            yield Event("truncated", self.at, self.at - len(raw), raw)
+
+
+class Searcher(Receiver):
+    """Bytes are kept until a frame has proven right; else the search goes on from the next one."""
+
+    def __init__(self, frame: Frame, known: Mapping[int, Message]) -> None:
+        """An empty buffer."""
+        super().__init__(known)
+        self.frame, self.splitter = frame, Splitter(frame, known)
+        self.buffer, self.start, self.skipped = b"", 0, b""
+        self.swallow, self.ended = False, False
+        self.needed, self.swallowed = 0, 0
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """Everything that the bytes so far tell."""
+        self.buffer += bytes([byte])
+        if len(self.buffer) >= self.needed:
+            yield from self._scan()
+
+    def finish(self) -> Iterator[Event]:
+        """Give up the frame that is not complete; look for others in its bytes."""
+        self.ended = True
+        if self.buffer and not self.frame.bare:
+            yield Event("truncated", self.at, self.start, self.buffer)
+            self._advance(1)
+        yield from self._scan()
+        yield from self._report()
+
+    def _scan(self) -> Iterator[Event]:
+        while self.buffer:
+            if self.swallow:
+                self.swallow = False
+                if self.frame.stuffing and self.buffer[0] == self.frame.stuffing.insert:
+                    self._advance(1)
+                    self.swallowed += 1
+                    continue
+            try:
+                event, size, self.swallow = self._attempt()
+            except NeedMore as more:
+                if not self.ended:
+                    self.needed = more.size
+                    return
+                yield from self._drop(Refused(""))
+            except Refused as refused:
+                yield from self._drop(refused)
+            else:
+                yield from self._report()
+                yield event
+                self._advance(size)
+
+    def _advance(self, size: int) -> None:
+        self.buffer, self.start, self.needed = self.buffer[size:], self.start + size, 0
+
+    def _drop(self, refused: Refused) -> Iterator[Event]:
+        if self.frame.bare:
+            self.skipped += self.buffer[:1]
+        elif refused.kind:
+            yield Event(refused.kind, self.at, self.start, self.buffer[: refused.size])
+        self._advance(1)
+        if len(self.skipped) == self.frame.overhead + self.frame.most_sent:
+            yield from self._report()
+
+    def _report(self) -> Iterator[Event]:
+        """The bytes skipped in a row, as one fault."""
+        if self.skipped:
+            yield Event("frame", self.at, self.start - len(self.skipped), self.skipped)
+        self.skipped = b""
+
+    def _attempt(self) -> tuple[Event, int, bool]:
+        cut = self.splitter.split(self.buffer)
+        raw, stuffing = self.buffer[: cut.size], self.frame.stuffing
+        payload = cut.parts[self.frame.by_role["payload"].name]
+        if stuffing and stuffing.payload_alone:
+            try:
+                payload = stuffing.unstuff(payload)
+            except Wrong:
+                raise Refused("stuffing", cut.size) from None
+        if self.frame.check_fails(cut.parts):
+            raise Refused("crc", cut.size)
+        message = self.known.get(self.frame.number("message", cut.parts) or 0)
+        address = self.frame.number("address", cut.parts)
+        event = self.carried(message, address, lambda: payload, self.start, raw)
+        if event.kind != "message" and "checksum" not in self.frame.by_role:
+            # Nothing has proven that this is a frame at all, so what follows its first byte may hold one.
+            raise Refused(event.kind, cut.size)
+        return event, cut.size, cut.pending
+
+
+class MarkedReceiver(Receiver):
+    """Header and end carry a bit that nothing between them has."""
+
+    def __init__(self, frame: Marked, known: Mapping[int, Message]) -> None:
+        """Idle."""
+        super().__init__(known)
+        self.frame = frame
+        self.raw, self.lost = b"", False
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """One step."""
+        marked = bool(byte & self.frame.marker)
+        if marked and not self.frame.is_end(byte):
+            if self.raw:
+                yield Event("frame", self.at, self.at - len(self.raw), self.raw)
+            self.raw, self.lost = bytes([byte]), False
+        elif self.raw:
+            yield from self._inside(byte, ended=marked)
+        elif not self.lost:
+            self.lost = True
+            yield Event("frame", self.at, self.at, bytes([byte]))
+
+    def _inside(self, byte: int, *, ended: bool) -> Iterator[Event]:
+        raw = self.raw + bytes([byte])
+        self.raw = b"" if ended else raw
+        if not ended and len(raw) - 1 <= self.frame.most + self.frame.check_size:
+            return
+        offset = self.at + 1 - len(raw)
+        if not ended:
+            self.raw, self.lost = b"", True
+            yield Event("frame", self.at, offset, raw)
+            return
+        try:
+            message, address, payload = self.frame.opened(raw, self.known)
+        except Wrong as wrong:
+            yield Event(wrong.kind, self.at, offset, raw)
+        else:
+            yield self.carried(message, address, lambda: payload, offset, raw)
+
+    def finish(self) -> Iterator[Event]:
+        """An unfinished message is truncated."""
+        if self.raw:
+            yield Event("truncated", self.at, self.at - len(self.raw), self.raw)
+
+
+class PacketReceiver(Receiver):
+    """The first byte says how many follow. Requests alone."""
+
+    def __init__(self, frame: Packets, known: Mapping[int, Message]) -> None:
+        """Between packets."""
+        super().__init__(known)
+        self.frame = frame
+        self.raw = b""
+
+    def take(self, byte: int) -> Iterator[Event]:
+        """One step."""
+        self.raw += bytes([byte])
+        message = self.known.get(self.raw[0])
+        size = self.frame.size(message) if message else 0
+        if message is None or len(self.raw) == 1 + size:
+            raw, self.raw = self.raw, b""
+            yield self.carried(message, None, lambda: raw[1:], self.at + 1 - len(raw), raw)
+
+    def finish(self) -> Iterator[Event]:
+        """An unfinished packet is truncated."""
+        if self.raw:
+            yield Event("truncated", self.at, self.at - len(self.raw), self.raw)

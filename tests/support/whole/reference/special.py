@@ -1,0 +1,103 @@
+"""Marked frames, and packets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tests.support.whole.reference import checks, values
+from tests.support.whole.reference.document import Doc, Message, whole_span
+from tests.support.whole.reference.frames import part_of
+from tests.support.whole.reference.values import Wrong, put
+
+
+class Marked:
+    """Header and end carry a marker bit."""
+
+    def __init__(self, document: Doc) -> None:
+        """Read the header's bits."""
+        spec, order = document["frame"]["marked"], document.get("byteorder", "big")
+        self.marker: int = spec["marker"]
+        self._address, self._message = (whole_span(spec["header"][key]) for key in ("address", "message"))
+        self._end: int = spec["end"]
+        self.most = whole_span(spec["payload"])[1]
+        self._check = part_of("checksum", spec["checksum"], order) if "checksum" in spec else None
+        self.check_size = self._check.size if self._check else 0
+
+    def _bits(self, byte: int, where: tuple[int, int]) -> int:
+        return byte >> where[0] & (1 << where[1] + 1 - where[0]) - 1
+
+    def is_end(self, byte: int) -> bool:
+        """The id bits are those of an end."""
+        return self._bits(byte, self._message) == self._end
+
+    def seal(self, message: Message, payload: bytes, address: int) -> bytes:
+        """The wire bytes around a payload."""
+        place = self.marker | address << self._address[0]
+        first, last = place | message.number << self._message[0], place | self._end << self._message[0]
+        return bytes([first]) + payload + self._value(message, payload) + bytes([last])
+
+    def _value(self, message: Message, payload: bytes) -> bytes:
+        if self._check is None or not message.checked:
+            return b""
+        covered = payload if "payload" in self._check.spec["over"] else b""
+        return put(self._check.pieces, checks.compute(self._check.spec["algorithm"], covered))
+
+    def opened(self, raw: bytes, known: Mapping[int, Message]) -> tuple[Message, int, bytes]:
+        """Message, address and payload. Raises Wrong."""
+        if len(raw) < 2 or not (raw[0] & raw[-1] & self.marker) or not self.is_end(raw[-1]):
+            raise Wrong("frame")
+        message, address = known.get(self._bits(raw[0], self._message)), self._bits(raw[0], self._address)
+        if message is None or address == 0 or self._bits(raw[-1], self._address) != address:
+            raise Wrong("frame")
+        size = self.check_size if message.checked else 0
+        payload, sent = raw[1 : len(raw) - 1 - size], raw[max(1, len(raw) - 1 - size) : -1]
+        if len(sent) < size or any(byte & self.marker for byte in raw[1:-1]):
+            raise Wrong("frame")
+        try:
+            values.decode(message, payload)
+        except Wrong as wrong:
+            if wrong.kind == "length":
+                raise Wrong("frame") from None
+        if sent != self._value(message, payload):
+            raise Wrong("crc")
+        return message, address, payload
+
+
+class Packets:
+    """No frame at all."""
+
+    def __init__(self, document: Doc) -> None:
+        """Read the sum."""
+        parts = document["frame"]["packet"]
+        order = document.get("byteorder", "big")
+        found = [part_of(name, spec, order) for name, spec in parts.items() if spec["role"] == "checksum"]
+        self._check = found[0] if found else None
+
+    def size(self, message: Message) -> int:
+        """Payload bytes, always the same."""
+        return sum(slot.most_bytes for slot in message.slots)
+
+    def seal(self, message: Message, payload: bytes, request: bytes) -> bytes:
+        """A request, or a response to one."""
+        if message.direction == "request":
+            return bytes([message.number]) + payload
+        return payload + self._value(request, payload)
+
+    def _value(self, request: bytes, payload: bytes) -> bytes:
+        if self._check is None:
+            return b""
+        words, word = request[1:] + payload, self._check.spec.get("words", 1)
+        units = [int.from_bytes(words[at : at + word], "big") for at in range(0, len(words), word)]
+        return put(self._check.pieces, checks.compute(self._check.spec["algorithm"], [request[0], *units]))
+
+    def opened(self, message: Message, wire: bytes, request: bytes) -> bytes:
+        """The payload of a response. Raises Wrong."""
+        size = self._check.size if self._check else 0
+        payload, sent = wire[: len(wire) - size], wire[len(wire) - size :]
+        if len(wire) != self.size(message) + size:
+            raise Wrong("length")
+        if sent != self._value(request, payload):
+            rejected = self._check.spec.get("rejected") if self._check else None
+            refused = self._check and rejected is not None and sent == put(self._check.pieces, rejected)
+            raise Wrong("illegal" if refused else "crc")
+        return payload

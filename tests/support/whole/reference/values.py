@@ -1,0 +1,205 @@
+"""Values to payload bytes, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from tests.support.whole.reference.document import Kind, Message, Number, Packed, Run, Slot
+
+#: A value as the integers on the wire: a number, a list of numbers, or bytes.
+Raw = int | list[int] | bytes
+
+
+class Wrong(Exception):
+    """Bytes or values that are refused: the kind of fault."""
+
+    def __init__(self, kind: str, about: str = "") -> None:
+        """`about` is for people."""
+        super().__init__(f"{kind} {about}".strip())
+        self.kind = kind
+
+
+def put(pieces: Sequence[tuple[int, int]], raw: int) -> bytes:
+    """The wire bytes of an integer."""
+    return bytes(raw >> shift & (1 << bits) - 1 for shift, bits in pieces)
+
+
+def get(pieces: Sequence[tuple[int, int]], data: bytes) -> int:
+    """The unsigned integer of wire bytes."""
+    return sum((byte & (1 << bits) - 1) << shift for (shift, bits), byte in zip(pieces, data, strict=True))
+
+
+def stray(pieces: Sequence[tuple[int, int]], data: bytes) -> bool:
+    """A byte has bits that carry nothing."""
+    return any(byte >> bits for (_, bits), byte in zip(pieces, data, strict=True))
+
+
+def check(number: Number, raw: int) -> None:
+    """Refuse what a number cannot be."""
+    if not number.low <= raw <= number.high or raw & number.forbidden:
+        raise Wrong("range", str(raw))
+
+
+def default(kind: Number | Run) -> Raw:
+    """The value of a field that is not given."""
+    if isinstance(kind, Number):
+        return kind.default
+    return list(kind.default) if kind.item else bytes(kind.default)
+
+
+def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
+    """The payload of a message."""
+    return b"".join(_encoded(message, slot, values) for slot in message.slots)
+
+
+def _encoded(message: Message, slot: Slot, values: Mapping[str, Raw]) -> bytes:
+    kind = slot.kind
+    if isinstance(kind, Packed):
+        raw = 0
+        for name, shift, number in kind.members:
+            raw |= (_number(number, values[name]) & (1 << number.bits) - 1) << shift
+        return put(kind.pieces, raw)
+    if isinstance(kind, Run):
+        return _encoded_run(kind, values[slot.name])
+    if slot.role == "count":
+        counted = next(each.kind for each in message.slots if each.name == slot.counts)
+        given = values[slot.counts]
+        assert isinstance(counted, Run)
+        assert not isinstance(given, int)
+        return put(kind.pieces, len(given) * (counted.step if slot.counts_in == "bytes" else 1))
+    return put(kind.pieces, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
+
+
+def _number(number: Number, raw: Raw) -> int:
+    assert isinstance(raw, int)
+    check(number, raw)
+    return raw
+
+
+def _encoded_run(kind: Run, given: Raw) -> bytes:
+    assert not isinstance(given, int)
+    if not kind.low <= len(given) <= kind.most:
+        raise Wrong("range", f"{len(given)} items")
+    if kind.item:
+        return b"".join(put(kind.item.pieces, _number(kind.item, each)) for each in given)
+    if kind.text and any(each > 0x7F for each in given):
+        raise Wrong("range", "text")
+    return bytes(given)
+
+
+def decode(message: Message, payload: bytes) -> dict[str, Raw]:
+    """The values of a payload. Raises Wrong: a length that does not fit before a value out of range."""
+    if not payload and message.empty_is_default:
+        return {name: default(kind) for name, kind in message.values()}
+    values: dict[str, Raw] = {}
+    for slot, data in _cut(message, payload):
+        values |= _decoded(slot, data)
+    return values
+
+
+def _decoded(slot: Slot, data: bytes) -> dict[str, Raw]:
+    kind = slot.kind
+    if isinstance(kind, Run):
+        return {slot.name: _decoded_run(kind, data)}
+    if slot.role == "reserved":
+        return {}
+    if stray(kind.pieces, data):
+        raise Wrong("range", slot.name)
+    if isinstance(kind, Packed):
+        whole = get(kind.pieces, data)
+        return {name: _checked(number, whole >> shift) for name, shift, number in kind.members}
+    raw = _signed(kind, get(kind.pieces, data))
+    if slot.role == "count":
+        return {}
+    check(kind, raw)
+    if slot.role == "constant":
+        if raw != kind.default:
+            raise Wrong("range", slot.name)
+        return {}
+    return {slot.name: raw}
+
+
+def _signed(number: Number, raw: int) -> int:
+    raw &= (1 << number.bits) - 1
+    return raw - (1 << number.bits) if number.signed and raw >> number.bits - 1 else raw
+
+
+def _checked(number: Number, raw: int) -> int:
+    raw = _signed(number, raw)
+    check(number, raw)
+    return raw
+
+
+def _decoded_run(kind: Run, data: bytes) -> Raw:
+    if kind.item is None:
+        if kind.text and any(each > 0x7F for each in data):
+            raise Wrong("range", "text")
+        return data
+    items = []
+    for at in range(0, len(data), kind.step):
+        piece = data[at : at + kind.step]
+        if stray(kind.item.pieces, piece):
+            raise Wrong("range", "item")
+        items.append(_checked(kind.item, get(kind.item.pieces, piece)))
+    return items
+
+
+def _cut(message: Message, payload: bytes) -> list[tuple[Slot, bytes]]:
+    """The bytes of each field."""
+    cut: list[tuple[Slot, bytes]] = []
+    counted: dict[str, int] = {}
+    at = 0
+    for index, slot in enumerate(message.slots):
+        size = _size(slot, counted)
+        if size is None:
+            size = len(payload) - at - _behind(message.slots[index + 1 :], counted)
+            _demand(slot.kind, size)
+        data = payload[at : at + size]
+        if len(data) < size or size < 0:
+            raise Wrong("length", slot.name)
+        if slot.counts:
+            _note(message, slot, data, counted)
+        cut.append((slot, data))
+        at += size
+    if at != len(payload):
+        raise Wrong("length", "bytes are left")
+    return cut
+
+
+def _size(slot: Slot, counted: Mapping[str, int]) -> int | None:
+    kind = slot.kind
+    if not isinstance(kind, Run):
+        return len(kind.pieces)
+    if slot.name in counted:
+        return counted[slot.name] * kind.step
+    return kind.most * kind.step if slot.fixed else None
+
+
+def _behind(slots: Sequence[Slot], counted: Mapping[str, int]) -> int:
+    """Bytes that follow a field of no size of its own."""
+    sizes = [_size(slot, counted) for slot in slots]
+    return sum(size for size in sizes if size is not None)
+
+
+def _demand(kind: Kind, size: int) -> None:
+    assert isinstance(kind, Run)
+    if size < 0 or size % kind.step or not kind.low <= size // kind.step <= kind.most:
+        raise Wrong("length", "the rest")
+
+
+def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) -> None:
+    """Learn a count; a second one has to say the same."""
+    assert isinstance(slot.kind, Number)
+    items = items_of(message, slot, get(slot.kind.pieces, data))
+    if counted.setdefault(slot.counts, items) != items:
+        raise Wrong("length", "counts differ")
+
+
+def items_of(message: Message, slot: Slot, raw: int) -> int:
+    """The items that a count announces. Raises Wrong where the field cannot have so many."""
+    kind = next(each.kind for each in message.slots if each.name == slot.counts)
+    assert isinstance(kind, Run)
+    unit = kind.step if slot.counts_in == "bytes" else 1
+    if raw % unit or not kind.low <= raw // unit <= kind.most:
+        raise Wrong("length", f"count {raw}")
+    return raw // unit

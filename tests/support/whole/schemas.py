@@ -1,0 +1,244 @@
+"""Whole random schemas: the same text for the same seed."""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from tests.support.whole import frames, words
+from tests.support.whole.fields import FieldMaker, Room
+from tests.support.whole.frames import Shape
+
+Doc = dict[str, Any]
+_PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
+_YAML_WORDS = frozenset("true false null yes no on off y n nan inf".split())  # noqa: SIM905
+#: Mappings that lie deeper than this are written on one line.
+_BLOCKS = 4
+
+
+def generate(seed: int, *, hostile: bool = False) -> str:
+    """The text of a schema; `hostile` names and texts are those of `words` that break careless generators."""
+    return dump(_Maker(seed, hostile=hostile).make())
+
+
+@dataclass
+class Words:
+    """Draws names and texts."""
+
+    rng: random.Random
+    hostile: bool
+
+    def name(self, taken: set[str]) -> str:
+        """A name that nothing in a scope has yet, nor the count that belongs to something there."""
+        while True:
+            odd = self.hostile and self.rng.random() < 0.35
+            name = self.rng.choice(words.HOSTILE if odd else words.NAMES)
+            if self.rng.random() < 0.3:
+                name += f"_{self.rng.randrange(10)}"
+            names = {name, f"{name}_count", f"{name}_size"}
+            if not names & taken:
+                taken |= names
+                return name
+
+    def text(self) -> str:
+        """A description."""
+        return self.rng.choice(
+            words.HOSTILE_TEXTS if self.hostile and self.rng.random() < 0.5 else words.TEXTS
+        )
+
+    def unit(self) -> str:
+        """A unit."""
+        return self.rng.choice(
+            words.HOSTILE_UNITS if self.hostile and self.rng.random() < 0.5 else words.UNITS
+        )
+
+
+@dataclass
+class _Maker:
+    seed: int
+    hostile: bool
+    _ids: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.rng = random.Random(f"whole schema {self.seed}")
+        self.words = Words(self.rng, self.hostile)
+
+    def make(self) -> Doc:
+        rng = self.rng
+        shape = frames.choose(rng, self.words)
+        protocols = words.HOSTILE_PROTOCOLS if self.hostile and rng.random() < 0.3 else words.PROTOCOLS
+        document: Doc = {
+            "qlinkgen": 1,
+            "protocol": {
+                "name": rng.choice(protocols),
+                "title": self.words.text(),
+                "revision": "1",
+                "source": self.words.text(),
+                "doc": self.words.text(),
+            },
+            "byteorder": rng.choice(("big", "little")),
+        }
+        if shape.groups:
+            document["groups"] = shape.groups
+        maker = FieldMaker(rng, self.words, shape)
+        document |= maker.types()
+        document["frame"] = shape.frame
+        document["bus"] = self._bus(shape)
+        document |= self._traffic(shape, maker, document["bus"])
+        maker.forget_unused(document)
+        return document
+
+    def _bus(self, shape: Shape) -> Doc:
+        rng = self.rng
+        bus: Doc = {"kind": shape.bus}
+        if shape.address_bits:
+            bus |= self._addresses(shape)
+        if rng.random() < 0.5:
+            bus["baud"] = rng.choice((9600, 19200, 115200))
+        if rng.random() < 0.3:
+            bus["bits_per_byte"] = 11
+        if rng.random() < 0.7:
+            bus["response_within"] = rng.choice(("3 bytes", "260 us", "10 ms", "1 s"))
+        return bus
+
+    def _addresses(self, shape: Shape) -> Doc:
+        rng, top = self.rng, (1 << shape.address_bits) - 1
+        least = 1 if shape.kind == "marked" else 0
+        ranges = ((1, 8), (0, top), (1, top - 1), (0, 3), (top, top), (top // 2, top - 1))
+        first, last = (min(max(end, least), top) for end in rng.choice(ranges))
+        bus: Doc = {"nodes": f"{first}..{last}"}
+        free = [each for each in (0, top, last + 1) if not first <= each <= last and least <= each <= top]
+        if free and rng.random() < 0.7:
+            bus["broadcast"] = rng.choice(free)
+        return bus
+
+    def _traffic(self, shape: Shape, maker: FieldMaker, bus: Doc) -> Doc:
+        rng = self.rng
+        kinds = rng.choices(("both", "commands", "messages", "undirected"), (5, 3, 1, 1))[0]
+        if shape.kind == "packet":
+            kinds = rng.choice(("both", "commands"))
+        found: Doc = {}
+        taken: set[str] = set(maker.taken)
+        if rng.random() < 0.3:
+            found["attributes"] = {"level": {"doc": self.words.text(), "values": ["user", "service"]}}
+        found["commands"] = {}
+        free = (1 << shape.id_bits) - (shape.end_id >= 0)
+        if kinds in ("both", "commands"):
+            for _ in range(rng.randint(1, min(4, free - 1))):
+                name = self.words.name(taken)
+                found["commands"][name] = self._command(shape, maker, bus, attributes="attributes" in found)
+        found["messages"] = {}
+        if kinds != "commands":
+            for _ in range(rng.randint(1, min(3, free - len(found["commands"])))):
+                found["messages"][self.words.name(taken)] = self._message(shape, maker, kinds)
+        if shape.only:
+            names = [*found["commands"], *found["messages"]]
+            shape.frame["marked"]["checksum"]["only"] = rng.sample(names, rng.randint(1, len(names)))
+        return {key: value for key, value in found.items() if value or key == "commands"}
+
+    def _command(self, shape: Shape, maker: FieldMaker, bus: Doc, *, attributes: bool) -> Doc:
+        rng = self.rng
+        command: Doc = {"id": self._id(shape)}
+        addressing = "node"
+        if shape.address_bits:
+            most = (
+                ("node", "node", "broadcast", "either", "answered_broadcast")
+                if "broadcast" in bus
+                else ("node",)
+            )
+            addressing = command["addressing"] = rng.choice(most)
+        silent = addressing == "broadcast" or (addressing != "answered_broadcast" and rng.random() < 0.2)
+        request = maker.fields(Room.of(shape))
+        response = "none" if silent else self._response(shape, maker, request)
+        command |= {"request": request, "response": response, "repeat": rng.choice(("safe", "unsafe"))}
+        counters = [name for name, spec in request.items() if spec in ("u8", "u16")]
+        if counters and rng.random() < 0.4:
+            command["repeat"] = {"counter": rng.choice(counters)}
+        if shape.has_length and request and not shape.least and rng.random() < 0.15:
+            command["empty_request"] = "defaults"
+        if rng.random() < 0.2:
+            command["in_flight"] = rng.randint(1, 3)
+        if attributes:
+            command["attributes"] = {"level": rng.choice(("user", "service"))}
+        if rng.random() < 0.3:
+            command["response_within"] = "20 ms"
+        return self._described(command)
+
+    def _response(self, shape: Shape, maker: FieldMaker, request: Doc) -> Doc:
+        echoes: Doc = {}
+        plain = [
+            name for name, spec in request.items() if isinstance(spec, str) and re.fullmatch(r"[ui]\d+", spec)
+        ]
+        if plain and shape.kind != "packet" and self.rng.random() < 0.3:
+            name = self.rng.choice(plain)
+            echoes[name] = {"type": request[name], "echo": True}
+        return maker.fields(Room.of(shape), echoes)
+
+    def _message(self, shape: Shape, maker: FieldMaker, kinds: str) -> Doc:
+        message: Doc = {"id": self._id(shape)}
+        direction = "request" if shape.kind == "packet" else self.rng.choice(("request", "response", None))
+        if direction and kinds != "undirected":
+            message["direction"] = direction
+        return self._described(message | {"fields": maker.fields(Room.of(shape))})
+
+    def _described(self, spec: Doc) -> Doc:
+        if self.rng.random() < 0.6:
+            spec["doc"] = self.words.text()
+        if self.rng.random() < 0.4:
+            spec["section"] = "user's guide" if self.hostile else "7.10"
+        return spec
+
+    def _id(self, shape: Shape) -> int:
+        """A number that nothing else has; the stuffed byte and the bounds come often."""
+        top = (1 << shape.id_bits) - 1
+        while True:
+            likely = (
+                0,
+                top,
+                shape.mark,
+                top // 2 + 1,
+                self.rng.randint(0, top),
+                self.rng.randint(0, min(top, 40)),
+            )
+            number = self.rng.choice([each for each in likely if each <= top])
+            if number not in self._ids and number != shape.end_id:
+                self._ids.add(number)
+                return number
+
+
+# YAML
+
+
+def dump(document: Doc) -> str:
+    """A schema as YAML that people can read; everything that YAML could take for something else is quoted."""
+    return "\n".join(_lines(document, 0)) + "\n"
+
+
+def _lines(mapping: Doc, depth: int) -> Iterable[str]:
+    for key, value in mapping.items():
+        front = f"{'  ' * depth}{_flow(key)}:"
+        if isinstance(value, dict) and value and depth < _BLOCKS:
+            yield front
+            yield from _lines(value, depth + 1)
+        else:
+            yield f"{front} {_flow(value)}"
+
+
+def _flow(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_flow(key)}: {_flow(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return value if _PLAIN.match(value) and value not in _YAML_WORDS else _quoted(value)
+    return str(value)
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'

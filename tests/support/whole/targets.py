@@ -1,0 +1,280 @@
+"""The outputs of one schema behind one face: values go in and come out as integers of the wire."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import types
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Context, Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from construct import ConstructError
+
+from qlinkgen.backends import construct, python
+from qlinkgen.backends.base import Options
+from qlinkgen.model.protocol import Protocol
+from tests.support.cdriver import Driver
+from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
+from tests.support.whole.reference.document import Message, Number, Run
+from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.values import decode as decode_payload
+
+_EXACT = Context(prec=200)
+
+
+@dataclass(frozen=True)
+class Heard:
+    """An event as every receiver can tell it; `place` is left out by those that do not know it."""
+
+    at: int
+    kind: str
+    name: str = ""
+    address: int | None = None
+    values: str = ""
+    place: tuple[int, str] | None = None
+
+    @classmethod
+    def of(cls, event: Event) -> Heard:
+        """An event of the reference."""
+        shown = str(dict(event.values)) if event.kind == "message" else ""
+        place = (event.offset, event.raw.hex()) if event.kind != "message" else None
+        return cls(event.at, event.kind, event.name, event.address, shown, place)
+
+
+class Target:
+    """One output."""
+
+    name = ""
+
+    def __init__(self, reference: Reference) -> None:
+        """`reference` knows the shape of every message."""
+        self.reference = reference
+
+    def encode(
+        self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
+    ) -> tuple[bytes, bytes]:
+        """Payload and wire bytes. Raises Wrong where the output refuses, and nothing else."""
+        raise NotImplementedError
+
+    def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
+        """What a frame says. Raises Wrong where the output refuses, and nothing else."""
+        raise NotImplementedError
+
+    def natives(self, message: Message, given: Mapping[str, Raw]) -> dict[str, Any]:
+        """Values as a caller in Python has them."""
+        return {name: native(kind, given[name]) for name, kind in message.values()}
+
+    def raws(self, message: Message, found: Callable[[str], Any]) -> dict[str, Raw]:
+        """Values as integers, out of what a caller in Python gets."""
+        return {name: raw_of(kind, found(name)) for name, kind in message.values()}
+
+
+def native(kind: Number | Run, raw: Raw) -> Any:
+    """An int, bool, float or Decimal in the unit; bytes, text, a list."""
+    if isinstance(kind, Run):
+        return bytes(raw).decode("ascii") if kind.text else raw
+    assert isinstance(raw, int)
+    exact = kind.native(raw)
+    if kind.scale is None or not isinstance(exact, Fraction):
+        return exact
+    if kind.scale.denominator == kind.offset.denominator == 1:
+        return int(exact)
+    return (
+        float(exact)
+        if kind.bits <= 53
+        else _EXACT.divide(Decimal(exact.numerator), Decimal(exact.denominator))
+    )
+
+
+def raw_of(kind: Number | Run, found: Any) -> Raw:
+    """The integer that a value stands for; a value that no integer has is its own, telling, text."""
+    if isinstance(kind, Run):
+        return list(found) if kind.item else found.encode("ascii") if kind.text else bytes(found)
+    if kind.scale is None:
+        return int(found) if isinstance(found, bool) == kind.truth else f"{found!r} of a wrong type"  # type: ignore[return-value]
+    raw = round((Fraction(found) - kind.offset) / kind.scale)
+    return raw if found == native(kind, raw) else f"{found!r} is not exact"  # type: ignore[return-value]
+
+
+class PythonTarget(Target):
+    """The generated module."""
+
+    name = "python"
+
+    def __init__(self, reference: Reference, protocol: Protocol) -> None:
+        """Compile the module in memory."""
+        super().__init__(reference)
+        self.module: Any = python.load(protocol)
+
+    def encode(
+        self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
+    ) -> tuple[bytes, bytes]:
+        """See Target."""
+        place = {self.reference.address_name: address} if self.reference.address_name else {}
+        try:
+            made = self.module.MESSAGES[message.name](**self.natives(message, given), **place)
+            return made.to_bytes(), made.to_frame(*self._context(request))
+        except self.module.EncodeError as error:
+            raise Wrong("encode", str(error)) from None
+
+    def _context(self, request: bytes) -> Sequence[Any]:
+        return (self.module.decode_request(request),) if request else ()
+
+    def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
+        """See Target."""
+        direction = self.reference.hears(message)
+        function = getattr(self.module, "decode" if direction == "message" else f"decode_{direction}")
+        try:
+            return self._seen(function(wire, *self._context(request)))
+        except self.module.DecodeError as error:
+            raise Wrong(error.kind, str(error)) from None
+
+    def _seen(self, found: Any) -> Seen:
+        name = self.reference.address_name
+        values = self.raws(self.reference.by_name[found.NAME], lambda each: getattr(found, each))
+        return Seen(found.NAME, getattr(found, name) if name else None, values)
+
+    def events(self, direction: str, pieces: Sequence[bytes]) -> list[list[Heard]]:
+        """The events of each piece, then those at the end; `at` is the last byte of the piece."""
+        decoder = self.module.StreamDecoder(*(() if direction == "message" else (direction,)))
+        found, end = [], 0
+        for piece in pieces:
+            end += len(piece)
+            found.append([self._heard(event, end - 1) for event in decoder.feed(piece)])
+        return [*found, [self._heard(event, end) for event in decoder.finish()]]
+
+    def _heard(self, event: Any, at: int) -> Heard:
+        if hasattr(event, "NAME"):
+            seen = self._seen(event)
+            return Heard(at, "message", seen.name, seen.address, str(dict(seen.values)))
+        return Heard(at, event.kind, place=(event.offset, event.raw.hex()))
+
+
+class ConstructTarget(Target):
+    """Construct structures, live or as printed."""
+
+    def __init__(self, reference: Reference, name: str, live: construct.Live) -> None:
+        """`name` tells the two apart."""
+        super().__init__(reference)
+        self.name = name
+        self._live = live
+
+    def encode(
+        self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
+    ) -> tuple[bytes, bytes]:
+        """See Target."""
+        natives = self.natives(message, given)
+        whole: dict[str, Any] = {"message": message.name, "fields": natives}
+        if self.reference.address_name:
+            whole[self.reference.address_name] = address
+        try:
+            frame = self._live.frames[self.reference.hears(message)]
+            return self._live.payload(message.name, natives), frame.build(whole, request=request)
+        except ConstructError as error:
+            raise Wrong("encode", str(error)) from None
+
+    def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
+        """See Target."""
+        try:
+            found = self._live.parse(self.reference.hears(message), wire, request)
+        except ConstructError as error:
+            raise Wrong(getattr(error, "kind", ""), str(error)) from None
+        fields = found["fields"]
+        values = self.raws(self.reference.by_name[found["message"]], lambda each: fields[each])
+        name = self.reference.address_name
+        return Seen(found["message"], found[name] if name else None, values)
+
+
+def printed(protocol: Protocol, folder: Path) -> construct.Live:
+    """The structures of the printed module, imported from a package as a user would."""
+    package = folder / f"construct_of_{protocol.name}"
+    package.mkdir()
+    for path, text in {**construct.shared(), **construct.generate(protocol, Options())}.items():
+        (package / Path(path).name).write_text(text, "utf-8")
+    return construct.Live(vars(_imported(package, protocol.name)))
+
+
+def _imported(package: Path, name: str) -> types.ModuleType:
+    sys.path.insert(0, str(package.parent))
+    importlib.invalidate_caches()
+    try:
+        return importlib.import_module(f"{package.name}.{name}")
+    finally:
+        sys.path.remove(str(package.parent))
+        for each in [each for each in sys.modules if each.split(".")[0] == package.name]:
+            del sys.modules[each]
+
+
+class CTarget(Target):
+    """A compiled header, asked through the program that speaks for it."""
+
+    name = "c"
+
+    def __init__(self, reference: Reference, driver: Driver) -> None:
+        """`driver` is running."""
+        super().__init__(reference)
+        self._driver = driver
+        frame = reference.frame
+        #: Receivers that look back are told of the end of the stream, others have nothing to say then.
+        self.finishes = isinstance(frame, Frame) and not frame.unique
+
+    def encode(
+        self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
+    ) -> tuple[bytes, bytes]:
+        """See Target."""
+        place: object = request.hex() if request else address if self.reference.address_name else "-"
+        payload, wire = self._ask(
+            "encode", message.name, place, *(_word(given[name]) for name, _ in message.values())
+        )
+        return _bytes(payload), _bytes(wire)
+
+    def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
+        """See Target."""
+        context = (request.hex(),) if request else ()
+        address, *found = self._ask("decode", message.name, wire.hex() or "-", *context)
+        values = {name: _raw(kind, word) for (name, kind), word in zip(message.values(), found, strict=True)}
+        return Seen(message.name, None if address == "-" else int(address), values)
+
+    def events(self, direction: str, stream: bytes) -> list[Heard]:
+        """The events of a stream fed byte by byte."""
+        return [self._heard(word) for word in self._ask("stream", direction, stream.hex() or "-")]
+
+    def _heard(self, word: str) -> Heard:
+        at, kind, *rest = word.split(":")
+        if kind != "message":
+            return Heard(int(at), kind)
+        name, address, payload = rest
+        try:
+            values = str(decode_payload(self.reference.by_name[name], _bytes(payload)))
+        except Wrong as wrong:
+            values = f"{payload}, which is refused: {wrong}"
+        return Heard(int(at), kind, name, None if address == "-" else int(address), values)
+
+    def _ask(self, *words: object) -> list[str]:
+        status, *answer = self._driver.ask(*words).split()
+        if status == "error":
+            raise Wrong(answer[0])
+        assert status == "ok", (status, words)
+        return answer
+
+
+def _word(raw: Raw) -> str:
+    if isinstance(raw, int):
+        return str(raw)
+    return (raw.hex() if isinstance(raw, bytes) else ",".join(map(str, raw))) or "-"
+
+
+def _raw(kind: Number | Run, word: str) -> Raw:
+    if isinstance(kind, Number):
+        return int(word)
+    if kind.item is None:
+        return _bytes(word)
+    return [int(each) for each in word.split(",")] if word != "-" else []
+
+
+def _bytes(word: str) -> bytes:
+    return b"" if word == "-" else bytes.fromhex(word)

@@ -1,0 +1,438 @@
+"""One schema through lint, every target and both compilers, compared with the reference."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import re
+import signal
+import subprocess
+import tempfile
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from types import FrameType
+
+from qlinkgen.backends import construct
+from qlinkgen.backends.base import Options
+from qlinkgen.cli.targets import TARGETS
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.schema import loads
+from tests.support.cdriver import WARNINGS, Driver, build
+from tests.support.whole import chance, schemas
+from tests.support.whole.reference import Reference, Seen, Wrong
+from tests.support.whole.reference.document import Message
+from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.special import Packets
+from tests.support.whole.targets import ConstructTarget, CTarget, Heard, PythonTarget, Target, printed
+
+#: Seconds of processor time that one schema may take, and of any time that a compiled program may.
+SECONDS = 120
+_STRICT = ("-std=c99", "-fsyntax-only", *WARNINGS)
+#: Targets that need no vectors, which take long.
+_QUICK = ("python", "stations", "c", "construct")
+_PLAIN = ("-O0", "-std=c99")
+_CHECKED = ("-O1", "-g", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much of everything is tried of one schema."""
+
+    messages: int = 6
+    streams: int = 12
+    #: One of so many schemas is compiled with sanitizers.
+    sanitized: int = 4
+    #: C is generated, but nothing is compiled.
+    uncompiled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Something that an output does otherwise than the reference."""
+
+    stage: str
+    who: str
+    #: What many differences of one cause have in common.
+    cause: str
+    detail: str
+
+
+@dataclass
+class Outcome:
+    """What became of one schema."""
+
+    seed: int
+    hostile: bool
+    text: str
+    traits: str = ""
+    refused: tuple[str, ...] = ()
+    differences: list[Difference] = field(default_factory=list)
+    compared: int = 0
+
+    def report(self) -> str:
+        """Everything that is needed to see it again."""
+        lines = [f"seed {self.seed}{' hostile' if self.hostile else ''} ({self.traits})"]
+        lines += [f"- {each.stage}, {each.who}: {each.detail}" for each in self.differences]
+        return "\n".join([*lines, self.text])
+
+
+def run(seed: int, *, hostile: bool = False, effort: Effort | None = None) -> Outcome:
+    """The trial of the schema of a seed."""
+    return run_text(schemas.generate(seed, hostile=hostile), seed, hostile=hostile, effort=effort)
+
+
+def run_text(text: str, seed: int = 0, *, hostile: bool = False, effort: Effort | None = None) -> Outcome:
+    """The trial of any schema; `seed` draws its messages and streams."""
+    outcome = Outcome(seed, hostile, text)
+    with tempfile.TemporaryDirectory() as folder, _limited():
+        trial = _Trial(outcome, Path(folder), effort or Effort())
+        trial.guard("trial", "any", trial.run)
+    return outcome
+
+
+@contextlib.contextmanager
+def _limited() -> Iterator[None]:
+    """A trial that hangs is a difference like any other."""
+
+    def expired(number: int, frame: FrameType | None) -> None:
+        raise TimeoutError(f"no result after {SECONDS} seconds of processor time")
+
+    before = signal.signal(signal.SIGPROF, expired)
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+class _Failed(Exception):
+    """A tool refused; the text is what it said."""
+
+
+class _Trial:
+    def __init__(self, outcome: Outcome, folder: Path, effort: Effort) -> None:
+        self.outcome, self.folder, self.effort = outcome, folder, effort
+        self.rng = random.Random(f"trial {outcome.seed}")
+        self.targets: list[Target] = []
+        self.mark = 0xA5
+
+    def run(self) -> None:
+        protocol, faults = loads(self.outcome.text, "whole.yaml")
+        self.outcome.refused = tuple(sorted({each.rule for each in faults if each.severity == "error"}))
+        if self.outcome.refused:
+            return
+        assert protocol is not None
+        self.reference = Reference(self.outcome.text)
+        self.outcome.traits = traits(self.reference)
+        if isinstance(self.reference.frame, Frame) and self.reference.frame.stuffing:
+            self.mark = self.reference.frame.stuffing.after[0]
+        with contextlib.ExitStack() as programs:
+            self._make(protocol, programs)
+            self._messages()
+            self._streams()
+
+    # Differences
+
+    def found(self, stage: str, who: str, cause: str, detail: str) -> None:
+        """Note a difference, one of each kind."""
+        difference = Difference(stage, who, cause, detail)
+        if all(
+            (stage, who, cause) != (each.stage, each.who, each.cause) for each in self.outcome.differences
+        ):
+            self.outcome.differences.append(difference)
+
+    def guard(self, stage: str, who: str, action: Callable[[], None]) -> bool:
+        """Run a step; whatever it raises is a difference."""
+        try:
+            action()
+        except _Failed as failed:
+            self.found(stage, who, _common(str(failed)), str(failed))
+        except Exception as error:  # noqa: BLE001 - a crash of any kind is what is looked for
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            where = f"{Path(last.filename).name}:{last.name}"
+            detail = f"{type(error).__name__}: {error} at {where}"
+            self.found(stage, who, _common(f"{type(error).__name__} at {where}: {error}"), detail[:600])
+        else:
+            return True
+        return False
+
+    # Making
+
+    def _make(self, protocol: Protocol, programs: contextlib.ExitStack) -> None:
+        texts: dict[str, str] = {}
+        for name in _QUICK if self.effort.uncompiled else TARGETS:
+            self.guard("generate", name, partial(_generate, name, protocol, texts))
+        for path, text in texts.items():
+            (self.folder / Path(path).name).write_text(text, "utf-8")
+            if path.endswith(".py"):
+                self.guard("parse", Path(path).parent.name, partial(_parse, text, path))
+        self.guard("load", "python", lambda: self.targets.append(PythonTarget(self.reference, protocol)))
+        self.guard("load", "construct", lambda: self._construct("construct", construct.live(protocol)))
+        source = partial(printed, protocol, self.folder)
+        self.guard("load", "construct source", lambda: self._construct("construct source", source()))
+        header = self.folder / f"{protocol.name}.h"
+        if not self.effort.uncompiled and header.exists() and self._compile(header):
+            self.guard("driver", "c", lambda: self._driver(protocol, programs))
+
+    def _construct(self, name: str, live: construct.Live) -> None:
+        self.targets.append(ConstructTarget(self.reference, name, live))
+
+    def _driver(self, protocol: Protocol, programs: contextlib.ExitStack) -> None:
+        checked = self.outcome.seed % self.effort.sanitized == 0
+        folder = self.folder / "driver"
+        folder.mkdir()
+        try:
+            program = build(protocol, folder, "gcc", _CHECKED if checked else _PLAIN)
+        except subprocess.CalledProcessError as error:
+            raise _Failed(f"the driver does not compile ({error.returncode})") from None
+        driver = programs.enter_context(Driver("timeout", str(10 * SECONDS), program))
+        self.targets.append(CTarget(self.reference, driver))
+
+    def _compile(self, header: Path) -> bool:
+        """Compile strictly; whether it compiles at all."""
+        unit = self.folder / "strict.c"
+        unit.write_text(f'#include "{header.name}"\nint main(void) {{ return 0; }}\n', "utf-8")
+        for compiler in ("gcc", "clang"):
+            self.guard("compile", compiler, partial(_tool, compiler, *_STRICT, unit))
+        kit = self.folder / f"{header.stem}_conformance.c"
+        program = self.folder / "kit"
+        command = ("gcc", *_PLAIN, *WARNINGS, "-DCONFORMANCE_STDIO=1", kit, "-o", program)
+        if kit.exists() and self.guard("compile", "kit", lambda: _tool(*command)):
+            self.guard("run", "kit", lambda: _kit(program))
+        done = subprocess.run(["gcc", *_PLAIN, "-fsyntax-only", str(unit)], capture_output=True, check=False)
+        return done.returncode == 0
+
+    # Messages
+
+    def _messages(self) -> None:
+        for message in self.reference.messages:
+            for _ in range(self.effort.messages):
+                self._message(message)
+
+    def _request(self, message: Message) -> bytes:
+        """The request's packet, where an answer means nothing without it."""
+        if not isinstance(self.reference.frame, Packets) or message.direction != "response":
+            return b""
+        asked = self.reference.by_name[message.name.replace(".response", ".request")]
+        return self.reference.encode(asked.name, chance.values(asked, self.rng, self.mark))[1]
+
+    def _message(self, message: Message) -> None:
+        given = chance.values(message, self.rng, self.mark)
+        place, request = chance.address(message, self.rng), self._request(message)
+        payload, wire = self.reference.encode(message.name, given, place, request)
+        wrong = chance.wrong_frames(self.reference, message, payload, wire, self.rng, request=request)
+        for target in list(self.targets):
+            about = f"{message.name} {given} at {place}"
+            encode = partial(target.encode, message, given, place, request)
+            self._same("encode", target, about, lambda: (payload, wire), encode)
+            for frame in (wire, *wrong):
+                self._decoded(target, message, frame, request)
+
+    def _decoded(self, target: Target, message: Message, wire: bytes, request: bytes) -> None:
+        direction = self.reference.hears(message)
+        try:
+            expected: Seen | Wrong = self.reference.decode(direction, wire, request)
+        except Wrong as wrong:
+            expected = wrong
+        asked = self.reference.by_name[expected.name] if isinstance(expected, Seen) else message
+
+        def right() -> Seen:
+            if isinstance(expected, Wrong):
+                raise expected
+            return expected
+
+        about = f"{asked.name} {wire.hex(' ')}{' after ' + request.hex(' ') if request else ''}"
+        self._same("decode", target, about, right, lambda: target.decode(asked, wire, request))
+
+    def _same(
+        self, stage: str, target: Target, about: str, right: Callable[[], object], seen: Callable[[], object]
+    ) -> None:
+        self.outcome.compared += 1
+        if target not in self.targets:
+            return
+        expected, found = _result(right), _result(seen)
+        if expected != found:
+            crashed = isinstance(found, str) and not found.startswith("refused")
+            cause = _common(str(found)) if crashed else _manner(expected, found)
+            self.found(stage, target.name, cause, f"{about}: {_shown(found)} instead of {_shown(expected)}")
+            if crashed and isinstance(target, CTarget):
+                self.targets.remove(target)
+
+    # Streams
+
+    def _streams(self) -> None:
+        for direction in (
+            ("request",) if isinstance(self.reference.frame, Packets) else self.reference.directions
+        ):
+            known = list(self.reference.known(direction).values())
+            frames = [self._frame(each) for each in known for _ in range(2)]
+            if not frames:
+                continue
+            alphabet = b"".join(frame[:4] + frame[-2:] for frame in frames) + bytes([self.mark, 0])
+            for _ in range(self.effort.streams):
+                self._stream(direction, chance.stream(frames, alphabet, self.rng))
+
+    def _frame(self, message: Message) -> bytes:
+        given = chance.values(message, self.rng, self.mark)
+        return self.reference.encode(message.name, given, chance.address(message, self.rng))[1]
+
+    def _stream(self, direction: str, data: bytes) -> None:
+        seed = self.rng.random()
+        for target in list(self.targets):
+            if isinstance(target, PythonTarget):
+                self._heard(target, direction, data, "stream", partial(_python_stream, target, direction))
+                cut = partial(_cut_stream, target, direction, seed)
+                self._heard(target, direction, data, "cut stream", cut)
+            elif isinstance(target, CTarget):
+                self._heard(target, direction, data, "stream", partial(_c_stream, target, direction))
+
+    def _heard(
+        self, target: Target, direction: str, data: bytes, stage: str, compare: Callable[[bytes], str]
+    ) -> None:
+        self.outcome.compared += 1
+        if target not in self.targets:
+            return
+        try:
+            difference = compare(data)
+        except Exception as error:  # noqa: BLE001 - see guard
+            self.found(
+                stage, target.name, _common(f"{type(error).__name__}: {error}"), f"{data.hex(' ')}: {error!r}"
+            )
+            self.targets.remove(target)
+            return
+        if not difference:
+            return
+        cause = f"{difference.partition(';')[0]} [{self.outcome.traits}]"
+        if any(
+            (stage, target.name, cause) == (each.stage, each.who, each.cause)
+            for each in self.outcome.differences
+        ):
+            return
+        least = chance.smallest(
+            data, lambda shorter: compare(shorter).partition(";")[0] == difference.partition(";")[0]
+        )
+        self.found(stage, target.name, cause, f"{direction} {least.hex(' ')}: {compare(least)}")
+
+
+def _generate(name: str, protocol: Protocol, texts: dict[str, str]) -> None:
+    generate, _ = TARGETS[name].load()
+    texts.update(generate(protocol, Options()))
+
+
+def _parse(text: str, path: str) -> None:
+    compile(text, path, "exec")
+
+
+def _tool(*words: object) -> None:
+    done = subprocess.run(
+        [str(word) for word in words], capture_output=True, text=True, timeout=10 * SECONDS, check=False
+    )
+    if done.returncode:
+        errors = [line for line in done.stderr.splitlines() if "error:" in line]
+        raise _Failed(
+            " | ".join(line.partition("error:")[2].strip() for line in errors[:3]) or done.stderr[:300]
+        )
+
+
+def _kit(program: Path) -> None:
+    done = subprocess.run([str(program)], capture_output=True, text=True, timeout=10 * SECONDS, check=False)
+    lines = done.stdout.splitlines()
+    failed = [line for line in lines if line.startswith("not ok")]
+    planned = int(next((line for line in lines if line.startswith("1..")), "1..0").removeprefix("1.."))
+    passed = sum(line.startswith("ok ") for line in lines)
+    if done.returncode or failed or passed != planned:
+        raise _Failed(f"{passed} of {planned} pass: {' | '.join(failed[:3]) or done.stderr[:200]}")
+
+
+def _result(action: Callable[[], object]) -> object:
+    try:
+        return action()
+    except Wrong:
+        return "refused"
+    except Exception as error:  # noqa: BLE001 - see guard
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        return f"{type(error).__name__} at {last.name}: {error}"[:300]
+
+
+def _shown(result: object) -> str:
+    if isinstance(result, tuple):
+        return " ".join(each.hex(" ") or "-" for each in result)
+    return str(result)
+
+
+def _manner(expected: object, found: object) -> str:
+    if found == "refused":
+        return "refuses what is right"
+    return "takes what is wrong" if expected == "refused" else "other values"
+
+
+def _python_stream(target: PythonTarget, direction: str, data: bytes) -> str:
+    expected = [Heard.of(event) for event in target.reference.events(direction, data)]
+    found = target.events(direction, [bytes([byte]) for byte in data])
+    return _unlike(expected, [event for events in found for event in events])
+
+
+def _c_stream(target: CTarget, direction: str, data: bytes) -> str:
+    expected = [Heard.of(event) for event in target.reference.events(direction, data)]
+    if not target.finishes:
+        expected = [event for event in expected if event.at < len(data)]
+    bare = [Heard(each.at, each.kind, each.name, each.address, each.values) for each in expected]
+    return _unlike(bare, target.events(direction, data))
+
+
+def _cut_stream(target: PythonTarget, direction: str, seed: float, data: bytes) -> str:
+    """What a piece brings is what its bytes bring one by one."""
+    cut = chance.pieces(data, random.Random(seed))
+    single = target.events(direction, [bytes([byte]) for byte in data])
+    end = 0
+    for piece, events in zip(cut, target.events(direction, cut), strict=False):
+        expected = [event for each in single[end : end + len(piece)] for event in each]
+        end += len(piece)
+        if [_timeless(each) for each in events] != [_timeless(each) for each in expected]:
+            kinds = [each.kind for each in events], [each.kind for each in expected]
+            return f"depends on the cuts; {[each.hex(' ') for each in cut]}: {kinds[0]} instead of {kinds[1]}"
+    return ""
+
+
+def _timeless(event: Heard) -> tuple[object, ...]:
+    return event.kind, event.name, event.address, event.values, event.place
+
+
+def _unlike(expected: list[Heard], found: list[Heard]) -> str:
+    """How two lists of events differ; what stands in front of the semicolon names the manner."""
+    for right, seen in zip(expected, found, strict=False):
+        if right == seen:
+            continue
+        if right.kind != seen.kind:
+            return f"{seen.kind} for {right.kind}; {seen} instead of {right}"
+        if _timeless(right) == _timeless(seen):
+            return f"{'late' if seen.at > right.at else 'early'} {seen.kind}; {seen} instead of {right}"
+        what = "place" if right.place != seen.place else "values"
+        return f"other {what} of {seen.kind}; {seen} instead of {right}"
+    if len(found) > len(expected):
+        return f"{found[len(expected)].kind} for nothing; {found[len(expected)]}"
+    return f"no {expected[len(found)].kind}; {expected[len(found)]}" if len(expected) > len(found) else ""
+
+
+def traits(reference: Reference) -> str:
+    """What a frame is like, in a few words."""
+    frame = reference.frame
+    if not isinstance(frame, Frame):
+        return type(frame).__name__.lower()
+    words = ["hunt" if frame.unique else "search", "bare" if frame.bare else "lead"]
+    words += ["length"] if "length" in frame.by_role else ["counts"]
+    words += [] if "checksum" in frame.by_role else ["unchecked"]
+    words += ["end"] if frame.parts[-1].role == "constant" else []
+    if frame.stuffing:
+        words.append("stuffed payload" if frame.stuffing.payload_alone else "stuffed")
+    return " ".join(words)
+
+
+def _common(text: str) -> str:
+    """A text without what is different in every schema."""
+    text = re.sub(r"'[^']*'|‘[^’]*’|\"[^\"]*\"", "_", text.splitlines()[0] if text else "")
+    return re.sub(r"\b0x[0-9a-f]+\b|\d+", "N", text)[:120]

@@ -1,0 +1,121 @@
+"""Random whole schemas through everything: ``python -m tests.whole --seeds 0..99 [--jobs 2]``.
+
+Prints a line for each cause of a difference, with the seeds that show it, and ends with 1 if there is one.
+``--report FILE`` writes every difference with its schema.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from tests.support.whole.schemas import generate
+from tests.support.whole.trial import Effort, Outcome, run
+
+#: Of the schemas of `--names mixed`, every so many has hostile names and texts.
+_HOSTILE = 4
+
+
+@dataclass(frozen=True)
+class _Arguments:
+    seeds: Sequence[int]
+    jobs: int
+    names: str
+    effort: Effort
+    report: Path | None
+    show: bool
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the trials that a command line asks for."""
+    arguments = _parsed(words)
+    if arguments.show:
+        for seed in arguments.seeds:
+            print(generate(seed, hostile=is_hostile(seed, arguments.names)))
+        return 0
+    begun = time.monotonic()
+    trial = partial(_trial, names=arguments.names, effort=arguments.effort)
+    outcomes = []
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        for outcome in pool.map(trial, arguments.seeds):
+            outcomes.append(outcome)
+            if arguments.report:
+                different = [each.report() for each in outcomes if each.differences]
+                arguments.report.write_text("\n\n".join(different), "utf-8")
+    print(summary(outcomes))
+    print(f"{time.monotonic() - begun:.0f} s")
+    return int(any(each.differences for each in outcomes))
+
+
+def is_hostile(seed: int, names: str) -> bool:
+    """The schema of a seed has hostile names and texts."""
+    return names == "hostile" or (names == "mixed" and seed % _HOSTILE == _HOSTILE - 1)
+
+
+def _trial(seed: int, names: str, effort: Effort) -> Outcome:
+    return run(seed, hostile=is_hostile(seed, names), effort=effort)
+
+
+def summary(outcomes: Sequence[Outcome]) -> str:
+    """How many schemas were refused and why, and every cause of a difference with its seeds."""
+    refused: dict[str, list[int]] = defaultdict(list)
+    causes: dict[tuple[str, str, str], list[int]] = defaultdict(list)
+    for outcome in outcomes:
+        for rule in outcome.refused:
+            refused[rule].append(outcome.seed)
+        for each in outcome.differences:
+            causes[each.stage, each.who, each.cause].append(outcome.seed)
+    lines = [f"refused by lint, {rule}: {_seeds(seeds)}" for rule, seeds in sorted(refused.items())]
+    lines += [
+        f"{stage}, {who}: {cause}: {_seeds(seeds)}" for (stage, who, cause), seeds in sorted(causes.items())
+    ]
+    lines.append(
+        f"{len(outcomes)} schemas, {sum(bool(each.refused) for each in outcomes)} refused by lint, "
+        f"{sum(bool(each.differences) for each in outcomes)} with differences, "
+        f"{sum(each.compared for each in outcomes)} comparisons"
+    )
+    return "\n".join(lines)
+
+
+def _seeds(seeds: Sequence[int]) -> str:
+    return f"{len(seeds)} schemas, seeds {', '.join(map(str, seeds[:6]))}{' ...' if len(seeds) > 6 else ''}"
+
+
+def _parsed(words: Sequence[str] | None) -> _Arguments:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.whole", description="Trials of whole random schemas."
+    )
+    parser.add_argument(
+        "--seeds", type=_seeds_of, required=True, help="first..last, or numbers and ranges with commas"
+    )
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--names", choices=("ordinary", "hostile", "mixed"), default="mixed")
+    parser.add_argument("--messages", type=int, default=Effort.messages, help="of each kind, for each schema")
+    parser.add_argument(
+        "--streams", type=int, default=Effort.streams, help="of each direction, for each schema"
+    )
+    parser.add_argument("--uncompiled", action="store_true", help="leave out the compilers and the kit")
+    parser.add_argument("--report", type=Path, help="file for every difference with its schema")
+    parser.add_argument("--show", action="store_true", help="print the schemas alone")
+    given = parser.parse_args(words)
+    effort = Effort(given.messages, given.streams, uncompiled=given.uncompiled)
+    return _Arguments(given.seeds, given.jobs, given.names, effort, given.report, given.show)
+
+
+def _seeds_of(text: str) -> Sequence[int]:
+    seeds: list[int] = []
+    for each in text.split(","):
+        first, _, last = each.partition("..")
+        seeds += range(int(first), int(last or first) + 1)
+    return seeds
+
+
+if __name__ == "__main__":
+    sys.exit(main())
