@@ -101,7 +101,8 @@ def _plan(path: Path | str) -> Plan:
 
 
 def _cases() -> Iterator[tuple[Path | str, Direction]]:
-    for path in (*_SCHEMAS, *_SHAPES):
+    paths: list[Path | str] = [*_SCHEMAS, *_SHAPES]
+    for path in paths:
         yield from ((path, direction) for direction in _plan(path).heard)
 
 
