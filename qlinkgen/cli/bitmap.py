@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from qlinkgen.model.frame import MarkedFrame
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.types import Bits, Flags
+from qlinkgen.model.types import Flags
+from qlinkgen.plan.framing import MarkPart
+from qlinkgen.plan.payload import BitsStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,20 +25,20 @@ def runs_of_flags(flags: Flags) -> list[Run]:
     return [Run(member.value, 1, _labelled(member.name, member.doc)) for member in flags.members]
 
 
-def runs_of_bits(bits: Bits) -> list[Run]:
-    """The fields inside an integer."""
+def runs_of_bits(step: BitsStep, docs: Mapping[str, str]) -> list[Run]:
+    """The members of an integer; ``docs`` by name."""
     return [
-        Run(member.shift, member.type.bits, _labelled(member.name, member.doc)) for member in bits.members
+        Run(each.shift, each.bits, _labelled(each.name, docs.get(each.name, ""))) for each in step.members
     ]
 
 
-def runs_of_header(frame: MarkedFrame) -> list[Run]:
-    """Marker, address and message id of a marked frame."""
-    marker = frame.marker.bit_length() - 1
+def runs_of_header(header: MarkPart, end_id: int | None) -> list[Run]:
+    """Marker, address and message id of a header."""
+    marker = header.marker.bit_length() - 1
     return [
         Run(marker, 1, "marker: set in header and end alone"),
-        Run(frame.address_bits.shift, frame.address_bits.bits, frame.address_name),
-        Run(frame.id_bits.shift, frame.id_bits.bits, f"{frame.id_name}; {frame.end_id} marks the end"),
+        Run(header.address.shift, header.address.bits, header.address_name),
+        Run(header.id.shift, header.id.bits, f"{header.id_name}; {end_id} marks the end"),
     ]
 
 

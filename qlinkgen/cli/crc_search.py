@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from qlinkgen.model.checksum import SUMS, Algorithm, Sum, catalogue
-from qlinkgen.model.frame import Checksum
+from qlinkgen.plan.check import Check
 
 #: Answers that are shown at most; further ones are as likely to be coincidences.
 SHOWN = 3
@@ -33,11 +33,18 @@ class Fit:
 
 
 def coverages(
-    parts: Mapping[str, bytes], over: Sequence[str], wire: Mapping[str, bytes] | None
+    parts: Mapping[str, bytes], over: Sequence[str], others: Mapping[str, bytes], other: str
 ) -> list[Coverage]:
-    """Every subset of the parts, as they are and as they were sent (stuffed), nearest to the schema first."""
+    """Every subset of the parts, nearest to the schema first.
+
+    Args:
+        parts: bytes of each part as the schema has them covered, with or without stuffing.
+        over: names of the parts that the schema has covered.
+        others: their bytes the other way.
+        other: says that they are covered the other way.
+    """
     found: dict[bytes, Coverage] = {}
-    forms = [("", parts, 0)] + ([(" with the stuffing", wire, 1)] if wire and wire != parts else [])
+    forms = [("", parts, 0)] + ([(other, others, 1)] if others != parts else [])
     for (suffix, form, extra), size in itertools.product(forms, range(1, len(parts) + 1)):
         for names in itertools.combinations(parts, size):
             steps = len(set(names) ^ set(over)) + extra
@@ -48,24 +55,24 @@ def coverages(
     return sorted(found.values(), key=lambda each: each.steps)
 
 
-def search(checksum: Checksum, received: int, covers: Sequence[Coverage]) -> list[Fit]:
+def search(check: Check, received: int, covers: Sequence[Coverage]) -> list[Fit]:
     """Readings under which the received value fits, the nearest to the schema first."""
-    limit = 2 if checksum.algorithm.width >= CHANCE_BITS else 1
-    fits = [fit for fit in _fits(checksum, received, covers, limit) if fit.steps]
+    limit = 2 if check.algorithm.width >= CHANCE_BITS else 1
+    fits = [fit for fit in _fits(check, received, covers, limit) if fit.steps]
     nearest = min((fit.steps for fit in fits), default=0)
     return sorted((fit for fit in fits if fit.steps == nearest), key=lambda fit: fit.text)[:SHOWN]
 
 
-def _fits(checksum: Checksum, received: int, covers: Sequence[Coverage], limit: int) -> Iterator[Fit]:
-    algorithms = _algorithms(checksum.algorithm)
+def _fits(check: Check, received: int, covers: Sequence[Coverage], limit: int) -> Iterator[Fit]:
+    algorithms = _algorithms(check.algorithm)
     orders = [("", received, 0)]
-    if (swapped := _swapped(checksum, received)) != received:
+    if (swapped := _swapped(check, received)) != received:
         orders.append((" with its bytes the other way round", swapped, 1))
     for each, algorithm in itertools.product(covers, algorithms):
         steps = each.steps + (algorithm is not algorithms[0])
         if steps > limit:
             continue
-        value = algorithm.compute(each.data) & checksum.mask
+        value = algorithm.compute(each.data) & check.mask
         for suffix, wanted, extra in orders:
             if value == wanted and steps + extra <= limit:
                 yield Fit(f"{algorithm.name}{each.text}{suffix}", steps + extra)
@@ -79,44 +86,70 @@ def _algorithms(own: Algorithm | Sum) -> list[Algorithm | Sum]:
     return [own, *(each for each in others if each.name != own.name)]
 
 
-def _swapped(checksum: Checksum, value: int) -> int:
+def _swapped(check: Check, value: int) -> int:
     """The value if its wire bytes had come in the opposite order."""
-    raw = [(value >> chunk.shift) & chunk.mask for chunk in checksum.chunks]
-    pairs = zip(reversed(raw), checksum.chunks, strict=True)
-    return sum((byte & chunk.mask) << chunk.shift for byte, chunk in pairs)
+    return check.unpack(check.pack(value)[::-1])
 
 
-def flipped_bit(checksum: Checksum, received: int, data: bytes) -> tuple[int, int] | None:
+def flipped_bit(check: Check, received: int, data: bytes) -> tuple[int, int] | None:
     """Index of a covered byte, and what it should have been, if one flipped bit explains the difference."""
-    if checksum.algorithm.width < CHANCE_BITS:
+    if check.algorithm.width < CHANCE_BITS:
         return None
     for index, bit in itertools.product(range(len(data)), range(8)):
         repaired = bytearray(data)
         repaired[index] ^= 1 << bit
-        if checksum.algorithm.compute(repaired) & checksum.mask == received:
+        if check.algorithm.compute(repaired) & check.mask == received:
             return index, repaired[index]
     return None
 
 
 def explain_mismatch(
-    checksum: Checksum, received: int, covers: Sequence[Coverage], own: Sequence[tuple[int, int]]
+    check: Check, received: int, covers: Sequence[Coverage], own: Sequence[tuple[int, int]]
 ) -> str:
     """The likely cause of a check value that does not fit.
 
     Args:
-        checksum: What the schema says.
+        check: What the schema says.
         received: The value that came.
         covers: Coverages to try.
         own: The covered bytes, as the schema has it: wire offset and value.
     """
-    if fits := search(checksum, received, covers):
+    if fits := search(check, received, covers):
         return f"it would fit as {', or as '.join(fit.text for fit in fits)}: the sender may compute it so"
     data = bytes(value for _, value in own)
-    expected = checksum.algorithm.compute(data) & checksum.mask
+    expected = check.algorithm.compute(data) & check.mask
     if (expected ^ received).bit_count() == 1:
         return "one bit of the check value itself was flipped on the wire"
-    if flipped := flipped_bit(checksum, received, data):
+    if flipped := flipped_bit(check, received, data):
         index, value = flipped
         return f"one bit was flipped on the wire: {value:02x} at offset {own[index][0]} would fit"
     tried = "algorithm of the catalogue, byte order or coverage near the schema's"
     return f"no {tried} fits: bytes were corrupted on the wire"
+
+
+def explain_sum(check: Check, id_name: str, request: bytes, answer: bytes, received: int) -> str:
+    """The likely cause of a check value over a request and its response that does not fit.
+
+    Args:
+        check: What the schema says.
+        id_name: The name of the first byte of the request.
+        request: The packet that is answered.
+        answer: The payload of the response.
+        received: The value that was received.
+    """
+    start, words = request[0], request[1:]
+    expected = check.of(words, answer, start=start) & check.mask
+    if check.unpack(check.pack(received)[::-1]) == expected:
+        return "its bytes came the other way round"
+    readings = {
+        f"the sum of the words without {id_name}": check.of(words, answer),
+        "the sum of the response's words alone": check.of(answer),
+        "the sum of the request alone": check.of(words, start=start),
+        "the sum of single bytes": sum(request + answer),
+    }
+    fitting = [text for text, value in readings.items() if value & check.mask == received]
+    if fitting:
+        return f"it would fit as {fitting[0]}: the device may compute it so"
+    if (received ^ expected).bit_count() == 1:
+        return "one bit was flipped on the wire"
+    return "bytes were corrupted or lost, or these bytes answer another request"

@@ -19,9 +19,9 @@ from qlinkgen.cli.conversations import Answers, Conversation
 from qlinkgen.cli.encode import asked
 from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
-from qlinkgen.model.frame import PacketFrame
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan.framing import frame_plan
 
 CHUNK = 65536
 _COMMENT = re.compile(rb"#[^\n]*")
@@ -78,7 +78,7 @@ def _stream(protocol: Protocol, codec: Any, direction: Direction | None, request
         raise Failure(
             f"{protocol.name} has neither requests nor responses; leave out --direction {direction}"
         )
-    packets = isinstance(protocol.frame, PacketFrame)
+    packets = frame_plan(protocol.frame).needs_request
     if request is not None and not (packets and direction != "request"):
         raise Failure("--request goes with the responses of a packet protocol; leave it out")
     if not packets or direction == "request":

@@ -21,10 +21,10 @@ from qlinkgen.cli.common import (
     warn_unconfirmed,
 )
 from qlinkgen.cli.describe import addresses_text
-from qlinkgen.model.frame import PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import whole_number
+from qlinkgen.plan.framing import frame_plan
 
 address_option = click.option(
     "--node",
@@ -195,7 +195,7 @@ def _only_address(message: Message, name: str) -> int:
 
 
 def _frame(protocol: Protocol, codec: Any, message: Message, built: Any, request: str | None) -> bytes:
-    answer = isinstance(protocol.frame, PacketFrame) and message.direction == "response"
+    answer = frame_plan(protocol.frame).needs_request and message.direction == "response"
     if not answer:
         if request is not None:
             raise Failure(f"{message.name} does not depend on a request; leave out --request")

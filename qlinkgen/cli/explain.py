@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import click
 
-from qlinkgen.cli.anatomy import Anatomy
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.common import crc_option, load_protocol, on_terminal, parse_hex
-from qlinkgen.cli.explain_delimited import explain_delimited
-from qlinkgen.cli.explain_marked import explain_marked
-from qlinkgen.cli.explain_packet import explain_packet
+from qlinkgen.cli.findings import finding, notes
+from qlinkgen.cli.span_text import value_of
+from qlinkgen.cli.streams import PROGRESS
 from qlinkgen.cli.tables import Table, heading, paragraph
-from qlinkgen.model.frame import MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction
-from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.dissect import dissect, request_size
+from qlinkgen.plan.payload import MemberConstant, MemberReserved, MemberValue
+from qlinkgen.plan.spans import Dissection, Rule, Span
+
+Line = tuple[int, str, str, str, bool]
 
 
 @click.command("explain")
 @click.argument("protocol")
 @click.argument("hex_", metavar="HEX...", nargs=-1, required=True)
 @click.option(
-    "--direction", type=click.Choice(["request", "response"]), help="What the frame is; guessed by its size."
+    "--direction", type=click.Choice(["request", "response"]), help="What the frame is; guessed unless given."
 )
 @click.option(
     "--request", "request", metavar="HEX", help="Packets: the request; HEX is then its response alone."
@@ -43,34 +48,102 @@ def command(
     data = parse_hex(" ".join(hex_))
     if not data:
         raise Failure("HEX is empty; give the bytes of one frame")
-    anatomy = _explain(loaded, data, direction, request)
-    _show(anatomy)
-    return WRONG if anatomy.findings else FINE
+    asked = None if request is None else parse_hex(request, "--request")
+    found, hints = explained(plan_of(loaded), data, direction, asked)
+    _show(found, hints)
+    return WRONG if any(each.kind for each in found) else FINE
 
 
-def _explain(protocol: Protocol, data: bytes, direction: Direction | None, request: str | None) -> Anatomy:
-    if isinstance(protocol.frame, PacketFrame):
-        if direction == "response" and request is None:
-            raise Failure("a response alone cannot be told apart; give its request with --request HEX")
-        return explain_packet(protocol, data, None if request is None else parse_hex(request, "--request"))
+def explained(
+    plan: Plan, data: bytes, direction: Direction | None, request: bytes | None
+) -> tuple[list[Dissection], list[str]]:
+    """The frames in the bytes, one after the other, and notes on them."""
+    if not plan.frame.needs_request:
+        if request is not None:
+            raise Failure("--request goes with packet protocols; leave it out")
+        found, hint = _guessed(plan, data, [direction] if direction else plan.protocol.directions)
+        return [found], [*hint, *notes(found)]
     if request is not None:
-        raise Failure("--request goes with packet protocols; leave it out")
-    if isinstance(protocol.frame, MarkedFrame):
-        return explain_marked(protocol, data)
-    return explain_delimited(protocol, data, direction)
+        _check_request(plan, request)
+        found = dissect(plan, data, "response", request)
+        return [found], notes(found)
+    if direction == "response":
+        raise Failure("a response cannot be identified without its request; pass --request HEX")
+    size = request_size(plan, data)
+    asked = dissect(plan, data[:size], "request")
+    answers = [dissect(plan, data[size:], "response", data[:size])] if data[size:] else []
+    return [asked, *answers], [note for each in answers for note in notes(each)]
 
 
-def _show(anatomy: Anatomy) -> None:
-    heading(anatomy.title)
+def _check_request(plan: Plan, request: bytes) -> None:
+    """Refuse a request that cannot be answered; one with a value that is not allowed can be."""
+    kind = dissect(plan, request, "request").kind
+    if kind not in ("", "range"):
+        raise Failure(f"--request {request.hex()} is not a request ({kind}); give command byte and words")
+
+
+def _guessed(plan: Plan, data: bytes, ways: Sequence[Direction]) -> tuple[Dissection, list[str]]:
+    """The direction under which a decoder comes furthest and the fewest rules are broken."""
+    found = sorted((dissect(plan, data, way) for way in ways), key=_doubt)
+    first, *others = found
+    hints = [
+        f"it could be {other.message.name} as well; --direction {other.direction} shows that"
+        for other in others
+        if other.message and other.message is not first.message and _doubt(other) == _doubt(first)
+    ]
+    return first, hints
+
+
+def _doubt(found: Dissection) -> tuple[int, int, bool]:
+    """How much speaks against the direction: an early fault, many, a payload of another size."""
+    early = len(PROGRESS) - PROGRESS.index(found.kind) if found.kind else 0
+    payload = found.message.payload if found.message else None
+    cell = found.cells.get(found.plan.frame.envelope.payload.name)
+    fits = payload and cell and payload.least <= len(cell.data) <= payload.most
+    return early, len(found.faults), not fits
+
+
+def _show(found: Sequence[Dissection], hints: Sequence[str]) -> None:
+    heading(_title(found[0]))
     table = Table(["offset", "byte", "part", "value", ""], "", frozenset({"offset"}))
-    for offset, byte, part, value, wrong in anatomy.lines():
-        table.add(offset if byte else "", byte, part, value, "<- wrong" if wrong else "")
+    start = 0
+    for each in found:
+        for offset, byte, part, value, wrong in _lines(each):
+            table.add(start + offset if byte else "", byte, part, value, "<- wrong" if wrong else "")
+        start += len(each.wire)
     table.show()
-    paragraph([f"note: {note}" for note in anatomy.notes])
-    for finding in anatomy.findings:
-        label = click.style("wrong:", fg="red", bold=True) if on_terminal() else "wrong:"
-        click.echo(f"{label} {one_line(finding.rule)}")
-        if finding.cause:
-            click.echo(f"likely: {one_line(finding.cause)}")
-    if not anatomy.findings:
+    paragraph([f"note: {hint}" for hint in hints])
+    label = click.style("wrong:", fg="red", bold=True) if on_terminal() else "wrong:"
+    start = 0
+    for each in found:
+        for fault in each.faults:
+            rule, cause = finding(each, fault, start)
+            click.echo(f"{label} {one_line(rule)}")
+            if cause:
+                click.echo(f"likely: {one_line(cause)}")
+        start += len(each.wire)
+    if not any(each.kind for each in found):
         click.echo("every rule is kept")
+
+
+def _title(found: Dissection) -> str:
+    name = found.message.name if found.message else f"unknown {found.direction}"
+    return name if found.address is None else f"{name}, {found.plan.frame.address} {found.address}"
+
+
+def _lines(found: Dissection) -> list[Line]:
+    """A line for each byte and for each member: offset, hex, part, value, whether it is marked."""
+    lines = [line for span in found.spans for line in _of_span(found, span)]
+    return sorted(lines, key=lambda line: line[0])
+
+
+def _of_span(found: Dissection, span: Span) -> Iterator[Line]:
+    part, value = value_of(found, span)
+    misplaced = {fault.at for fault in found.faults if fault.rule is Rule.STUFFING}
+    match span.of:
+        case MemberValue() | MemberConstant() | MemberReserved():
+            yield span.places[-1], "", f"  .{part}", value, span.fault != ""
+        case _:
+            for place, byte in zip(span.places, span.raw, strict=True):
+                yield place, f"{byte:02x}", part, value, span.fault != "" or place in misplaced
+                value = ""

@@ -11,8 +11,8 @@ from click.core import ParameterSource
 from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import find_schema
-from qlinkgen.model.frame import MarkedFrame, PacketFrame
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan, frame_plan
 
 
 class Kind(Enum):
@@ -50,13 +50,13 @@ def shipped_kind(name: str) -> tuple[str, Kind] | None:
 
 def kind_of(protocol: Protocol) -> Kind:
     """What kind of bus a protocol is for. Raises Failure where nothing here can drive it."""
-    packets = isinstance(protocol.frame, PacketFrame)
-    if protocol.bus.kind == "host" and packets:
-        return HOST
-    if protocol.bus.kind == "ring" and isinstance(protocol.frame, MarkedFrame):
-        return RING
-    if protocol.bus.kind == "master_slave" and not packets:
-        return BUS
+    match protocol.bus.kind, frame_plan(protocol.frame).receiver:
+        case "host", InStep():
+            return HOST
+        case "ring", Marks():
+            return RING
+        case "master_slave", Hunt() | Rescan() | Marks():
+            return BUS
     raise Failure(
         f"{protocol.name}: frames of this kind on a bus of kind {protocol.bus.kind} can be encoded and "
         "decoded, not driven; what can be is frames with master_slave, marked ones with ring, packets "

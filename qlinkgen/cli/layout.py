@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from qlinkgen.cli import bitmap, describe
 from qlinkgen.cli.tables import Table, heading, paragraph
-from qlinkgen.model.message import Field, Message, Value
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.sizes import frame_size, max_wire_size
-from qlinkgen.model.types import Array, Bits, Blob, Enum, Flags, Scalar
+from qlinkgen.model.message import Value
+from qlinkgen.model.types import Enum, Flags
+from qlinkgen.plan.describe import (
+    bytes_text,
+    holds_text,
+    id_text,
+    number_of,
+    scale_text,
+    size_text,
+    span_text,
+    type_text,
+)
+from qlinkgen.plan.payload import BitsStep, Member, Step
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 UNCONFIRMED = "unconfirmed"
 COLUMNS = [
@@ -25,40 +35,42 @@ COLUMNS = [
 ]
 
 
-def show_message(protocol: Protocol, message: Message) -> None:
+def show_message(plan: Plan, planned: MessagePlan) -> None:
     """Print a message: facts, layout, bits and names."""
-    heading(f"{message.name}, id {describe.id_text(message, protocol)}")
-    paragraph([message.doc, *_facts(protocol, message)])
-    _layout(message)
-    for field in message.fields:
-        if isinstance(field.type, Bits):
-            heading(f"Bits of {field.name}")
-            paragraph(bitmap.diagram(field.type.container.bits, bitmap.runs_of_bits(field.type)))
-    for meaning in dict.fromkeys(_meanings(message)):
+    message = planned.message
+    heading(f"{message.name}, id {id_text(plan.frame, message.id)}")
+    paragraph([message.doc, *_facts(plan, planned)])
+    _layout(planned)
+    for step in planned.payload.steps:
+        if isinstance(step, BitsStep):
+            heading(f"Bits of {step.name}")
+            paragraph(bitmap.diagram(step.integer.bits, bitmap.runs_of_bits(step, message.docs)))
+    for meaning in dict.fromkeys(_meanings(planned)):
         show_enum(meaning) if isinstance(meaning, Enum) else show_flags(meaning)
 
 
-def _meanings(message: Message) -> list[Enum | Flags]:
-    scalars = [value.type for value in message.values if isinstance(value.type, Scalar)]
-    return [scalar.meaning for scalar in scalars if isinstance(scalar.meaning, Enum | Flags)]
+def _meanings(planned: MessagePlan) -> list[Enum | Flags]:
+    scalars = [number_of(each) for each in planned.payload.settable]
+    return [each.meaning for each in scalars if each and isinstance(each.meaning, Enum | Flags)]
 
 
-def _facts(protocol: Protocol, message: Message) -> list[str]:
-    low, high = (frame_size(protocol.frame, message, size) for size in (message.min_size, message.max_size))
+def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
+    message, payload = planned.message, planned.payload
+    low, high = (planned.envelope.overhead + size for size in (payload.least, payload.most))
     facts = [
-        f"payload {describe.bytes_text(message.min_size, message.max_size)}",
-        f"frame {describe.span_text(low, high)}",
-        f"on the wire at most {max_wire_size(protocol.frame, message)}",
+        f"payload {bytes_text(payload.least, payload.most)}",
+        f"frame {span_text(low, high)}",
+        f"on the wire at most {planned.wire_size}",
     ]
     if message.addresses:
-        facts.append(f"{protocol.address_name} {describe.addresses_text(message)}")
+        facts.append(f"{plan.frame.address} {describe.addresses_text(message)}")
     lines = [", ".join(facts)]
-    if (command := protocol.command_of(message)) and message is command.request:
+    if (command := plan.protocol.command_of(message)) and message is command.request:
         within = describe.time_text(command.response_within)
         answer = f"answered within {within}" if within else "answered"
         answered = answer if command.response else "never answered"
         lines.append(f"{answered}; repeat: {describe.repeat_text(command)}")
-    if message.empty_is_default:
+    if payload.empty_is_default:
         lines.append("a payload of no bytes is taken as one with every default")
     if message.section:
         lines.append(f"section {message.section}")
@@ -67,60 +79,43 @@ def _facts(protocol: Protocol, message: Message) -> list[str]:
     return lines
 
 
-def _layout(message: Message) -> None:
+def _layout(planned: MessagePlan) -> None:
     table = Table(COLUMNS, "", frozenset({"offset", "bytes"}))
-    values = {value.name: value for value in message.values}
-    for field in message.fields:
-        offset = message.offset(field.name)
-        place = "behind" if offset is None else offset
+    values, docs = {value.name: value for value in planned.message.values}, planned.message.docs
+    for field, step in zip(planned.message.fields, planned.payload.steps, strict=True):
+        offset = step.place.offset
         notes = ["echo"] if field.echo else []
         notes += [] if field.confirmed else [UNCONFIRMED]
         table.add(
-            place,
-            field.name,
-            describe.size_text(field),
-            *_about(field, values.get(field.name)),
+            size_text(step.place.front) if offset is None else offset,
+            step.name,
+            span_text(field.min_size, field.max_size),
+            *_about(step, values.get(step.name)),
+            field.doc,
             field.section,
             ", ".join(notes),
         )
-        if isinstance(field.type, Bits):
-            for member in field.type.members:
-                table.add(
-                    f".{member.shift}", member.name, f"{member.type.bits} bit",
-                    *_scalar(member.type, values.get(member.name)), member.doc, "", "",
-                )  # fmt: skip
+        for member in step.members if isinstance(step, BitsStep) else ():
+            value = values.get(member.name)
+            cells = _about(member, value)
+            table.add(
+                f".{member.shift}",
+                member.name,
+                f"{member.bits} bit",
+                *cells,
+                docs[member.name],
+                "",
+                "",
+            )
     table.show()
 
 
-def _about(field: Field, value: Value | None) -> list[str]:
-    kind = field.type
-    if isinstance(kind, Blob):
-        return [
-            describe.type_text(kind),
-            "",
-            "",
-            "",
-            describe.default_text(value) if value else "",
-            field.doc,
-        ]
-    if isinstance(kind, Array):
-        shown = describe.default_text(value) if value else ""
-        return [
-            describe.type_text(kind),
-            describe.range_text(kind.item),
-            kind.item.unit,
-            "",
-            shown,
-            field.doc,
-        ]
-    return [*_scalar(kind.container if isinstance(kind, Bits) else kind, value), field.doc]
-
-
-def _scalar(kind: Scalar, value: Value | None) -> list[str]:
-    counted = f"{kind.counts_unit} of {kind.counts}" if kind.counts else ""
-    shown = counted or describe.range_text(kind)
+def _about(step: Step | Member, value: Value | None) -> list[str]:
+    """Type, range, unit, step and default."""
+    number = number_of(step)
+    unit, scale = (number.unit, scale_text(number)) if number else ("", "")
     default = describe.default_text(value) if value else ""
-    return [describe.type_text(kind), shown, kind.unit, describe.step_text(kind), default]
+    return [type_text(step), holds_text(step), unit, scale, default]
 
 
 def show_enum(enum: Enum) -> None:

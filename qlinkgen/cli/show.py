@@ -7,12 +7,14 @@ import click
 from qlinkgen.cli import bitmap, describe
 from qlinkgen.cli.common import find_message, load_protocol, warn_unconfirmed
 from qlinkgen.cli.layout import UNCONFIRMED, show_enum, show_flags, show_message
+from qlinkgen.cli.plan_text import envelopes, parts_table
 from qlinkgen.cli.tables import Table, heading, paragraph
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.sizes import max_wire_size, protocol_max_wire_size
 from qlinkgen.model.transaction import Command
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.describe import id_text, span_text, transparency_text
+from qlinkgen.plan.framing import ByMark
 
 
 @click.command("show")
@@ -25,11 +27,12 @@ def command(protocol: str, message: str | None) -> None:
     are bytes; `on the wire` counts the frame and the worst case of stuffing.
     """
     shown = load_protocol(protocol)
+    plan = plan_of(shown)
     if message is None:
-        _protocol(shown)
+        _protocol(plan)
         return
     for each in _messages(shown, message):
-        show_message(shown, each)
+        show_message(plan, plan.message(each.name))
         warn_unconfirmed(shown, each)
 
 
@@ -40,69 +43,37 @@ def _messages(protocol: Protocol, name: str) -> list[Message]:
     return [message for message in (command.request, command.response) if message]
 
 
-def _protocol(protocol: Protocol) -> None:
+def _protocol(plan: Plan) -> None:
+    protocol = plan.protocol
     heading(f"{protocol.title} ({protocol.name}), revision {protocol.revision}")
     paragraph([protocol.source, protocol.doc])
-    _frame(protocol)
+    _frame(plan)
     _bus(protocol)
-    _commands(protocol)
-    _loose_messages(protocol)
+    _commands(plan)
+    _loose_messages(plan)
     _named(protocol)
 
 
-def _frame(protocol: Protocol) -> None:
-    frame = protocol.frame
-    if isinstance(frame, DelimitedFrame):
-        _delimited(frame)
-    elif isinstance(frame, MarkedFrame):
+def _frame(plan: Plan) -> None:
+    frame = plan.frame
+    if isinstance(frame.end, ByMark):
         heading("Header byte; the end byte is the same with the end's number")
-        paragraph(bitmap.diagram(8, bitmap.runs_of_header(frame)))
-        paragraph(_marked_facts(frame))
-    else:
-        paragraph(_packet_facts(frame))
-    paragraph([f"Most bytes on the wire: {protocol_max_wire_size(protocol)}"])
-
-
-def _delimited(frame: DelimitedFrame) -> None:
-    table = Table(["offset", "part", "bytes", "holds", "section"], "Frame", frozenset({"offset", "bytes"}))
-    behind = False
-    for part in frame.parts:
-        offset = f"{frame.offset(part.name)}+n" if behind else frame.offset(part.name)
-        size = describe.span_text(part.min_size, part.max_size) if part.role == "payload" else part.size
-        table.add(offset, part.name, size, describe.part_text(part, frame), part.section)
-        behind = behind or part.role == "payload"
-    table.show()
-    if frame.stuffing:
-        paragraph([f"Stuffing: {describe.stuffing_text(frame.stuffing)}"])
-
-
-def _marked_facts(frame: MarkedFrame) -> list[str]:
-    facts = [f"Payload: 0..{frame.payload_max} bytes without the marker bit"]
-    if frame.checksum:
-        bits = ", ".join(f"{chunk.shift}..{chunk.shift + chunk.bits - 1}" for chunk in frame.checksum.chunks)
-        facts.append(f"Checksum: {describe.checksum_text(frame.checksum)}; bits {bits} are sent")
-    return facts
-
-
-def _packet_facts(frame: PacketFrame) -> list[str]:
-    facts = [
-        f"Request: {frame.id_name} byte, up to {frame.payload_max} bytes written",
-        f"Response: up to {frame.payload_max} bytes read, and the check value if the host wants it",
-    ]
-    if frame.checksum:
-        facts.append(
-            f"Check value: {frame.checksum.algorithm.name} of {frame.id_name} and every word, written or read"
-        )
-    if frame.rejected is not None:
-        facts.append(f"A check value of {frame.rejected} says that the command is not known")
-    return facts
+        paragraph(bitmap.diagram(8, bitmap.runs_of_header(frame.end.header, frame.end.end.end_id)))
+    for title, envelope in envelopes(plan):
+        parts_table(frame, envelope, title, plan.protocol.part_sections).show()
+    facts = [f"Sent: {transparency_text(frame)}"]
+    if frame.needs_request and frame.check:
+        facts.append("The host need not read the check value")
+        if frame.check.rejected is not None:
+            facts.append(f"A check value of {frame.check.rejected} says that the command is not known")
+    paragraph([*facts, f"Most bytes on the wire: {plan.max_wire_size}"])
 
 
 def _bus(protocol: Protocol) -> None:
     bus = protocol.bus
     facts = [
         bus.kind.replace("_", "/"),
-        f"{protocol.address_name or 'nodes'} {describe.span_text(*bus.nodes)}" if bus.nodes else "",
+        f"{protocol.address_name or 'nodes'} {span_text(*bus.nodes)}" if bus.nodes else "",
         "" if bus.broadcast is None else f"broadcast {bus.broadcast}",
         f"{bus.baud} baud, {bus.bits_per_byte} bits a byte" if bus.baud else "",
     ]
@@ -111,7 +82,8 @@ def _bus(protocol: Protocol) -> None:
     paragraph([f"Bus: {', '.join(fact for fact in facts if fact)}"])
 
 
-def _commands(protocol: Protocol) -> None:
+def _commands(plan: Plan) -> None:
+    protocol = plan.protocol
     columns = ["id", "command", "request", "response", "on the wire", "addressing", "answer within", "repeat"]
     attributes = list(dict.fromkeys(name for each in protocol.commands for name in each.attributes))
     table = Table(
@@ -119,7 +91,7 @@ def _commands(protocol: Protocol) -> None:
     )
     for each in protocol.commands:
         table.add(
-            *_command_cells(protocol, each),
+            *_command_cells(plan, each),
             *(_attribute(each.attributes.get(name, "")) for name in attributes),
             each.section,
             _note(each),
@@ -127,14 +99,14 @@ def _commands(protocol: Protocol) -> None:
     table.show()
 
 
-def _command_cells(protocol: Protocol, command: Command) -> list[str]:
+def _command_cells(plan: Plan, command: Command) -> list[str]:
     request, response = command.request, command.response
-    wire = [max_wire_size(protocol.frame, message) for message in (request, response) if message]
+    wire = [plan.message(message.name).wire_size for message in (request, response) if message]
     return [
-        describe.id_text(request, protocol),
+        id_text(plan.frame, request.id),
         command.name,
-        describe.span_text(request.min_size, request.max_size),
-        describe.span_text(response.min_size, response.max_size) if response else "none",
+        span_text(request.min_size, request.max_size),
+        span_text(response.min_size, response.max_size) if response else "none",
         " + ".join(map(str, wire)),
         describe.ADDRESSING[command.addressing],
         describe.time_text(command.response_within) if response else "",
@@ -152,16 +124,17 @@ def _note(command: Command) -> str:
     return UNCONFIRMED if weak or any(not field.confirmed for m in messages for field in m.fields) else ""
 
 
-def _loose_messages(protocol: Protocol) -> None:
+def _loose_messages(plan: Plan) -> None:
     """Messages that are no part of a transaction."""
+    protocol = plan.protocol
     loose = [message for message in protocol.messages if protocol.command_of(message) is None]
     table = Table(["id", "message", "payload", "on the wire", "addresses", "section", "note"], "Messages")
     for message in loose:
         table.add(
-            describe.id_text(message, protocol),
+            id_text(plan.frame, message.id),
             message.name,
-            describe.span_text(message.min_size, message.max_size),
-            max_wire_size(protocol.frame, message),
+            span_text(message.min_size, message.max_size),
+            plan.message(message.name).wire_size,
             describe.addresses_text(message),
             message.section,
             "" if message.confirmed else UNCONFIRMED,

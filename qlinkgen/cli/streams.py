@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any, Protocol, assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
+from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, FramePlan, frame_plan
 
 #: A frame that both directions refuse is reported by the one that came further with it.
 PROGRESS = ("unknown", "length", "frame", "stuffing", "truncated", "crc", "illegal", "range")
@@ -185,11 +185,17 @@ def open_stream(protocol: Described, codec: ModuleType, direction: Direction | N
         return OneWay(codec, "message")
     if direction:
         return OneWay(codec, direction)
-    return InStep(codec) if _ends_alike(protocol.frame) else EitherWay(codec)
+    return InStep(codec) if _ends_alike(frame_plan(protocol.frame)) else EitherWay(codec)
 
 
-def _ends_alike(frame: Frame) -> bool:
+def _ends_alike(frame: FramePlan) -> bool:
     """Where a frame begins and ends does not depend on the direction."""
-    if isinstance(frame, DelimitedFrame):
-        return bool(frame.preamble) and frame.part("length") is not None
-    return isinstance(frame, MarkedFrame)
+    match frame.end:
+        case ByLength():
+            return bool(frame.envelope.preamble)
+        case ByMark():
+            return True
+        case ByMessage():
+            return False
+        case _:
+            assert_never(frame.end)

@@ -14,9 +14,9 @@ from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.link.codec import Codec
 from qlinkgen.link.echo import PROBE, EchoMode
 from qlinkgen.link.transaction import Accepts
-from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import whole_number
+from qlinkgen.plan.framing import frame_plan
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Ability, Port
 
@@ -132,8 +132,8 @@ def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
     """What was given; else a search, unless its bytes could be taken for the beginning of a frame."""
     if given is not None:
         return cast(EchoMode, given)
-    searched = isinstance(protocol.frame, DelimitedFrame) and protocol.frame.preamble
-    return "auto" if searched and not searched.startswith(PROBE[:1]) else "none"
+    preamble = frame_plan(protocol.frame).envelope.preamble
+    return "auto" if preamble and not preamble.startswith(PROBE[:1]) else "none"
 
 
 def counted(number: int, what: str) -> str:

@@ -120,6 +120,15 @@ class Message:
             elif not isinstance(field.type, Scalar) or field.type.settable:
                 yield Value(field.name, field.type, field.doc, field)
 
+    @property
+    def docs(self) -> dict[str, str]:
+        """What the document says of fields, and of the values inside them."""
+        found = {field.name: field.doc for field in self.fields}
+        for field in self.fields:
+            if isinstance(field.type, Bits):
+                found |= {member.name: member.doc for member in field.type.members}
+        return found
+
     def offset(self, name: str) -> int | None:
         """Bytes of payload before a field, None where a field of variable size stands before it."""
         position = 0

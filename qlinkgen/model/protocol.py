@@ -74,6 +74,12 @@ class Protocol:
             return part.name
         return None
 
+    @property
+    def part_sections(self) -> dict[str, str]:
+        """Sections of the document that describe parts of the frame, by part."""
+        parts = self.frame.parts if isinstance(self.frame, DelimitedFrame) else ()
+        return {part.name: part.section for part in parts}
+
     def command_of(self, message: Message) -> Command | None:
         """The transaction that a message belongs to."""
         return next(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from qlinkgen.model.checksum import Algorithm, Sum
 from qlinkgen.model.frame import Checksum
-from qlinkgen.model.integer import ByteOrder
+from qlinkgen.model.integer import ByteOrder, unpack_chunks
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,11 @@ class Check:
         return self.value.over
 
     @property
+    def mask(self) -> int:
+        """The bits that are sent."""
+        return self.value.mask
+
+    @property
     def regular(self) -> ByteOrder | None:
         """Byte order of a value that is sent whole, None where bits are left out or regrouped."""
         return self.value.regular
@@ -48,7 +53,7 @@ class Check:
     @property
     def complete(self) -> bool:
         """Every bit of the value is sent."""
-        return self.value.mask == self.algorithm.mask
+        return self.mask == self.algorithm.mask
 
     def of(self, *runs: bytes, start: int = 0) -> int:
         """The value over runs of bytes; a sum takes words of each run apart, and ``start`` first."""
@@ -60,3 +65,7 @@ class Check:
     def pack(self, value: int) -> bytes:
         """The wire bytes of a value."""
         return self.value.pack(value)
+
+    def unpack(self, data: bytes) -> int:
+        """The value in its wire bytes; bits that are not sent are 0."""
+        return unpack_chunks(data, self.value.chunks)

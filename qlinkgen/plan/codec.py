@@ -162,7 +162,8 @@ class Codec:
     # Packets
 
     def _packet(self, wire: bytes, direction: Direction, request: bytes) -> Decoded:
-        message = self.plan.known(direction).get(request[0] if direction == "response" else wire[0])
+        first = request[:1] if direction == "response" else wire[:1]
+        message = self.plan.known(direction).get(first[0]) if first else None
         if message is None:
             raise BadFrame("unknown", 1 if direction == "request" else 0)
         beside = message.envelope.overhead

@@ -130,7 +130,7 @@ def _member_bits(member: MemberValue | MemberConstant | MemberReserved, values: 
 
 def _checked(name: str, number: Scalar, value: object) -> int:
     fits = isinstance(value, int) and number.natural_minimum <= value <= number.natural_maximum
-    if not isinstance(value, int) or not fits or _broken(conditions(number), value):
+    if not isinstance(value, int) or not fits or broken(conditions(number), value):
         raise Unsendable(name, value)
     return value
 
@@ -147,7 +147,8 @@ def _count(step: RunStep, value: object) -> int:
     return len(value)
 
 
-def _broken(rules: tuple[Condition, ...], value: int) -> bool:
+def broken(rules: tuple[Condition, ...], value: int) -> bool:
+    """A condition does not hold of a number."""
     return not all(rule.holds(value) for rule in rules)
 
 
@@ -250,7 +251,7 @@ def _valid(name: str, integer: Integer, rules: tuple[Condition, ...], data: byte
     """The integer that begins ``data``, if its bytes are those of one and it keeps the rules."""
     own = data[: integer.size]
     value = integer.unpack(own)
-    if integer.stray(own) or _broken(rules, value):
+    if integer.stray(own) or broken(rules, value):
         raise BadContent("range", name, at)
     return value
 
@@ -262,7 +263,7 @@ def _members(step: BitsStep, whole: int, at: int) -> dict[str, Raw]:
         match member:
             case MemberValue():
                 value = member.number.integer.signed_value(bits)
-                if _broken(member.conditions, value):
+                if broken(member.conditions, value):
                     raise BadContent("range", member.name, at)
                 found[member.name] = value
             case MemberConstant():

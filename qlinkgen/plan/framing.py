@@ -359,6 +359,11 @@ class FramePlan:
         return part.check if part else None
 
     @property
+    def needs_request(self) -> bool:
+        """A response means nothing without the request that it answers."""
+        return isinstance(self.receiver, InStep)
+
+    @property
     def max_payload(self) -> int:
         """Most payload bytes that the frame allows."""
         return self.envelope.payload.most

@@ -61,6 +61,7 @@ class ConstantStep:
     place: Place
     integer: Integer
     value: int
+    number: Scalar
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ class ReservedStep:
     place: Place
     integer: Integer
     value: int
+    number: Scalar
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,12 @@ class MemberConstant:
     shift: int
     bits: int
     value: int
-    signed: bool = False
+    number: Scalar
+
+    @property
+    def signed(self) -> bool:
+        """The number is in two's complement."""
+        return self.number.signed
 
 
 @dataclass(frozen=True)
@@ -125,6 +132,7 @@ class MemberReserved:
     shift: int
     bits: int
     value: int
+    number: Scalar
 
 
 Member = MemberValue | MemberConstant | MemberReserved
@@ -276,6 +284,17 @@ class PayloadPlan:
         return tuple(found)
 
 
+def least_size(step: Step) -> int:
+    """Fewest bytes of a step."""
+    match step:
+        case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
+            return step.integer.size
+        case BytesStep() | ItemsStep():
+            return step.length.minimum * step.item_size
+        case _:
+            assert_never(step)
+
+
 def conditions(number: Scalar) -> tuple[Condition, ...]:
     """What must hold of a number on the wire, beyond what its bits can hold."""
     found: list[Condition] = [] if number.full_range else [Within(number.minimum, number.maximum)]
@@ -339,9 +358,9 @@ class _Planner:
 
     def _integer(self, name: str, scalar: Scalar, place: Place) -> Step:
         if scalar.reserved:
-            return ReservedStep(name, place, scalar.integer, scalar.default)
+            return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
         if scalar.constant:
-            return ConstantStep(name, place, scalar.integer, scalar.default)
+            return ConstantStep(name, place, scalar.integer, scalar.default, scalar)
         if not scalar.counts:
             return ValueStep(name, place, scalar.integer, scalar)
         counted = self._fields[scalar.counts]
@@ -378,9 +397,9 @@ def _member(member: BitField) -> Member:
     kind = member.type
     pattern = kind.default & kind.integer.mask
     if kind.reserved:
-        return MemberReserved(member.name, member.shift, kind.bits, pattern)
+        return MemberReserved(member.name, member.shift, kind.bits, pattern, kind)
     if kind.constant:
-        return MemberConstant(member.name, member.shift, kind.bits, pattern, kind.signed)
+        return MemberConstant(member.name, member.shift, kind.bits, pattern, kind)
     return MemberValue(member.name, member.shift, kind.bits, kind)
 
 

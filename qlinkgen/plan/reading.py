@@ -100,6 +100,9 @@ class Cursor:
         self.at = at
         #: An inserted byte must come next, if anything does.
         self.due = False
+        #: Places of the bytes taken, and of the inserted ones between them.
+        self.places: list[int] = []
+        self.inserted: list[int] = []
 
     def take(self, size: int, *, stuffed: bool) -> bytes:
         """Bytes of a part. Raises Missing, or BadFrame where an inserted byte is another one."""
@@ -107,6 +110,7 @@ class Cursor:
         while len(taken) < size:
             self._pass_inserted()
             taken.append(self._byte())
+            self.places.append(self.at - 1)
             if stuffed and self._rule is not None:
                 self._recent = (self._recent + taken[-1:])[-len(self._rule.after) :]
                 self.due = self._recent == self._rule.after
@@ -116,12 +120,17 @@ class Cursor:
 
     def _pass_inserted(self) -> None:
         if self.due and self._rule is not None:
-            byte = self._byte()
-            if byte != self._rule.insert:
-                again = self._hunting and byte == self._rule.after[0]
-                # A preamble inside a frame: the frame ends before it.
-                raise BadFrame("truncated", self.at - 2) if again else BadFrame("stuffing", self.at)
+            if self._byte() == self._rule.insert:
+                self.inserted.append(self.at - 1)
+            else:
+                again = self._hunting and self._wire[self.at - 1] == self._rule.after[0]
+                self.misplaced(again=again)
             self.due, self._recent = False, b""
+
+    def misplaced(self, *, again: bool) -> None:
+        """The byte before ``at`` is not the inserted one; ``again``: it is the second one of a preamble."""
+        # A preamble inside a frame: the frame ends before it.
+        raise BadFrame("truncated", self.at - 2) if again else BadFrame("stuffing", self.at)
 
     def _byte(self) -> int:
         if self.at == len(self._wire):

@@ -6,6 +6,7 @@ compiler knows how stuffing works.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 
@@ -44,6 +45,14 @@ class Insertion:
     def stuff(self, data: bytes) -> bytes:
         """The bytes as they are sent."""
         return data.replace(self.after, self.inserted)
+
+    def places(self, sent: bytes) -> Iterator[int]:
+        """Places at which an inserted byte is due; the last may lie past the end."""
+        at = sent.find(self.after)
+        while at >= 0:
+            at += len(self.after)
+            yield at
+            at = sent.find(self.after, at + (sent[at : at + 1] == bytes((self.insert,))))
 
     def growth(self, size: int) -> int:
         """Most bytes that are added to so many."""

@@ -37,15 +37,7 @@ def drivers(shared: Path, require_tool: Callable[..., str]) -> Iterator[Callable
 
     def get(name: str) -> Driver:
         if name not in running:
-            flags = (
-                "-O1",
-                "-g",
-                "-std=c99",
-                *WARNINGS,
-                "-fsanitize=address,undefined",
-                "-fno-sanitize-recover=all",
-            )
-            running[name] = Driver(build(protocol_of(name), shared / "drivers", compiler, flags))
+            running[name] = Driver(build(protocol_of(name), shared / "drivers", compiler, SANITIZED))
         return running[name]
 
     yield get

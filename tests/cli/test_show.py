@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import pytest
 
 from tests.cli.conftest import Run
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])
@@ -39,7 +42,7 @@ def test_the_commands_of_qlink(qlinkgen: Run) -> None:
         "7.10",
     ]
     assert "crc-16/ibm-3740 over length, command, node, data" in out
-    assert "a byte 00 is inserted behind every A5" in out
+    assert "a byte 00 is inserted after every A5" in out
 
 
 def test_the_command_shows_both_messages(qlinkgen: Run) -> None:
@@ -97,3 +100,12 @@ def test_no_allowance_is_no_time(qlinkgen: Run, thermo: Path) -> None:
     assert result.code == 0, result.err
     assert "no time" not in result.out
     assert "answered" in result.out
+
+
+def test_the_command_line_does_not_ask_for_the_kind_of_a_field() -> None:
+    kinds = {"Scalar", "Bits", "Blob", "Array", "DelimitedFrame", "MarkedFrame", "PacketFrame"}
+    for path in (ROOT / "qlinkgen" / "cli").glob("*.py"):
+        names = {
+            node.id for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Name)
+        }
+        assert not names & kinds, path

@@ -21,7 +21,7 @@ from qlinkgen.backends.python import bus, load
 from qlinkgen.backends.python import generate as generate_codec
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
-from qlinkgen.plan.build import plan_of
+from qlinkgen.plan import plan_of
 from qlinkgen.schema import loads
 from tests.python.protocols import build, defaults, module, protocol
 

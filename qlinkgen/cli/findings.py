@@ -1,0 +1,245 @@
+"""Faults in words: the rule that is broken with what was seen, and the likely cause."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import assert_never
+
+from qlinkgen.cli.crc_search import Coverage, coverages, explain_mismatch, explain_sum
+from qlinkgen.cli.describe import addresses_text
+from qlinkgen.cli.span_text import check_number
+from qlinkgen.plan.describe import (
+    bytes_text,
+    check_text,
+    id_text,
+    limits_text,
+    number_of,
+    number_text,
+    span_text,
+    value_text,
+)
+from qlinkgen.plan.framing import ByLength, ByMark, CheckPart, ConstantPart, LengthPart, MarkPart
+from qlinkgen.plan.payload import Member, Step
+from qlinkgen.plan.spans import Dissection, Fault, Rule
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.tree import MessagePlan
+
+Words = tuple[str, str]
+
+_LOST = "the capture was cut, or bytes were lost"
+
+
+def notes(found: Dissection) -> list[str]:
+    """What is worth knowing although no rule is broken by it."""
+    message = found.message
+    if message is None:
+        return []
+    text = []
+    payload, check = found.cells[message.envelope.payload.name], message.envelope.check
+    if message.payload.empty_is_default and not payload.data:
+        text.append("a payload of no bytes stands for every default")
+    if check and check.check.chained and not found.cells[check.name].data:
+        text.append("reading the check value is optional, but nothing else shows that the response is right")
+    return text
+
+
+def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: C901, PLR0912  # a case a rule
+    """Rule and cause; ``start`` is the offset of the frame in all bytes."""
+    of, at, name = fault.of, fault.at + start, found.plan.frame.address
+    match fault.rule:
+        case Rule.BEGINNING:
+            return _beginning(found, fault)
+        case Rule.FIRST:
+            cause = "the capture begins inside another frame, or the beginning of one was lost"
+            return f"{counted(fault.seen)} before the {_start(found)}, outside of any frame", cause
+        case Rule.CONSTANT:
+            assert isinstance(of, ConstantPart)
+            return f"{of.name} is {found.cells[of.name].data.hex(' ')}, must be {of.data.hex(' ')}", ""
+        case Rule.WHOLE:
+            return _missing(found, fault)
+        case Rule.ALONE:
+            return _interrupted(found, at)
+        case Rule.STUFFING:
+            return _stuffing(found, fault, at)
+        case Rule.LENGTH:
+            assert isinstance(of, LengthPart)
+            cause = "a bit of it was flipped, or the bytes before it are not a preamble but data"
+            return f"{of.name} is {fault.seen}, allowed are {span_text(of.least, of.most)}", cause
+        case Rule.LAST:
+            cause = "the capture goes on, or bytes were added; `qlinkgen decode` takes whole streams"
+            return f"{counted(fault.seen)} after the end of the frame", cause
+        case Rule.MESSAGE:
+            return _unknown(found, fault)
+        case Rule.SIZE:
+            return _size(found, fault)
+        case Rule.END:
+            cause = "a node counted down one of the two alone, or the end belongs to another frame"
+            return f"the end has {name} {fault.seen}, the header {found.address}", cause
+        case Rule.ADDRESS:
+            return _address(found, fault)
+        case Rule.CHECK:
+            return _check(found, fault)
+        case Rule.REFUSED:
+            assert isinstance(of, CheckPart)
+            cause = "the device does not know the command, or does not take it now"
+            return f"{of.name} is {fault.seen}: the command was refused as illegal", cause
+        case Rule.VALUE:
+            return _value(fault)
+        case _:
+            assert_never(fault.rule)
+
+
+def counted(number: int | None) -> str:
+    """``1 byte``, ``2 bytes``."""
+    return bytes_text(number or 0, number or 0)
+
+
+def _beginning(found: Dissection, fault: Fault) -> Words:
+    if isinstance(fault.of, MarkPart):
+        end = found.plan.frame.envelope.parts[-1]
+        other = end.end_id if isinstance(end, MarkPart) else 0
+        rule = f"no byte with 0x{fault.of.marker:02X} set and {fault.of.id_name} other than {other}"
+        return f"there is no header: {rule}", "the capture began late, or the header was lost"
+    preamble = found.plan.frame.envelope.preamble.hex(" ")
+    cause = "the capture began late, or a byte of the preamble was lost"
+    return f"there is no preamble {preamble}", cause
+
+
+def _start(found: Dissection) -> str:
+    """What a frame begins with."""
+    return "header" if isinstance(found.plan.frame.end, ByMark) else "preamble"
+
+
+def _interrupted(found: Dissection, at: int) -> Words:
+    if isinstance(found.plan.frame.end, ByMark):
+        cause = "the end byte was lost, or two nodes sent at once"
+        return f"a header at offset {at}, before the end of the frame", cause
+    cause = "the sender was interrupted or bytes were lost: this frame is cut off"
+    return f"a new preamble begins at offset {at}, inside the frame", cause
+
+
+def _unknown(found: Dissection, fault: Fault) -> Words:
+    frame, number = found.plan.frame, fault.seen or 0
+    near = _nearest(number, list(found.plan.known(found.direction).values()))
+    cause = f"the nearest known is {near.message.command}, {id_text(frame, near.id)}" if near else ""
+    return f"{frame.id_name} {id_text(frame, number)} is unknown", cause
+
+
+def _address(found: Dissection, fault: Fault) -> Words:
+    assert found.message is not None
+    cause = "the sender is set to a wrong address, or the message cannot be addressed so"
+    if isinstance(fault.of, MarkPart):
+        cause = "no node has this address; the node that should have taken the frame has sent it on"
+    allowed = addresses_text(found.message.message)
+    return f"{found.plan.frame.address} is {fault.seen}; {found.message.name} has {allowed}", cause
+
+
+def _missing(found: Dissection, fault: Fault) -> Words:
+    end, number = found.plan.frame.end, counted(fault.seen)
+    what = "packet" if found.plan.frame.needs_request else "frame"
+    if isinstance(end, ByMark):
+        return "there is no end byte", _LOST
+    if isinstance(end, ByLength):
+        data = found.cells[end.part.name].data
+        if len(data) == end.part.size:
+            cause = "the capture was cut, bytes were lost, or the length is wrong"
+            length = end.part.integer.unpack(data)
+            return f"{end.part.name} {length} announces {number} more than there are", cause
+    if found.message is None:
+        return f"the {what} ends {number} too early", _LOST
+    payload, check = found.message.payload, found.message.envelope.check
+    beside = f", and {check.size} of {check.name}" if check else ""
+    sizes = bytes_text(payload.least, payload.most)
+    return f"the {what} ends {number} too early; {found.message.name} has {sizes}{beside}", _LOST
+
+
+def _stuffing(found: Dissection, fault: Fault, at: int) -> Words:
+    way = found.plan.frame.transparency
+    assert isinstance(way, FrameStuffing | PayloadStuffing)
+    seen = "the end of the payload" if fault.seen is None else f"{fault.seen:02x}"
+    after = f"{way.rule.after.hex(' ')} at offset {at - len(way.rule.after)}"
+    rule = f"{after} is followed by {seen}, not by {way.rule.insert:02x}"
+    return rule, "the sender does not stuff, or a byte was lost or changed"
+
+
+def _size(found: Dissection, fault: Fault) -> Words:
+    message, lost = found.message, "bytes were lost or added"
+    size = fault.seen or 0
+    if message is None:
+        return f"payload of {counted(size)}, the frame allows {found.plan.frame.max_payload}", lost
+    envelope, payload = message.envelope, message.payload
+    if isinstance(found.plan.frame.end, ByMark):
+        check = envelope.check
+        beside = check.size if check else 0
+        between = size + (len(found.cells[check.name].data) if check else 0)
+        sizes = span_text(payload.least + beside, payload.most + beside)
+        what = f"{message.name} has {sizes}{' with its checksum' if beside else ''}"
+        return f"{counted(between)} between header and end; {what}", lost
+    if payload.least <= size <= payload.most:
+        rule = f"payload of {counted(size)}, which does not agree with the counts in it"
+        return rule, "a count was changed, or bytes were lost or added"
+    cause = f"{lost}, or the other side has another revision of the protocol"
+    if envelope.length and payload.fixed:
+        bias = envelope.length.bias
+        cause = (
+            f"{message.name} has {envelope.length.name} {payload.most + bias}, this is {size + bias}; {cause}"
+        )
+    return f"payload of {counted(size)}; {message.name} has {span_text(payload.least, payload.most)}", cause
+
+
+def _check(found: Dissection, fault: Fault) -> Words:
+    part, received, expected = fault.of, fault.seen or 0, found.expected or 0
+    assert isinstance(part, CheckPart)
+    text = check_text(part.check, found.plan.frame)
+    rule = f"{part.name} is {check_number(part, received)}, but {text} gives {check_number(part, expected)}"
+    if part.check.chained:
+        payload = found.cells[found.plan.frame.envelope.payload.name].data
+        return rule, explain_sum(part.check, found.plan.frame.id_name, found.request, payload, received)
+    if received == expected:
+        return rule, "bits of its bytes are set that belong to no value"
+    over = part.check.over
+    cells = {name: cell for name, cell in found.cells.items() if name != part.name}
+    plain = {name: cell.data for name, cell in cells.items()}
+    own = [pair for name in over for pair in zip(cells[name].places, plain[name], strict=True)]
+    return rule, explain_mismatch(part.check, received, _coverages(found, plain, over), own)
+
+
+def _coverages(found: Dissection, plain: Mapping[str, bytes], over: Sequence[str]) -> list[Coverage]:
+    """What the check value may have been taken over."""
+    way = found.plan.frame.transparency
+    match way:
+        case PayloadStuffing():
+            name = found.plan.frame.envelope.payload.name
+            bare = way.unstuff(plain[name])
+            others = plain if bare is None else {**plain, name: bare}
+            return coverages(plain, over, others, " without the stuffing")
+        case FrameStuffing():
+            sent = {name: found.cells[name].sent for name in plain}
+            return coverages(plain, over, sent, " with the stuffing")
+        case Plain() | SevenBit():
+            return coverages(plain, over, plain, "")
+        case _:
+            assert_never(way)
+
+
+def _value(fault: Fault) -> Words:
+    assert isinstance(fault.of, Step | Member)
+    scalar = number_of(fault.of)
+    seen = fault.seen or 0
+    if scalar is None:
+        return f"{fault.of.name} has a byte 0x{seen:02X} that it cannot have", "bytes were changed on the way"
+    if scalar.constant:
+        always = number_text(scalar.default)
+        cause = "another message or revision of the protocol"
+        return f"{fault.of.name} is {seen}, but is always {always}", cause
+    rule = f"{fault.of.name} is {value_text(scalar, seen)}, allowed are {limits_text(scalar)}"
+    return rule, "the sender does not keep the range"
+
+
+def _nearest(wanted: int, messages: Sequence[MessagePlan]) -> MessagePlan | None:
+    """The known message whose number differs in the fewest bits."""
+
+    def distance(message: MessagePlan) -> tuple[int, int, int]:
+        return (message.id ^ wanted).bit_count(), abs(message.id - wanted), message.id
+
+    return min(messages, key=distance, default=None)

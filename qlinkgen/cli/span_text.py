@@ -1,0 +1,124 @@
+"""Spans in words: what they are called, and what they hold."""
+
+from __future__ import annotations
+
+from typing import assert_never
+
+from qlinkgen.plan.describe import id_text, value_text
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
+)
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    Member,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    ReservedStep,
+    Step,
+    ValueStep,
+)
+from qlinkgen.plan.spans import Around, Dissection, Span
+
+_AROUND = {
+    Around.BEFORE: ("(noise)", "before the frame"),
+    Around.LOST: ("(preamble)", "rest of the preamble"),
+    Around.INSERTED: ("(stuffing)", "inserted"),
+    Around.EXTRA: ("(extra)", "belongs to no field"),
+    Around.NEXT: ("(next frame)", "begins inside this one"),
+    Around.AFTER: ("(after)", "not part of the frame"),
+}
+
+
+def value_of(found: Dissection, span: Span) -> tuple[str, str]:
+    """The name of a span and its value."""
+    of = span.of
+    if isinstance(of, Around):
+        return _AROUND[of]
+    if len(span.raw) < span.size:
+        return of.name, f"{len(span.raw)} of {span.size} bytes are there"
+    if isinstance(of, Part):
+        return of.name, _of_part(found, of, span)
+    return of.name, _of_field(of, span)
+
+
+def _of_part(found: Dissection, part: Part, span: Span) -> str:
+    match part:
+        case ConstantPart():
+            first = part is found.plan.frame.envelopes[found.direction].parts[0]
+            return f"must be {part.data.hex(' ')}" if span.fault else "preamble" if first else ""
+        case LengthPart() | AddressPart():
+            return str(span.number)
+        case IdPart():
+            return _id(found)
+        case MarkPart():
+            return _mark(found, part, span)
+        case PayloadPart():
+            return "payload of an unknown message"
+        case CheckPart():
+            return _check(found, part, span)
+        case _:
+            assert_never(part)
+
+
+def _of_field(field: Step | Member, span: Span) -> str:
+    number = span.number or 0
+    match field:
+        case ConstantStep() | ReservedStep() | ValueStep():
+            return value_text(field.number, number)
+        case MemberConstant() | MemberReserved() | MemberValue():
+            return value_text(field.number, number)
+        case CountStep():
+            return str(number)
+        case BitsStep():
+            return f"0x{number & field.integer.mask:0{2 * field.integer.size}X}"
+        case BytesStep():
+            text = repr(span.raw.decode("ascii", "backslashreplace"))
+            return text if field.text else f"{len(span.raw)} bytes"
+        case ItemsStep():
+            starts = range(0, len(span.raw), field.item_size)
+            items = (field.item.unpack(span.raw[at : at + field.item_size]) for at in starts)
+            return ", ".join(map(str, items))
+        case _:
+            assert_never(field)
+
+
+def _id(found: Dissection) -> str:
+    number = found.number or 0
+    messages = [message for message in found.plan.messages if message.id == number]
+    names = dict.fromkeys(message.message.command for message in messages)
+    return f"{id_text(found.plan.frame, number)} ({', '.join(names) or 'unknown'})"
+
+
+def _mark(found: Dissection, part: MarkPart, span: Span) -> str:
+    byte = span.raw[0]
+    address = f"{part.address_name} {part.address_of(byte)}"
+    if part.end_id is not None:
+        return address
+    name = f" ({found.message.name})" if found.message else ""
+    return f"{address}, {part.id_name} {part.id_of(byte)}{name}"
+
+
+def _check(found: Dissection, part: CheckPart, span: Span) -> str:
+    received = check_number(part, span.number or 0)
+    if found.expected is None:
+        return f"{received}, not checked"
+    if span.fault:
+        return f"{received}, computed {check_number(part, found.expected)}"
+    return f"{received}, right" + ("" if part.check.complete else " (the bits that are sent)")
+
+
+def check_number(part: CheckPart, value: int) -> str:
+    """A check value as it is written."""
+    return f"0x{value:0{(part.check.algorithm.width + 3) // 4}X}"

@@ -1,0 +1,403 @@
+"""The plan in words: what parts and steps hold, for tables, comments and documentation."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+from typing import assert_never
+
+from qlinkgen.model.integer import Chunk, Integer
+from qlinkgen.model.types import Enum, Flags, Length, Number, Scalar
+from qlinkgen.model.values import native_from_raw
+from qlinkgen.plan.check import Check
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
+from qlinkgen.plan.framing import (
+    AddressPart,
+    ByLength,
+    ByMark,
+    ByMessage,
+    CheckPart,
+    ConstantPart,
+    FramePlan,
+    Hunt,
+    IdPart,
+    InStep,
+    LengthPart,
+    MarkPart,
+    Marks,
+    Part,
+    PayloadPart,
+    Rescan,
+)
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    Compare,
+    ConstantStep,
+    CountStep,
+    Infer,
+    ItemsStep,
+    Learn,
+    Member,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    ReservedStep,
+    Sizing,
+    Step,
+    ValueStep,
+)
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+
+# Numbers ----------------------------------------------------------------------------------------------------
+
+
+def span_text(low: object, high: object) -> str:
+    """``low..high``, or one number where they are the same."""
+    return str(low) if low == high else f"{low}..{high}"
+
+
+def bytes_text(low: int, high: int) -> str:
+    """``1 byte``, ``0..12 bytes``."""
+    return f"{span_text(low, high)} byte{'' if low == high == 1 else 's'}"
+
+
+def number_text(value: Number | Fraction) -> str:
+    """A number without an exponent or needless digits."""
+    if isinstance(value, Decimal):
+        return f"{value:f}"
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def limits_text(scalar: Scalar) -> str:
+    """Legal values in the unit."""
+    low, high = sorted((scalar.physical(scalar.minimum), scalar.physical(scalar.maximum)))
+    return f"{number_text(low)}..{number_text(high)}"
+
+
+def range_text(scalar: Scalar) -> str:
+    """Legal values in the unit; "" for a bool, an enum or flags that may hold anything."""
+    if scalar.constant:
+        return f"always {number_text(scalar.physical(scalar.default))}"
+    if scalar.reserved:
+        return "reserved"
+    return "" if scalar.meaning is not None and scalar.full_range else limits_text(scalar)
+
+
+def scale_text(scalar: Scalar) -> str:
+    """The value of one step of the raw number: ``1/10``, ``1/2^16``, with the offset if there is one."""
+    if scalar.scaling is None:
+        return ""
+    scale, offset = scalar.scaling.scale, scalar.scaling.offset
+    base = scale.denominator.bit_length() - 1
+    power = base >= 8 and scale.denominator == 1 << base
+    step = f"{scale.numerator}/2^{base}" if power else str(scale)
+    return f"{step}, from {offset}" if offset else step
+
+
+def value_text(scalar: Scalar, raw: int) -> str:
+    """A value: its number in the unit, its name, or the names of its bits."""
+    meaning = scalar.meaning
+    match meaning:
+        case Enum():
+            return f"{meaning.name_of(raw) or 'no name'} ({raw})"
+        case Flags():
+            names = [member.name for member in meaning.members if raw >> member.value & 1]
+            bits = f"0x{raw & scalar.integer.mask:0{(scalar.bits + 3) // 4}X}"
+            return f"{bits} ({' | '.join(names) or 'none set'})"
+        case "bool":
+            return str(native_from_raw(scalar, raw)).lower()
+        case None:
+            unit = f" {scalar.unit}" if scalar.unit else ""
+            raw_text = f" (raw {raw})" if scalar.scaling else ""
+            return f"{number_text(scalar.physical(raw))}{unit}{raw_text}"
+        case _:
+            assert_never(meaning)
+
+
+# Steps ------------------------------------------------------------------------------------------------------
+
+
+def number_of(step: Step | Member) -> Scalar | None:
+    """What the number of a step means, or that of each of its items; None where it holds no value."""
+    match step:
+        case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep():
+            return step.number
+        case MemberValue() | MemberConstant() | MemberReserved():
+            return step.number
+        case CountStep() | BitsStep() | BytesStep():
+            return None
+        case _:
+            assert_never(step)
+
+
+def type_text(step: Step | Member) -> str:
+    """A type as a schema would name it: u16, i32 little, text[1..256], u16[0..12]."""
+    match step:
+        case ValueStep() | ConstantStep() | ReservedStep():
+            return _scalar_text(step.number)
+        case MemberValue() | MemberConstant() | MemberReserved():
+            return _scalar_text(step.number)
+        case CountStep() | BitsStep():
+            return integer_text(step.integer)
+        case BytesStep():
+            return f"{'text' if step.text else 'bytes'}[{_length_text(step.length)}]"
+        case ItemsStep():
+            return f"{integer_text(step.item)}[{_length_text(step.length)}]"
+        case _:
+            assert_never(step)
+
+
+def _scalar_text(scalar: Scalar) -> str:
+    integer, meaning = integer_text(scalar.integer), scalar.meaning
+    match meaning:
+        case Enum():
+            return f"{meaning.name} (enum, {integer})"
+        case Flags():
+            return f"{meaning.name} (flags, {integer})"
+        case "bool":
+            return "bool"
+        case None:
+            return integer
+        case _:
+            assert_never(meaning)
+
+
+def integer_text(integer: Integer) -> str:
+    """``u8``, ``i32 little``, ``u14 in groups: bits 7-13 0-6``."""
+    base = f"{'i' if integer.signed else 'u'}{integer.bits}"
+    if integer.size <= 1:
+        return base
+    if integer.byteorder:
+        return f"{base} {integer.byteorder}"
+    return f"{base} in groups: bits {' '.join(map(_chunk_text, integer.chunks))}"
+
+
+def _chunk_text(chunk: Chunk) -> str:
+    return f"{chunk.shift}-{chunk.shift + chunk.bits - 1}"
+
+
+def _length_text(length: Length) -> str:
+    """``4``, ``0..12``, or ``0..12, by count``."""
+    span = span_text(length.minimum, length.maximum)
+    return f"{span}, by {length.counted_by}" if length.counted_by else span
+
+
+def holds_text(step: Step | Member) -> str:
+    """What a step may hold, beyond its type: a range, a constant, or what it counts."""
+    match step:
+        case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep():
+            return range_text(step.number)
+        case MemberValue() | MemberConstant() | MemberReserved():
+            return range_text(step.number)
+        case CountStep():
+            return f"{count_unit(step)} of {step.run}"
+        case BitsStep():
+            return span_text(step.integer.minimum, step.integer.maximum)
+        case BytesStep():
+            return ""
+        case _:
+            assert_never(step)
+
+
+def kind_text(step: Step | Member) -> str:
+    """What a step does, in a word."""
+    match step:
+        case ValueStep() | MemberValue():
+            return "value"
+        case ConstantStep() | MemberConstant():
+            return "constant"
+        case ReservedStep() | MemberReserved():
+            return "reserved"
+        case CountStep():
+            return "count"
+        case BitsStep():
+            return "bits"
+        case BytesStep():
+            return "text" if step.text else "bytes"
+        case ItemsStep():
+            return "items"
+        case _:
+            assert_never(step)
+
+
+def must_text(step: Step | Member) -> str:
+    """What must hold of the raw number of a step, or of each of its items, beyond what its bits can hold."""
+    match step:
+        case ValueStep() | ItemsStep() | MemberValue():
+            return " and ".join(map(condition_text, step.conditions))
+        case ConstantStep():
+            return str(step.value)
+        case MemberConstant():
+            return str(step.number.integer.signed_value(step.value))
+        case ReservedStep() | MemberReserved():
+            return f"anything; sent as {step.value}"
+        case CountStep():
+            return f"{count_unit(step)} of {step.run}, {condition_text(step.bounds)}"
+        case BitsStep():
+            return ""
+        case BytesStep():
+            return "7-bit characters" if step.text else ""
+        case _:
+            assert_never(step)
+
+
+def count_unit(step: CountStep) -> str:
+    """What a count counts."""
+    return "items" if step.scale == 1 else "bytes"
+
+
+def size_text(size: Size) -> str:
+    """A size: ``4``, ``3 + 2*samples``."""
+    terms = [f"{term.factor}*{term.run}" if term.factor > 1 else term.run for term in size.terms]
+    return " + ".join([str(size.fixed)] * bool(size.fixed or not terms) + terms)
+
+
+def condition_text(rule: Condition) -> str:
+    """A condition on a number on the wire."""
+    match rule:
+        case Within():
+            return span_text(rule.low, rule.high)
+        case Clear():
+            return f"bits 0x{rule.mask:X} clear"
+        case OneOf():
+            return " or ".join(map(condition_text, rule.ranges))
+        case _:
+            assert_never(rule)
+
+
+def sizing_text(each: Sizing) -> str:
+    """How the number of items of a run is found."""
+    match each:
+        case Learn():
+            count, bounds = each.count, condition_text(each.count.bounds)
+            return f"{count.run}: {_counted_text(count)}; {count.name} is {bounds}"
+        case Compare():
+            return f"{each.count.run}: {_counted_text(each.count)}, which must agree"
+        case Infer():
+            others = f"({size_text(each.others)})" if each.others.terms else size_text(each.others)
+            rest = f"payload size - {others}" if others != "0" else "payload size"
+            share = f"({rest}) / {each.run.item_size}" if each.run.item_size > 1 else rest
+            return f"{each.run.name}: {share}, {span_text(each.run.length.minimum, each.run.length.maximum)}"
+        case _:
+            assert_never(each)
+
+
+def _counted_text(count: CountStep) -> str:
+    return f"{count.name} / {count.scale}" if count.scale > 1 else count.name
+
+
+# Parts ------------------------------------------------------------------------------------------------------
+
+
+def part_text(part: Part, frame: FramePlan) -> str:
+    """What a part of a frame holds."""
+    match part:
+        case ConstantPart():
+            return part.data.hex(" ").upper()
+        case LengthPart():
+            return (
+                f"payload bytes{f' + {part.bias}' if part.bias else ''}, {span_text(part.least, part.most)}"
+            )
+        case IdPart():
+            return "message id"
+        case AddressPart():
+            return "address"
+        case MarkPart():
+            what = part.id_name if part.end_id is None else f"{part.end_id} in place of {part.id_name}"
+            return f"0x{part.marker:02X}, {part.address_name}, {what}"
+        case PayloadPart():
+            return "the message's fields"
+        case CheckPart():
+            text = check_text(part.check, frame)
+            return text if part.check.complete else f"{text}; bits {_sent_bits_text(part.check)} are sent"
+        case _:
+            assert_never(part)
+
+
+def check_text(check: Check, frame: FramePlan) -> str:
+    """Algorithm and coverage."""
+    if check.chained:
+        words = f"every {check.word}-byte word" if check.word > 1 else "every byte"
+        return f"{check.algorithm.name} of {frame.id_name} and {words}, written or read"
+    return f"{check.algorithm.name} over {', '.join(check.over)}"
+
+
+def _sent_bits_text(check: Check) -> str:
+    return ", ".join(f"{chunk.shift}..{chunk.shift + chunk.bits - 1}" for chunk in check.value.chunks)
+
+
+def id_text(frame: FramePlan, number: int) -> str:
+    """A message id as its frame carries it: hexadecimal where it has bytes of its own."""
+    end = frame.end
+    match end:
+        case ByMark():
+            return str(number)
+        case ByLength() | ByMessage():
+            return f"0x{number:02X}"
+        case _:
+            assert_never(end)
+
+
+def end_text(frame: FramePlan) -> str:
+    """What tells where a frame ends."""
+    end = frame.end
+    match end:
+        case ByLength():
+            bias = f" - {end.part.bias}" if end.part.bias else ""
+            return f"the payload has {end.part.name}{bias} bytes"
+        case ByMessage():
+            return "the message and the counts in its payload tell its size"
+        case ByMark():
+            return f"the next byte with bit 0x{end.header.marker:02X} set"
+        case _:
+            assert_never(end)
+
+
+def transparency_text(frame: FramePlan) -> str:
+    """How the bytes of a frame travel."""
+    way, envelope = frame.transparency, frame.envelope
+    match way:
+        case Plain():
+            return "bytes are sent as they are"
+        case SevenBit():
+            return f"no byte between header and end has bit 0x{way.marker:02X} set"
+        case FrameStuffing():
+            parts = envelope.between(way.front, way.back)
+            exempt = ", ".join(part.name for part in envelope.parts if part not in parts)
+            rule = f"a byte {way.rule.insert:02X} is inserted after every {_after_text(way)}"
+            return f"{rule}, after the checksum is computed" + (f"; not in {exempt}" if exempt else "")
+        case PayloadStuffing():
+            rule = f"a byte {way.rule.insert:02X} is inserted after every {_after_text(way)}"
+            return f"{rule} in {envelope.payload.name}, before length and checksum are computed"
+        case _:
+            assert_never(way)
+
+
+def _after_text(way: FrameStuffing | PayloadStuffing) -> str:
+    return way.rule.after.hex(" ").upper()
+
+
+def receiver_text(frame: FramePlan) -> tuple[str, str]:
+    """How a receiver finds frames, and why so."""
+    way, preamble = frame.receiver, frame.envelope.preamble.hex(" ").upper()
+    match way:
+        case Hunt():
+            return "hunt", (
+                f"{preamble} appears nowhere inside a frame, so every byte is looked at once and nothing but "
+                "the frame itself is kept"
+            )
+        case Rescan():
+            seen = f"{preamble} may also be data" if preamble else "no constant begins a frame"
+            proof = (
+                "the check value proves a frame, so one with wrong contents is skipped as a whole"
+                if way.verified
+                else "no check value proves a frame"
+            )
+            return "rescan", f"{seen}, so a failed search goes on from the next byte; {proof}"
+        case Marks():
+            return "marks", "a bit tells header and end from all other bytes"
+        case InStep():
+            return "in step", "nothing marks a packet, so both sides must agree where one begins"
+        case _:
+            assert_never(way)

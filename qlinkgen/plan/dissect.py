@@ -1,0 +1,499 @@
+"""Says what each byte of one frame is, and which rules the frame breaks.
+
+`Codec.decode` stops at the first fault; `dissect` goes on, so that every byte belongs to a span. Both agree:
+`Dissection.kind` is what `decode` raises, and one of `Dissection.faults` has that kind. A fault that only
+follows from another one is not listed: after a wrong inserted byte, say, the check value is not judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import assert_never
+
+from qlinkgen.model.integer import Integer
+from qlinkgen.model.message import Direction
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import BadContent, MoreNeeded, measure
+from qlinkgen.plan.fields import Fields
+from qlinkgen.plan.framing import (
+    AddressPart,
+    ByLength,
+    ByMark,
+    ByMessage,
+    CheckPart,
+    ConstantPart,
+    Hunt,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
+)
+from qlinkgen.plan.payload import Member, Step
+from qlinkgen.plan.reading import BadFrame, Cursor, Missing
+from qlinkgen.plan.spans import Around, Cell, Dissection, Fault, Rule, Span
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing
+from qlinkgen.plan.tree import MessagePlan, Plan
+
+Named = Part | Step | Member | None
+
+
+def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"") -> Dissection:
+    """Dissect exactly one frame; ``request`` is the packet that a response answers."""
+    codec = Codec(plan)
+    try:
+        codec.decode(wire, direction, request)
+    except BadFrame as bad:
+        kind = bad.kind
+    else:
+        kind = ""
+    return _Walk(codec, wire, direction, request, kind).run()
+
+
+def request_size(plan: Plan, wire: bytes) -> int:
+    """Bytes of the packet that begins ``wire``; all of them where that cannot be told."""
+    message = plan.known("request").get(wire[0]) if wire else None
+    if message is None:
+        return len(wire)
+    beside = message.envelope.overhead
+    try:
+        size = measure(message.payload, wire[message.envelope.header_size :])
+    except (MoreNeeded, BadContent):
+        return len(wire)
+    return min(len(wire), size + beside)
+
+
+class _Cursor(Cursor):
+    """Takes a wrong inserted byte for a byte of the frame, and goes on."""
+
+    def __init__(self, wire: bytes, at: int, stuffing: FrameStuffing | None, *, hunting: bool) -> None:
+        super().__init__(wire, at, stuffing.rule if stuffing else None, hunting=hunting)
+        #: Places at which an inserted byte is due and another one is.
+        self.wrong: list[int] = []
+        #: Where a new frame begins inside this one.
+        self.next: int | None = None
+
+    def some(self, size: int, *, stuffed: bool) -> None:
+        """Take so many bytes, or all that there are."""
+        if self.next is None:
+            with suppress(Missing):
+                self.take(size, stuffed=stuffed)
+
+    def misplaced(self, *, again: bool) -> None:
+        """Note it."""
+        if again:
+            self.at = self.next = self.at - 2
+            raise Missing
+        self.at -= 1
+        self.wrong.append(self.at)
+
+
+class _Walk:
+    """Divides one frame into parts, then judges them."""
+
+    def __init__(self, codec: Codec, wire: bytes, direction: Direction, request: bytes, kind: str) -> None:
+        self.codec, self.plan, self.frame = codec, codec.plan, codec.plan.frame
+        self.wire, self.direction, self.request, self.kind = wire, direction, request, kind
+        self.known = self.plan.known(direction)
+        self.envelope = self.frame.envelopes[direction]
+        stuffing = self.frame.transparency
+        self.whole = stuffing if isinstance(stuffing, FrameStuffing) else None
+        self.alone = stuffing if isinstance(stuffing, PayloadStuffing) else None
+        parts = self.envelope.between(self.whole.front, self.whole.back) if self.whole else ()
+        self.stuffed = {part.name for part in parts}
+        self.cursor = _Cursor(wire, 0, self.whole, hunting=isinstance(self.frame.receiver, Hunt))
+        self.message: MessagePlan | None = None
+        self.number: int | None = None
+        self.address: int | None = None
+        self.cells: dict[str, Cell] = {}
+        self.wanted: dict[str, int] = {}
+        self.spans: list[Span] = []
+        self.faults: list[Fault] = []
+        #: The preamble is not there: what is taken for the length may be anything.
+        self.astray = False
+        #: A count cannot be: the payload is taken to be what is left.
+        self.miscounted = False
+
+    def run(self) -> Dissection:
+        """The whole."""
+        front = self._begin()
+        if front is not None:
+            self._divide(front)
+            self._close()
+            expected = self._judge()
+        else:
+            expected = None
+        faults = sorted(self.faults, key=lambda fault: fault.kind != self.kind)
+        return Dissection(
+            self.plan, self.direction, self.wire, self.request, self.message, self.number, self.address,
+            tuple(sorted(self.spans, key=lambda span: span.places[0])),
+            tuple(dict.fromkeys(faults)), self.kind, self.cells, expected,
+        )  # fmt: skip
+
+    # Places
+
+    def _begin(self) -> tuple[Part, ...] | None:
+        """Find the beginning; the parts to take before the payload, None where there is no frame."""
+        first, *others = self.envelope.parts
+        match first:
+            case ConstantPart() if self.kind == "frame" and not self.wire.startswith(first.data):
+                start = self.wire.find(first.data)
+                if start < 0:
+                    self._lost(first)
+                    return tuple(others[: self.envelope.payload_at - 1])
+            case MarkPart():
+                heads = (at for at, byte in enumerate(self.wire) if self._is_header(first, byte))
+                start = next(heads, -1)
+                if start < 0:
+                    kind = "frame" if self.wire else "truncated"
+                    self._fault(kind, Rule.BEGINNING, 0, first)
+                    self._around(Around.BEFORE, range(len(self.wire)), kind)
+                    return None
+            case _:
+                start = 0
+        if start:
+            self._fault("frame", Rule.FIRST, 0, seen=start)
+            self._around(Around.BEFORE, range(start), "frame")
+            self.cursor.at = start
+        return self.envelope.front
+
+    def _is_header(self, part: MarkPart, byte: int) -> bool:
+        assert isinstance(self.frame.end, ByMark)
+        return bool(byte & part.marker) and part.id_of(byte) != self.frame.end.end.end_id
+
+    def _lost(self, first: ConstantPart) -> None:
+        """The preamble is nowhere: it may end with the first bytes, and a check value may cover it."""
+        self.astray = True
+        self._fault("frame", Rule.BEGINNING, 0, first)
+        ends = (first.data[at:] for at in range(1, first.size))
+        rest = next((end for end in ends if self.wire.startswith(end)), b"")
+        self._around(Around.LOST, range(len(rest)), "frame")
+        self.cells[first.name] = Cell(first.data, (), first.data)
+        self.wanted[first.name] = first.size
+        self.cursor.at = len(rest)
+
+    def _divide(self, front: Sequence[Part]) -> None:
+        """Take the parts one after the other."""
+        for part in front:
+            self._take(part, part.size)
+            if isinstance(part, LengthPart) and not self.astray:
+                self._bound(part)
+        self._identify()
+        if self.message is not None:
+            self.envelope = self.message.envelope
+        self._take_payload()
+        for part in self.envelope.back:
+            if isinstance(part, MarkPart) and self._interrupted(part):
+                self.wanted[part.name] = 0
+            self._take(part, self.wanted.get(part.name, part.size))
+
+    def _interrupted(self, part: MarkPart) -> bool:
+        """A header is where the end should be."""
+        at = self.cursor.at
+        if at < len(self.wire) and self._is_header(part, self.wire[at]):
+            self.cursor.next = at
+        return self.cursor.next is not None
+
+    def _take(self, part: Part, size: int) -> None:
+        """Take a part, after what was taken of it already."""
+        before = self._found(part)
+        taken = len(self.cursor.places)
+        self.cursor.some(size, stuffed=part.name in self.stuffed)
+        places = tuple(self.cursor.places[taken:])
+        data = bytes(self.wire[at] for at in places)
+        self.cells[part.name] = Cell(before.data + data, before.places + places, b"")
+        self.wanted[part.name] = len(before.data) + size
+
+    def _take_payload(self) -> None:
+        part, end, trailer = self.envelope.payload, self.frame.end, self.envelope.trailer_size
+        match end:
+            case ByLength():
+                length = self._number_in(end.part, end.part.integer)
+                fits = length is not None and end.part.least <= length <= end.part.most
+                size = length - end.part.bias if fits and length is not None else self._left() - trailer
+            case ByMark():
+                size = self._marked_size(end)
+            case ByMessage() if self.frame.needs_request:
+                payload = self.message.payload if self.message else None
+                size = max(payload.least, min(payload.most, self._left() - trailer)) if payload else 0
+            case ByMessage():
+                size = self._measured(part)
+            case _:
+                assert_never(end)
+        self._take(part, max(0, size))
+
+    def _marked_size(self, end: ByMark) -> int:
+        """Bytes of payload between two marks; where they are too few for a check value, there is none."""
+        rest = self.wire[self.cursor.at :]
+        between = next((at for at, byte in enumerate(rest) if byte & end.header.marker), None)
+        least = self.message.payload.least if self.message else 0
+        check = self.envelope.check
+        beside = check.size if check else 0
+        if between is None:
+            return max(least, len(rest) - beside)
+        if check and between - beside < least:
+            self.wanted[check.name] = 0
+            return between
+        return between - beside
+
+    def _measured(self, part: PayloadPart) -> int:
+        """Bytes still to take of a payload whose counts tell its size."""
+        if self.message is None:
+            return self._left() - self.envelope.trailer_size
+        while True:
+            data = self.cells[part.name].data if part.name in self.cells else b""
+            try:
+                return measure(self.message.payload, data) - len(data)
+            except MoreNeeded as more:
+                if self._left() == 0:
+                    return more.least - len(data)
+                self._take(part, 1)
+            except BadContent:
+                self.miscounted = True
+                return self._left() - self.envelope.trailer_size
+
+    def _left(self) -> int:
+        """Bytes that are left, without inserted ones."""
+        cursor = _Cursor(self.wire, self.cursor.at, self.whole, hunting=False)
+        cursor.due = self.cursor.due
+        if self.cursor.next is None:
+            cursor.some(len(self.wire) + 1, stuffed=True)
+        return len(cursor.places)
+
+    def _identify(self) -> None:
+        """Number, address and message, as far as they are there."""
+        if self.frame.needs_request and self.direction == "response":
+            self.number = self.request[0] if self.request else None
+        for part in self.envelope.front:
+            match part:
+                case IdPart():
+                    self.number = self._number_in(part, part.integer)
+                case AddressPart():
+                    self.address = self._number_in(part, part.integer)
+                case MarkPart():
+                    byte = self.cells[part.name].data[0]
+                    self.number, self.address = part.id_of(byte), part.address_of(byte)
+                case ConstantPart() | LengthPart() | PayloadPart() | CheckPart():
+                    pass
+                case _:
+                    assert_never(part)
+        self.message = None if self.number is None else self.known.get(self.number)
+
+    def _number_in(self, part: Part, integer: Integer) -> int | None:
+        data = self._found(part).data
+        return integer.unpack(data) if len(data) == integer.size else None
+
+    def _found(self, part: Part) -> Cell:
+        return self.cells.get(part.name, Cell(b"", (), b""))
+
+    def _close(self) -> None:
+        """What is left when all parts are taken, and what was taken too much."""
+        cursor, size = self.cursor, len(self.wire)
+        self._close_cells()
+        for at in cursor.inserted:
+            self._around(Around.INSERTED, range(at, at + 1))
+        for at in cursor.wrong:
+            self._fault("stuffing", Rule.STUFFING, at, seen=self.wire[at])
+        if cursor.next is not None:
+            self._cut(cursor.next)
+            return
+        follows = self.wire[cursor.at : cursor.at + 1]
+        if cursor.due and self.whole and follows == bytes((self.whole.rule.insert,)):
+            self._around(Around.INSERTED, range(cursor.at, cursor.at + 1))
+            cursor.at += 1
+        self._after()
+        short = [part for part in self.envelope.parts if self._short(part)]
+        if short and not self.astray:
+            self._fault("truncated", Rule.WHOLE, size, short[0], sum(map(self._short, short)))
+
+    def _close_cells(self) -> None:
+        """A part was sent up to where the next one begins, inserted bytes included."""
+        end = self.cursor.at
+        for name, cell in reversed(self.cells.items()):
+            if cell.places:
+                self.cells[name] = replace(cell, sent=self.wire[cell.places[0] : end])
+                end = cell.places[0]
+
+    def _cut(self, at: int) -> None:
+        """A new frame begins: no byte from there on belongs to this one."""
+        marked = isinstance(self.frame.end, ByMark)
+        self._fault("frame" if marked else "truncated", Rule.ALONE, at)
+        self._around(Around.NEXT, range(at, len(self.wire)), "frame" if marked else "truncated")
+        for name, cell in self.cells.items():
+            kept = tuple(place for place in cell.places if place < at)
+            if kept != cell.places:
+                self.cells[name] = Cell(
+                    cell.data[: len(kept)], kept, self.wire[kept[0] : at] if kept else b""
+                )
+        self._identify()
+
+    def _after(self) -> None:
+        rest = range(self.cursor.at, len(self.wire))
+        if rest:
+            kind = "frame" if isinstance(self.frame.end, ByMark) else "length"
+            self._fault(kind, Rule.LAST, rest.start, seen=len(rest))
+            self._around(Around.AFTER, rest, kind)
+
+    def _short(self, part: Part) -> int:
+        """Bytes of a part that are missing."""
+        return self.wanted.get(part.name, part.size) - len(self._found(part).data)
+
+    # Judgement
+
+    def _judge(self) -> int | None:
+        """Judge the parts in wire order; the check value that would be right."""
+        expected: int | None = None
+        for part in self.envelope.parts:
+            match part:
+                case ConstantPart():
+                    self._constant(part)
+                case LengthPart():
+                    self._length(part)
+                case IdPart():
+                    self._span(part, self.number, "unknown" if self._unknown(part) else "")
+                case AddressPart():
+                    self._span(part, self.address, self._addressed(part))
+                case MarkPart():
+                    self._mark(part)
+                case PayloadPart():
+                    self._payload(part)
+                case CheckPart():
+                    expected = self._check(part)
+                case _:
+                    assert_never(part)
+        if self.frame.needs_request and self.direction == "response" and self.message is None:
+            self._fault("unknown", Rule.MESSAGE, 0, seen=self.number)
+        return expected
+
+    def _constant(self, part: ConstantPart) -> None:
+        data, places = self._found(part).data, self._found(part).places
+        wrong = not part.data.startswith(data)
+        if wrong:
+            self._fault("frame", Rule.CONSTANT, places[0], part)
+        self._span(part, None, "frame" if wrong else "")
+
+    def _bound(self, part: LengthPart) -> None:
+        number = self._number_in(part, part.integer)
+        if number is not None and not part.least <= number <= part.most:
+            self._fault("length", Rule.LENGTH, self._found(part).places[0], part, number)
+
+    def _length(self, part: LengthPart) -> None:
+        wrong = any(each.rule is Rule.LENGTH for each in self.faults)
+        self._span(part, self._number_in(part, part.integer), "length" if wrong else "")
+
+    def _unknown(self, part: Part) -> bool:
+        if self.number is None or self.message is not None:
+            return False
+        kind = "frame" if isinstance(part, MarkPart) else "unknown"
+        self._fault(kind, Rule.MESSAGE, self._found(part).places[0], part, self.number)
+        return True
+
+    def _addressed(self, part: AddressPart | MarkPart) -> str:
+        """The kind of fault that the address is, "" where it is none."""
+        allowed = self.message.allowed if self.message else None
+        if self.address is None or allowed is None or allowed.holds(self.address):
+            return ""
+        kind = "frame" if isinstance(part, MarkPart) and self.address == 0 else "range"
+        self._fault(kind, Rule.ADDRESS, self._found(part).places[0], part, self.address)
+        return kind
+
+    def _mark(self, part: MarkPart) -> None:
+        cell = self._found(part)
+        if not cell.data:
+            return
+        byte = cell.data[0]
+        if part.end_id is None:
+            kind = "frame" if self._unknown(part) else self._addressed(part)
+        else:
+            wrong = part.address_of(byte) != self.address
+            kind = "frame" if wrong else ""
+            if wrong:
+                self._fault("frame", Rule.END, cell.places[0], part, part.address_of(byte))
+        self._span(part, byte, kind)
+
+    def _check(self, part: CheckPart) -> int | None:
+        data, check = self._found(part).data, part.check
+        covered = [each for each in self.envelope.parts if self.envelope.covered(each)]
+        if len(data) < part.size or any(map(self._short, covered)) or (check.chained and not self.message):
+            self._span(part, None)
+            return None
+        cells = {name: cell.sent if self.alone else cell.data for name, cell in self.cells.items()}
+        right = check.pack(self.codec.check_value(self.envelope, cells, self.request))
+        received, expected = check.unpack(data), check.unpack(right)
+        if data == right:
+            self._span(part, received)
+            return expected
+        # Wrong stuffing or a wrong length moves the bytes: then the check value says nothing.
+        if self.astray or any(each.rule in (Rule.STUFFING, Rule.LENGTH, Rule.WHOLE) for each in self.faults):
+            self._span(part, received)
+            return None
+        refused = check.rejected is not None and data == check.pack(check.rejected)
+        kind, rule = ("illegal", Rule.REFUSED) if refused else ("crc", Rule.CHECK)
+        self._fault(kind, rule, self._found(part).places[0], part, received)
+        self._span(part, received, kind)
+        return expected
+
+    # Payload
+
+    def _payload(self, part: PayloadPart) -> None:
+        cell = self._found(part)
+        data, places = self._plain(cell, whole=self._short(part) == 0)
+        at = places[0] if places else self.cursor.at
+        message = self.message
+        if message is None:
+            if len(data) > part.most and self.alone:
+                self._fault("length", Rule.SIZE, at, part, len(data))
+            if places:
+                self.spans.append(Span(part, places, data, len(data)))
+            return
+        if not data and message.payload.empty_is_default and not self._short(part):
+            return
+        whole = self._short(part) == 0
+        moved = any(each.rule in (Rule.STUFFING, Rule.ALONE) for each in self.faults)
+        check = self.envelope.check
+        # No room is left for the check value of a marked frame.
+        crowded = check is not None and self.wanted.get(check.name) == 0
+        fields = Fields(message.payload, data, sound=whole and not moved and not crowded)
+        if fields.bad or crowded or self.miscounted:
+            inside = message.payload.least <= len(data) <= message.payload.most and not crowded
+            kind = "frame" if isinstance(self.frame.end, ByMark) and not inside else "length"
+            self._fault(kind, Rule.SIZE, at, part, len(data))
+        for each in fields.wrong:
+            self._fault("range", Rule.VALUE, places[each.at], each.of, each.seen)
+        self.spans += (replace(span, places=tuple(places[i] for i in span.places)) for span in fields.spans)
+
+    def _plain(self, cell: Cell, *, whole: bool) -> tuple[bytes, tuple[int, ...]]:
+        """The payload and its places without the bytes inserted into it alone."""
+        if self.alone is None:
+            return cell.data, cell.places
+        inserted = set()
+        for at in self.alone.rule.places(cell.data):
+            if cell.data[at : at + 1] == bytes((self.alone.rule.insert,)):
+                inserted.add(at)
+                self._around(Around.INSERTED, (cell.places[at],))
+            elif at < len(cell.data):
+                self._fault("stuffing", Rule.STUFFING, cell.places[at], seen=cell.data[at])
+            elif whole:
+                self._fault("stuffing", Rule.STUFFING, cell.places[-1] + 1)
+        kept = [at for at in range(len(cell.data)) if at not in inserted]
+        return bytes(cell.data[at] for at in kept), tuple(cell.places[at] for at in kept)
+
+    # Results
+
+    def _fault(self, kind: str, rule: Rule, at: int, of: Named = None, seen: int | None = None) -> None:
+        self.faults.append(Fault(kind, rule, at, of, seen))
+
+    def _around(self, where: Around, places: Sequence[int], fault: str = "") -> None:
+        if places:
+            raw = bytes(self.wire[at] for at in places)
+            self.spans.append(Span(where, tuple(places), raw, len(raw), None, fault))
+
+    def _span(self, part: Part, number: int | None, fault: str = "") -> None:
+        """The bytes of a part that were found."""
+        cell = self._found(part)
+        if cell.places:
+            fault = fault or ("truncated" if self._short(part) else "")
+            size = self.wanted.get(part.name, part.size)
+            self.spans.append(Span(part, cell.places, cell.data, size, number, fault))

@@ -1,0 +1,171 @@
+"""Divides a payload into its fields, also one that is not a payload of the message."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import assert_never
+
+from qlinkgen.model.integer import Integer
+from qlinkgen.plan.content import BadContent, broken, count_items
+from qlinkgen.plan.expr import Condition, Within
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    Learn,
+    Member,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    PayloadPlan,
+    ReservedStep,
+    Step,
+    ValueStep,
+    least_size,
+)
+from qlinkgen.plan.spans import Around, Span
+
+
+@dataclass(frozen=True, slots=True)
+class Wrong:
+    """A value that its field cannot have, and where it begins in the payload."""
+
+    of: Step | Member
+    seen: int
+    at: int
+
+
+class Fields:
+    """The spans of a payload; their places count from its first byte.
+
+    Attributes:
+        bad: its sizes are not those of the message.
+        spans: in wire order, a member after its integer.
+        wrong: values that are not allowed; none are looked for where sizes are bad.
+    """
+
+    def __init__(self, plan: PayloadPlan, payload: bytes, *, sound: bool) -> None:
+        """Nothing is judged unless the payload is ``sound``, neither cut nor wrongly stuffed."""
+        self._plan, self._payload, self._sound = plan, payload, sound
+        self._learned: dict[str, int] = {}
+        self.bad = False
+        self.spans: list[Span] = []
+        self.wrong: list[Wrong] = []
+        counts: Mapping[str, int] = {}
+        try:
+            counts = count_items(plan, payload)
+        except BadContent:
+            self.bad = sound
+        self._judging = sound and not self.bad
+        self._divide(counts)
+
+    def _divide(self, counts: Mapping[str, int]) -> None:
+        at, rest = 0, sum(map(least_size, self._plan.steps))
+        for step in self._plan.steps:
+            rest -= least_size(step)
+            size = self._size(step, counts, len(self._payload) - at - rest)
+            places = tuple(range(at, min(at + size, len(self._payload))))
+            at += len(places)
+            self._step(step, places, size)
+        if self._payload[at:]:
+            places = tuple(range(at, len(self._payload)))
+            self.spans.append(Span(Around.EXTRA, places, self._payload[at:], len(places), None, "length"))
+
+    def _size(self, step: Step, counts: Mapping[str, int], left: int) -> int:
+        """Bytes of a step: by the counts, as far as they are right, else by what is left."""
+        match step:
+            case BytesStep() | ItemsStep() if not step.fixed:
+                number = counts.get(step.name, self._learned.get(step.name))
+                return step.item_size * (max(0, left) // step.item_size if number is None else number)
+            case _:
+                return least_size(step)
+
+    def _step(self, step: Step, places: tuple[int, ...], size: int) -> None:
+        raw = bytes(self._payload[at] for at in places)
+        if len(raw) < size:
+            if raw:
+                short = "length" if self._sound else "truncated"
+                self.spans.append(Span(step, places, raw, size, None, short))
+            return
+        match step:
+            case ValueStep():
+                self._integer(step, step.integer, step.conditions, places)
+            case ConstantStep():
+                self._integer(step, step.integer, (Within(step.value, step.value),), places)
+            case CountStep():
+                self._learn(step, self._integer(step, step.integer, (), places))
+            case ReservedStep():
+                self._span(step, places, step.integer.unpack(raw))
+            case BitsStep():
+                self._members(step, self._integer(step, step.integer, (), places), places)
+            case BytesStep():
+                high = (at for at in places if step.text and self._payload[at] >= 0x80)
+                self._span(step, places, None, next(high, None))
+            case ItemsStep():
+                self._items(step, raw, places)
+            case _:
+                assert_never(step)
+
+    def _learn(self, step: CountStep, number: int) -> None:
+        if any(isinstance(each, Learn) and each.count is step for each in self._plan.sizing):
+            self._learned[step.run] = max(0, number // step.scale)
+
+    def _items(self, step: ItemsStep, raw: bytes, places: tuple[int, ...]) -> None:
+        bad = None
+        for at in reversed(range(0, len(raw), step.item_size)):
+            if _misfit(step.item, step.conditions, raw[at : at + step.item_size]):
+                bad = places[at]
+        self._span(step, places, None, bad)
+
+    def _integer(
+        self, step: Step, integer: Integer, rules: tuple[Condition, ...], places: tuple[int, ...]
+    ) -> int:
+        raw = bytes(self._payload[at] for at in places)
+        number = integer.unpack(raw)
+        self._span(step, places, number, places[0] if _misfit(integer, rules, raw) else None)
+        return number
+
+    def _members(self, step: BitsStep, whole: int, places: tuple[int, ...]) -> None:
+        for member in step.members:
+            self._member(member, whole, places)
+
+    def _member(self, member: Member, whole: int, places: tuple[int, ...]) -> None:
+        integer = member.number.integer
+        number = integer.signed_value(whole >> member.shift & integer.mask)
+        rules: tuple[Condition, ...] = ()
+        match member:
+            case MemberValue():
+                rules = member.conditions
+            case MemberConstant():
+                value = integer.signed_value(member.value)
+                rules = (Within(value, value),)
+            case MemberReserved():
+                pass
+            case _:
+                assert_never(member)
+        self._span(member, places, number, places[0] if broken(rules, number) else None)
+
+    def _span(
+        self, of: Step | Member, places: tuple[int, ...], number: int | None, bad: int | None = None
+    ) -> None:
+        """Add a span; ``bad`` is where a value begins that is not allowed."""
+        wrong = bad is not None and self._judging
+        if bad is not None and wrong:
+            seen = number if number is not None else self._seen(of, bad)
+            self.wrong.append(Wrong(of, seen, bad))
+        if places:
+            raw = bytes(self._payload[at] for at in places)
+            self.spans.append(Span(of, places, raw, len(places), number, "range" if wrong else ""))
+
+    def _seen(self, of: Step | Member, at: int) -> int:
+        """The wrong item, or character."""
+        if isinstance(of, ItemsStep):
+            return of.item.unpack(self._payload[at : at + of.item_size])
+        return self._payload[at]
+
+
+def _misfit(integer: Integer, rules: tuple[Condition, ...], raw: bytes) -> bool:
+    return integer.stray(raw) or broken(rules, integer.unpack(raw))

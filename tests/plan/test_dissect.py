@@ -1,0 +1,175 @@
+"""Every byte of a frame belongs to one span, and what is wrong with it is what a decoder says."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.model.message import Direction
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import Unsendable, pack
+from qlinkgen.plan.dissect import dissect
+from qlinkgen.plan.payload import Member
+from qlinkgen.plan.reading import BadFrame
+from qlinkgen.plan.spans import Dissection
+from qlinkgen.schema.loader import load, loads
+
+_ROOT = Path(__file__).resolve().parents[2]
+_SCHEMAS = sorted([*(_ROOT / "schemas").glob("*.yaml"), *(_ROOT / "tests" / "schemas").glob("*.yaml")])
+_MUTANTS = 150
+
+#: Shapes of frames that no schema file has: parts, and the stuffing.
+_NUMBER, _NODE = "id: {role: message, type: u8}", "node: {role: address, type: u8}"
+_DATA, _SIZE = "data: {role: payload, size: 0..40}", "size: {role: length, type: u8, counts: [data]}"
+_SUM = "check: {role: checksum, type: u8, algorithm: sum8, over: [id, node, data]}"
+_CRC = "check: {role: checksum, type: u16, algorithm: crc-16/xmodem, over: [size, id, node, data]}"
+_DOUBLE = "start: {role: constant, value: 7E 7E}"
+_SHAPES = {
+    "constant_end": (
+        [
+            "start: {role: constant, value: 02}",
+            _SIZE,
+            _NUMBER,
+            _NODE,
+            _DATA,
+            _CRC,
+            "end: {role: constant, value: 03 0D}",
+        ],
+        "",
+    ),
+    "stuffed_between_constants": (
+        [
+            "start: {role: constant, value: 10 02}",
+            _NUMBER,
+            _NODE,
+            "size: {role: length, type: u16, counts: [data, check]}",
+            _DATA,
+            _SUM,
+            "end: {role: constant, value: 10 03}",
+        ],
+        "{after: 0x10, insert: 0x10, exempt: [start, end]}",
+    ),
+    "stuffed_after_two": (
+        [_DOUBLE, _SIZE, _NUMBER, _NODE, _DATA, _CRC],
+        "{after: 7E 7E, insert: 0x00, exempt: [start]}",
+    ),
+    "stuffed_payload": (
+        [_DOUBLE, _SIZE, _NUMBER, _NODE, _DATA, _CRC],
+        "{after: 7E 7E, insert: 0x7E, exempt: [start, size, id, node, check], checksum: after}",
+    ),
+    "neither_length_nor_check": (["start: {role: constant, value: 68}", _NUMBER, _NODE, _DATA], ""),
+    "no_length_stuffed": (
+        [_DOUBLE, _NUMBER, _NODE, _DATA, _SUM],
+        "{after: 0x7E, insert: 0x00, exempt: [start]}",
+    ),
+    "bare": ([_NUMBER, _NODE, _DATA, _SUM], ""),
+}
+_SCHEMA = """
+qlinkgen: 1
+protocol: {name: shape, title: Shape, revision: "1", source: Tests, doc: A shape}
+byteorder: big
+frame: {parts: {PARTS}STUFFING}
+bus: {kind: master_slave, nodes: 1..16, response_within: 5 ms}
+defaults: {addressing: node, repeat: safe}
+commands:
+  counted:
+    id: 0x10
+    request: {mark: {type: u8, const: 7}, n: {type: u8, counts: a}, a: "u16[0..9]", b: "u8[2]"}
+    response: {n: {type: u8, counts: t, counts_in: bytes}, t: "text[0..12]", f: {type: u8, bits: FIELDS}}
+  plain:
+    id: 0x7E
+    request: {a: {type: u16, range: 3..900, default: 5}}
+    response: {}
+"""
+_FIELDS = "{low: {at: 0..2, range: 1..5, default: 1}, high: {at: 4..7, signed: true}}"
+
+
+@cache
+def _plan(path: Path | str) -> Plan:
+    if isinstance(path, Path):
+        return plan_of(load(path))
+    parts, stuffing = _SHAPES[path]
+    text = _SCHEMA.replace("PARTS", ", ".join(parts)).replace("FIELDS", _FIELDS)
+    protocol, faults = loads(text.replace("STUFFING", stuffing and f", stuffing: {stuffing}"), f"{path}.yaml")
+    assert protocol is not None, [str(fault) for fault in faults]
+    return plan_of(protocol)
+
+
+def _cases() -> Iterator[tuple[Path | str, Direction]]:
+    paths: list[Path | str] = [*_SCHEMAS, *_SHAPES]
+    for path in paths:
+        yield from ((path, direction) for direction in _plan(path).heard)
+
+
+def _frames(plan: Plan, direction: Direction, chance: random.Random) -> list[tuple[bytes, bytes]]:
+    """Two frames of each message, one with its default values, one with any; each with its request."""
+    codec, frames = Codec(plan), []
+    for message in plan.received(direction):
+        request = bytes((message.id, *chance.randbytes(2)))
+        address = message.message.default_address
+        least, most = message.payload.least, min(message.payload.most, 40)
+        payloads = [chance.randbytes(chance.randint(least, max(least, most)))]
+        try:
+            payloads.append(pack(message.payload, {}))
+        except Unsendable:  # the caller has to choose a value
+            payloads.append(bytes(least))
+        frames += [(codec.seal(message.name, each, address, request), request) for each in payloads]
+    return frames
+
+
+def _mutant(wire: bytes, others: list[tuple[bytes, bytes]], chance: random.Random) -> bytes:
+    frame = bytearray(wire)
+    for _ in range(chance.randint(0, 2)):
+        at = chance.randrange(len(frame) + 1)
+        match chance.randrange(7):
+            case 0 if at < len(frame):
+                frame[at] ^= 1 << chance.randrange(8)
+            case 1:
+                del frame[at : at + chance.randint(1, 3)]
+            case 2:
+                del frame[at:]
+            case 3:
+                frame[at:at] = chance.choice((chance.randbytes(2), wire[:1], wire[:2], b"\x00"))
+            case 4:
+                frame += chance.choice((b"\x00", chance.randbytes(3), chance.choice(others)[0]))
+            case 5 if at < len(frame):
+                frame[at] = chance.choice((*wire, 0, 0x7F, 0xFF))
+            case _:
+                frame[:0] = chance.choice((b"", wire[:1], chance.randbytes(1)))
+    return bytes(frame)
+
+
+def _kind(plan: Plan, wire: bytes, direction: Direction, request: bytes) -> str:
+    try:
+        Codec(plan).decode(wire, direction, request)
+    except BadFrame as bad:
+        return bad.kind
+    return ""
+
+
+def _check(found: Dissection, kind: str) -> None:
+    what = (found.wire.hex(), found.faults)
+    assert found.kind == kind, what
+    assert [fault.kind for fault in found.faults[:1]] == ([kind] if kind else []), what
+    own = [span for span in found.spans if not isinstance(span.of, Member)]
+    assert sorted(place for span in own for place in span.places) == list(range(len(found.wire))), what
+    for span in found.spans:
+        assert span.raw == bytes(found.wire[place] for place in span.places), what
+    assert kind or not any(span.fault for span in found.spans), what
+
+
+@pytest.mark.parametrize(
+    ("path", "direction"), list(_cases()), ids=lambda value: getattr(value, "stem", value)
+)
+def test_dissecting_and_decoding_find_the_same_fault(path: Path | str, direction: Direction) -> None:
+    plan, chance = _plan(path), random.Random(f"{getattr(path, 'stem', path)} {direction}")
+    frames = _frames(plan, direction, chance)
+    for index in range(_MUTANTS):
+        wire, request = frames[index % len(frames)]
+        mutant = _mutant(wire, frames, chance)
+        _check(dissect(plan, mutant, direction, request), _kind(plan, mutant, direction, request))
