@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from qlinkgen.cli.tables import Table
+from qlinkgen.cli.tables import Table, heading, paragraph
 from qlinkgen.plan.describe import (
+    bytes_text,
+    condition_text,
+    end_text,
+    id_text,
+    kind_text,
+    must_text,
     part_text,
+    receiver_text,
+    size_text,
+    sizing_text,
     span_text,
+    transparency_text,
+    type_text,
 )
 from qlinkgen.plan.framing import CheckPart, Envelope, FramePlan, PayloadPart
-from qlinkgen.plan.tree import Plan
+from qlinkgen.plan.payload import BitsStep, BytesStep, ItemsStep, Step, least_size
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 def envelopes(plan: Plan) -> Sequence[tuple[str, Envelope]]:
@@ -39,3 +51,69 @@ def parts_table(
             sections.get(part.name, ""),
         )
     return table
+
+
+def show_frame_plan(plan: Plan) -> None:
+    """Print how frames are built and found, and the sizes of all messages."""
+    frame, protocol = plan.frame, plan.protocol
+    heading(f"Plan of {protocol.name}, revision {protocol.revision}")
+    for title, envelope in envelopes(plan):
+        parts_table(frame, envelope, title, {}, coverage=True).show()
+    strategy, reason = receiver_text(frame)
+    paragraph(
+        [
+            f"Sent: {transparency_text(frame)}",
+            f"End: {end_text(frame)}",
+            f"Receiver: {strategy}; {reason}",
+        ]
+    )
+    columns = ["id", "message", "payload", "frame", "on the wire", "check value"]
+    right = frozenset({"payload", "frame", "on the wire"})
+    table = Table(columns, "Messages (bytes; `on the wire` with everything inserted)", right)
+    for message in plan.messages:
+        payload = message.payload
+        table.add(
+            id_text(frame, message.id),
+            message.name,
+            span_text(payload.least, payload.most),
+            span_text(message.envelope.overhead + payload.least, message.frame_size),
+            message.wire_size,
+            "yes" if message.checked else "no",
+        )
+    table.show()
+
+
+def show_message_plan(plan: Plan, message: MessagePlan) -> None:
+    """Print the steps of a message."""
+    payload = message.payload
+    heading(f"Plan of {message.name}, id {id_text(plan.frame, message.id)}")
+    lines = [f"payload {bytes_text(payload.least, payload.most)}"]
+    if payload.empty_is_default:
+        lines.append("a payload of no bytes stands for every default")
+    if message.allowed:
+        lines.append(f"{plan.frame.address} must be {condition_text(message.allowed)}")
+    paragraph(lines)
+    sizes = [f"{index}. {sizing_text(each)}" for index, each in enumerate(payload.sizing, 1)]
+    if sizes:
+        heading("Sizes, in this order")
+        paragraph([*sizes, f"{len(sizes) + 1}. the payload has {size_text(payload.size)} bytes"])
+    columns = ["offset", "from end", "bytes", "step", "kind", "type", "must be"]
+    table = Table(columns, "Steps", frozenset({"offset", "from end", "bytes"}))
+    for step in payload.steps:
+        back = "" if step.place.back is None else step.place.back
+        table.add(
+            size_text(step.place.front), back, _bytes(step), step.name,
+            kind_text(step), type_text(step), must_text(step),
+        )  # fmt: skip
+        for member in step.members if isinstance(step, BitsStep) else ():
+            bits = span_text(member.shift, member.shift + member.bits - 1)
+            kind, must = kind_text(member), must_text(member)
+            table.add(f".{bits}", "", "", member.name, kind, type_text(member), must)
+    table.show()
+
+
+def _bytes(step: Step) -> str:
+    """Bytes of a step."""
+    if isinstance(step, BytesStep | ItemsStep) and not step.fixed:
+        return step.name if step.item_size == 1 else f"{step.item_size}*{step.name}"
+    return str(least_size(step))

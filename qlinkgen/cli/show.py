@@ -7,7 +7,7 @@ import click
 from qlinkgen.cli import bitmap, describe
 from qlinkgen.cli.common import find_message, load_protocol, warn_unconfirmed
 from qlinkgen.cli.layout import UNCONFIRMED, show_enum, show_flags, show_message
-from qlinkgen.cli.plan_text import envelopes, parts_table
+from qlinkgen.cli.plan_text import envelopes, parts_table, show_frame_plan, show_message_plan
 from qlinkgen.cli.tables import Table, heading, paragraph
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
@@ -20,8 +20,12 @@ from qlinkgen.plan.framing import ByMark
 @click.command("show")
 @click.argument("protocol")
 @click.argument("message", required=False)
-def command(protocol: str, message: str | None) -> None:
+@click.option("--plan", "planned", is_flag=True, help="How code builds and decodes it; see docs/plan.md.")
+def command(protocol: str, message: str | None, *, planned: bool) -> None:
     """Show a protocol: its frame, bus and transactions. With MESSAGE: layout, sizes, values.
+
+    With --plan, show what follows from that for code: the parts of a frame, which of them the check value
+    covers, how bytes travel, how a receiver finds frames; with MESSAGE the steps of its payload.
 
     MESSAGE is a message (motion.response), or a command (motion) for request and response together. Sizes
     are bytes; `on the wire` counts the frame and the worst case of stuffing.
@@ -29,11 +33,14 @@ def command(protocol: str, message: str | None) -> None:
     shown = load_protocol(protocol)
     plan = plan_of(shown)
     if message is None:
-        _protocol(plan)
+        show_frame_plan(plan) if planned else _protocol(plan)
         return
     for each in _messages(shown, message):
-        show_message(plan, plan.message(each.name))
-        warn_unconfirmed(shown, each)
+        if planned:
+            show_message_plan(plan, plan.message(each.name))
+        else:
+            show_message(plan, plan.message(each.name))
+            warn_unconfirmed(shown, each)
 
 
 def _messages(protocol: Protocol, name: str) -> list[Message]:

@@ -10,7 +10,7 @@ layouts are equal objects.
 * `framing` turns a frame into parts, their `transparency`, their `check` and the `receiver` that finds them.
 * `codec` and `receive` run the plan without generating code: the reference for every target. `dissect` says
   what each byte of a frame is.
-* `describe` has the words for parts and steps.
+* `describe` has the words for parts and steps. docs/plan.md shows them.
 """
 
 from __future__ import annotations

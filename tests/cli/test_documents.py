@@ -30,6 +30,7 @@ DOCUMENTS = [
     "README.md",
     "docs/tutorial.md",
     "docs/cli.md",
+    "docs/plan.md",
     "docs/quick-start.md",
     "docs/write-a-slave.md",
     "docs/stream-motion.md",

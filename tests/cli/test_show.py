@@ -7,9 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.cli.plan_text import show_message_plan
+from qlinkgen.plan import plan_of
+from qlinkgen.schema import load
 from tests.cli.conftest import Run
 
 ROOT = Path(__file__).resolve().parents[2]
+SCHEMAS = sorted([*(ROOT / "schemas").glob("*.yaml"), *(ROOT / "tests" / "schemas").glob("*.yaml")])
 
 
 @pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])
@@ -100,6 +104,39 @@ def test_no_allowance_is_no_time(qlinkgen: Run, thermo: Path) -> None:
     assert result.code == 0, result.err
     assert "no time" not in result.out
     assert "answered" in result.out
+
+
+@pytest.mark.parametrize("path", SCHEMAS, ids=lambda path: path.stem)
+def test_the_plan_of_everything(qlinkgen: Run, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It names every part and every step, and is the same each time."""
+    plan = plan_of(load(path))
+    out = qlinkgen("show", path, "--plan").out
+    assert out == qlinkgen("show", path, "--plan").out
+    words = set(out.split())
+    assert words >= {part.name for envelope in plan.frame.envelopes.values() for part in envelope.parts}
+    assert words >= {message.name for message in plan.messages}
+    for message in plan.messages:
+        show_message_plan(plan, message)
+        shown = set(capsys.readouterr().out.split())
+        assert shown >= {step.name for step in message.payload.steps}
+        assert shown >= {each.name for each in message.payload.settable}
+
+
+def test_the_plan_of_a_frame_and_of_its_strategy(qlinkgen: Run) -> None:
+    out = qlinkgen("show", "qlink", "--plan").out
+    assert "Receiver: hunt; A5 A5 appears nowhere inside a frame" in out
+    assert "End: the payload has length - 4 bytes" in out
+    assert "Receiver: marks; " in qlinkgen("show", "trio", "--plan").out
+    assert "Receiver: in step; " in qlinkgen("show", "mc1231a", "--plan").out
+
+
+def test_the_plan_of_a_message(qlinkgen: Run) -> None:
+    out = qlinkgen("show", ROOT / "tests/schemas/kitchen_sink.yaml", "--plan", "open_end.request").out
+    assert "1. samples: (payload size - 4) / 3, 0..20" in out
+    assert "2. the payload has 4 + 3*samples bytes" in out
+    steps = [line.split() for line in out.splitlines()]
+    assert ["1", "3*samples", "samples", "items", "i24", "little[0..20]"] in steps
+    assert ["1", "+", "3*samples", "3", "1", "mark", "constant", "u8", "85"] in steps
 
 
 def test_the_command_line_does_not_ask_for_the_kind_of_a_field() -> None:
