@@ -47,7 +47,7 @@ def write(folder: Path, *, most: int, bits: int = 8, values: int = 1) -> Path:
     (folder / "wide.yaml").write_text(text)
     protocol = load(folder / "wide.yaml")
     for target in ("c", "conformance"):
-        for path, made in TARGETS[target](protocol, Options()).items():
+        for path, made in TARGETS[target].load()(protocol, Options()).items():
             (folder / Path(path).name).write_text(made, "utf-8")
     return folder / "wide_conformance.c"
 

@@ -193,7 +193,7 @@ def printed(protocol: Protocol, folder: Path) -> construct.Live:
     """The structures of the printed module, imported from a package as a user would."""
     package = folder / f"construct_of_{protocol.name}"
     package.mkdir()
-    for path, text in {**construct.shared(), **construct.generate(protocol, Options())}.items():
+    for path, text in construct.generate(protocol, Options()).items():
         (package / Path(path).name).write_text(text, "utf-8")
     return construct.Live(vars(_imported(package, protocol.name)))
 

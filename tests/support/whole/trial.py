@@ -319,8 +319,7 @@ class _Trial:
 
 
 def _generate(name: str, protocol: Protocol, texts: dict[str, str]) -> None:
-    generate, _ = TARGETS[name].load()
-    texts.update(generate(protocol, Options()))
+    texts.update(TARGETS[name].load()(protocol, Options()))
 
 
 def _parse(text: str, path: str) -> None:
