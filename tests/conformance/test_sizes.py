@@ -39,11 +39,28 @@ commands:
     response: {{}}
 """
 
+BARE = """
+qlinkgen: 1
+protocol: {name: wide, title: Bare, revision: "1", source: this test, doc: Nothing around an answer.}
+frame: {packet: {id: {role: message, type: u8}, data: {role: payload, size: 0..40}}}
+bus: {kind: host, baud: 9600, response_within: 1 ms}
+defaults: {repeat: safe}
+commands:
+  set: {id: 1, doc: Set., request: {a: u16}, response: {}}
+  get: {id: 2, doc: Get., request: {}, response: {a: u16}}
+"""
+
 
 def write(folder: Path, *, most: int, bits: int = 8, values: int = 1) -> Path:
+    """The kit of a schema with long frames, wide ids and addresses, or many values."""
     top = (1 << bits) - 1
     fields = ", ".join(f"v{number}: u8" for number in range(values))
     text = SCHEMA.format(bits=bits, most=most, number=top, other=top // 2, nodes=top - 1, values=fields)
+    return written(folder, text)
+
+
+def written(folder: Path, text: str) -> Path:
+    """Write header and kit of a schema; returns the kit."""
     (folder / "wide.yaml").write_text(text)
     protocol = load(folder / "wide.yaml")
     for target in ("c", "conformance"):
@@ -74,3 +91,7 @@ def test_wide_ids_and_addresses(
 @pytest.mark.parametrize("values", [255, 256, 300])
 def test_many_values(values: int, tmp_path: Path, require_tool: Callable[..., str]) -> None:
     check(write(tmp_path, most=values, values=values), require_tool("gcc", package="gcc"))
+
+
+def test_answers_of_no_bytes(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    check(written(tmp_path, BARE), require_tool("gcc", package="gcc"))

@@ -30,6 +30,8 @@ class Layouts:
     def put(self, scalar: Scalar, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
         if scalar.size == 1:
+            if scalar.signed and scalar.bits < 8:  # no sign in bits that the wire does not have
+                value = f"(uint8_t)({value} & {unsigned(scalar.chunks[0].mask, 8, hexadecimal=True)})"
             return f"{place}[{index}] = {value};"
         return f"{self._call('put', scalar)}({pointer(place, index)}, {value});"
 

@@ -8,7 +8,7 @@ from qlinkgen.backends.base import Options, banner
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import numbers, wrapped
 from qlinkgen.backends.conformance.messages import ERRORS, Entries
-from qlinkgen.backends.conformance.rows import kinds_in, most_values, rows_of
+from qlinkgen.backends.conformance.rows import Right, kinds_in, most_values, rows_of
 from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm
@@ -60,6 +60,8 @@ class Kit:
             "noise": [numbers((len(piece), *piece)) for piece in noise],
             "noise_size": max(map(len, noise)) + 1,
             "most_wire": most_wire,
+            # An answer without a payload that nothing frames or checks.
+            "empty_wires": not all(row.wire for row in self._every if isinstance(row, Right)),
             "most_request": max(len(row.request) for row in self._every),
             "most_values": max(1, *(most_values(header, message) for message in self._messages)),
             "most_events": self._entries.most_events + 1,
