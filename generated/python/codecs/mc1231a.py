@@ -5635,9 +5635,9 @@ class StreamDecoder:
             text = f"direction is {direction!r}; use request or response"
             raise ValueError(text)
         self._answers = direction == "response"
-        self._buffer = b""
+        self._buffer: bytes = b""
         self._expected: list[Request] = []
-        self._offset = 0  # of the buffer's first byte in the stream
+        self._offset: int = 0  # of the buffer's first byte in the stream
         self.counters = Counters()
 
     def expect(self, request: Request) -> None:

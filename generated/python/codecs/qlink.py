@@ -158,10 +158,10 @@ _MAX_LENGTH = 30
 #: What a buffer may end in while a frame begins there.
 _BEGINNINGS = (b"", _PREAMBLE[:1], _PREAMBLE)
 
-_checksum = find_crc("crc-16/ibm-3740")
-_check = _checksum.verifier(2, "big")
-_crc = _checksum.compute
-_crc_start = _checksum.start
+_CHECKSUM = find_crc("crc-16/ibm-3740")
+_check = _CHECKSUM.verifier(2, "big")
+_crc = _CHECKSUM.compute
+_crc_start = _CHECKSUM.start
 _WHOLE_3 = Struct(">2s3sH").pack
 _WHOLE_4 = Struct(">2s4sH").pack
 _WHOLE_5 = Struct(">2s5sH").pack
@@ -181,7 +181,7 @@ def _stuffed(body: bytes, crc: int) -> bytes:
     return _PREAMBLE + (body + check).replace(_UNSTUFFED, _STUFFED)
 
 
-def _sealed_again(message: Message, checksum: Checksum) -> bytes:
+def _frame_with(message: Message, checksum: Checksum) -> bytes:
     """The frame of a message with a check value by another algorithm."""
     body = message.to_frame()[2:].replace(_STUFFED, _UNSTUFFED)[:-2]
     return _stuffed(body, checksum.compute(body, checksum.start))
@@ -2407,7 +2407,7 @@ def _judge(
 
 
 def _decode(
-    wire: BytesLike, known: dict[int, type[Message]], checksum: Checksum = _checksum
+    wire: BytesLike, known: dict[int, type[Message]], checksum: Checksum = _CHECKSUM
 ) -> Message:
     """One whole frame as it is on the wire. Raises DecodeError."""
     data = as_bytes(wire)
@@ -2485,14 +2485,14 @@ class StreamDecoder:
         self,
         direction: Literal["request", "response"],
         *,
-        checksum: Checksum = _checksum,
+        checksum: Checksum = _CHECKSUM,
     ) -> None:
         self._classes, self._readers = _known(direction)
         self._checksum = checksum
         self._check = checksum.verifier(2, "big")
-        self._buffer = b""
-        self._need = 0  # a frame that has begun is not complete with fewer bytes
-        self._offset = 0  # of the buffer's first byte in the stream
+        self._buffer: bytes = b""
+        self._need: int = 0  # a frame that has begun is not complete with fewer bytes
+        self._offset: int = 0  # of the buffer's first byte in the stream
         # The buffer's first byte is a mark that ended a frame: an inserted one may follow.
         self._tail = False
         self._counters = Counters()
@@ -2661,7 +2661,7 @@ class Codec:
 
     def encode(self, message: Message) -> bytes:
         """The whole frame of a message as it is on the wire. Raises EncodeError."""
-        return _sealed_again(message, self.checksum)
+        return _frame_with(message, self.checksum)
 
     def decode_request(self, wire: BytesLike) -> Message:
         """The message of exactly one request frame. Raises DecodeError."""

@@ -115,7 +115,7 @@ MARKING = Marking(
     most=_MOST,
 )
 
-_checksum = find_crc("crc-16/ibm-3740")
+_CHECKSUM = find_crc("crc-16/ibm-3740")
 _CHECK_SIZE = 2
 
 
@@ -125,9 +125,15 @@ def _check(payload: bytes, checksum: Checksum) -> bytes:
     return bytes((crc & 0x7F, crc >> 8 & 0x7F))
 
 
-def _sealed_again(message: Message, checksum: Checksum) -> bytes:
-    """The frame of a message with a check value by another algorithm."""
-    return message._sealed(checksum)
+def _frame_with(message: Message, checksum: Checksum) -> bytes:
+    """The frame of a message, with the check value of an algorithm."""
+    payload = message.to_bytes()
+    if message.RULES[0].complaint(message.address):
+        raise refused(message)
+    mark = _MARKER | index(message.address) << _ADDRESS_SHIFT
+    head, end = mark | message.ID << _ID_SHIFT, mark | _END << _ID_SHIFT
+    check = _check(payload, checksum) if message.CHECKED else b""
+    return bytes((head,)) + payload + check + bytes((end,))
 
 
 class Message(BaseMessage):
@@ -143,16 +149,7 @@ class Message(BaseMessage):
 
     def to_frame(self) -> bytes:
         """The whole message as it is on the wire. Raises EncodeError."""
-        return self._sealed(_checksum)
-
-    def _sealed(self, checksum: Checksum) -> bytes:
-        payload = self.to_bytes()
-        if self.RULES[0].complaint(self.address):
-            raise refused(self)
-        mark = _MARKER | index(self.address) << _ADDRESS_SHIFT
-        head, end = mark | self.ID << _ID_SHIFT, mark | _END << _ID_SHIFT
-        check = _check(payload, checksum) if self.CHECKED else b""
-        return bytes((head,)) + payload + check + bytes((end,))
+        return _frame_with(self, _CHECKSUM)
 
     @classmethod
     def from_bytes(cls, payload: BytesLike, address: int | None = None) -> Self:
@@ -524,7 +521,7 @@ def _is_header(byte: int) -> bool:
 def _decode(
     wire: BytesLike,
     known: dict[int, type[Message]],
-    checksum: Checksum = _checksum,
+    checksum: Checksum = _CHECKSUM,
 ) -> Message:
     """One whole frame as it is on the wire. Raises DecodeError."""
     data = as_bytes(wire)
@@ -574,13 +571,13 @@ class StreamDecoder:
         self,
         direction: Literal["message"] = "message",
         *,
-        checksum: Checksum = _checksum,
+        checksum: Checksum = _CHECKSUM,
     ) -> None:
         self._messages = _known(direction)
         self._checksum = checksum
         self._message = b""  # from the header on; b"" between messages
         self._hunting = False  # a fault was reported: only a header is of interest
-        self._offset = 0  # of the next byte in the stream
+        self._offset: int = 0  # of the next byte in the stream
         self.counters = Counters()
 
     def feed(self, data: BytesLike) -> list[Message | Fault]:
@@ -691,7 +688,7 @@ class Codec:
 
     def encode(self, message: Message) -> bytes:
         """The whole frame of a message as it is on the wire. Raises EncodeError."""
-        return _sealed_again(message, self.checksum)
+        return _frame_with(message, self.checksum)
 
     def decode(self, wire: BytesLike) -> Message:
         """The message of exactly one frame. Raises DecodeError."""

@@ -282,19 +282,20 @@ class Encoder:
         rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
         for rule in rules:
             self._terms.append(f"all({integers.holds(rule, 'item')} for item in {local})")
+        octets = f"{step.name}_octets"
         if step.item.byteorder is None:
             groups = [integers.group_out("item", chunk) for chunk in step.item.chunks]
             flat = f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
-            lines = comprehension(f"{local} = [", flat, f"for item in {local}", "]", _INDENT)
+            lines = comprehension(f"{octets} = [", flat, f"for item in {local}", "]", _INDENT)
             if _INDENT + 4 + len(flat) > WIDTH:
                 element = ["bytes(", "    (", *(f"        {each}," for each in groups), "    )", ")"]
                 lines = [lines[0], *indented(element), *lines[-2:]]
             self._late += lines
         else:
             self._late += comprehension(
-                f"{local} = [", integers.to_bytes(step.item, "item"), f"for item in {local}", "]", _INDENT
+                f"{octets} = [", integers.to_bytes(step.item, "item"), f"for item in {local}", "]", _INDENT
             )
-        self._pieces.append(f'b"".join({local})')
+        self._pieces.append(f'b"".join({octets})')
 
     # The expression
 

@@ -287,9 +287,9 @@ def _definition(algorithm: Algorithm | Sum, maker: str) -> list[str]:
     match algorithm:
         case Sum():
             complement = ", complement=True" if algorithm.complement else ""
-            return [f'_checksum = {maker}("{algorithm.name}", {algorithm.width}{complement})']
+            return [f'_CHECKSUM = {maker}("{algorithm.name}", {algorithm.width}{complement})']
         case Algorithm(width=16):
-            return [f'_checksum = {maker}("{algorithm.name}")']
+            return [f'_CHECKSUM = {maker}("{algorithm.name}")']
         case Algorithm():
             digits = (algorithm.width + 3) // 4
             numbers = {key: f"0x{getattr(algorithm, key):0{digits}X}" for key in ("poly", "init", "xorout")}
@@ -302,7 +302,7 @@ def _definition(algorithm: Algorithm | Sum, maker: str) -> list[str]:
                 f"refout={algorithm.refout}",
                 f"xorout={numbers['xorout']}",
             ]
-            return wrapped(f"_checksum = {maker}(", arguments, ")", 0)
+            return wrapped(f"_CHECKSUM = {maker}(", arguments, ")", 0)
         case _:
             assert_never(algorithm)
 
