@@ -383,17 +383,17 @@ class Message(BaseMessage):
         """The message of a payload. Raises DecodeError."""
         data = as_bytes(payload)
         try:
-            return cls._read(data)
+            return cls.from_checked(data)
         except (struct_error, LookupError):
             raise wrong_size(cls, data) from None
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         """The message of a payload. Raises struct.error, LookupError or DecodeError."""
         raise NotImplementedError
 
     @classmethod
-    def _measure(cls, data: bytes, at: int) -> int:
+    def measure_payload(cls, data: bytes, at: int) -> int:
         """Payload bytes, as far as its counts are there to tell; -1 for a wrong count."""
         return cls.MAX_SIZE
 
@@ -447,7 +447,7 @@ class _EmptyRequest(Request):
         return b""
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         if payload:
             raise LayoutError
@@ -479,7 +479,7 @@ class _StatusU16Response(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.status,) = _UNPACK_STATUS_U16_RESPONSE(payload)
         return message
@@ -501,7 +501,7 @@ class _EmptyResponse(Response):
         return b""
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         if payload:
             raise LayoutError
@@ -533,7 +533,7 @@ class _ValueI32Response(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_VALUE_I32_RESPONSE(payload)
         return message
@@ -566,7 +566,7 @@ class _ValueU16Request(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_VALUE_U16_REQUEST(payload)
         if not 0 <= value_raw <= 32767:
@@ -600,7 +600,7 @@ class _ValueU16Response(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_VALUE_U16_RESPONSE(payload)
         return message
@@ -796,7 +796,7 @@ class SetPosRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_POS_REQUEST(payload)
         if not -1073741824 <= value_raw <= 1073741823:
@@ -849,7 +849,7 @@ class SetVelRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_VEL_REQUEST(payload)
         message.value = value_raw / 65536
@@ -900,7 +900,7 @@ class SetAccRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_ACC_REQUEST(payload)
         if not -1073741824 <= value_raw <= 1073741823:
@@ -953,7 +953,7 @@ class SetMaxAccRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_MAX_ACC_REQUEST(payload)
         message.value = value_raw / 65536
@@ -1004,7 +1004,7 @@ class SetJerkRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_JERK_REQUEST(payload)
         message.value = value_raw / 4294967296
@@ -1056,7 +1056,7 @@ class SetRatioRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_RATIO_REQUEST(payload)
         message.value = value_raw / 65536
@@ -1226,7 +1226,7 @@ class GetVelResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_VEL_RESPONSE(payload)
         message.value = value_raw / 65536
@@ -1282,7 +1282,7 @@ class GetAccResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_ACC_RESPONSE(payload)
         message.value = value_raw / 65536
@@ -1333,7 +1333,7 @@ class GetMaxAccResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_MAX_ACC_RESPONSE(payload)
         message.value = value_raw / 65536
@@ -1384,7 +1384,7 @@ class GetJerkResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_JERK_RESPONSE(payload)
         message.value = value_raw / 4294967296
@@ -1434,7 +1434,7 @@ class GetRatioResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_RATIO_RESPONSE(payload)
         message.value = value_raw / 65536
@@ -1514,7 +1514,7 @@ class GetTrgtVelResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_TRGT_VEL_RESPONSE(payload)
         message.value = value_raw / 65536
@@ -1708,7 +1708,7 @@ class SetMtrBiasRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_MTR_BIAS_REQUEST(payload)
         if not -32767 <= value_raw <= 32767:
@@ -1932,7 +1932,7 @@ class GetMtrLmtResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_MTR_LMT_RESPONSE(payload)
         if not 0 <= value_raw <= 32767:
@@ -1985,7 +1985,7 @@ class GetMtrBiasResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_MTR_BIAS_RESPONSE(payload)
         if not -32767 <= value_raw <= 32767:
@@ -2070,7 +2070,7 @@ class GetIntgrResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_INTGR_RESPONSE(payload)
         return message
@@ -2123,7 +2123,7 @@ class GetActlPosErrResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_ACTL_POS_ERR_RESPONSE(payload)
         return message
@@ -2421,7 +2421,7 @@ class SetBrkPntRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_SET_BRK_PNT_REQUEST(payload)
         return message
@@ -2490,7 +2490,7 @@ class MultiUpdateRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.axes,) = _UNPACK_MULTI_UPDATE_REQUEST(payload)
         return message
@@ -2594,7 +2594,7 @@ class GetBrkPntResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_BRK_PNT_RESPONSE(payload)
         return message
@@ -2633,7 +2633,7 @@ class SetIntrptMaskRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.mask,) = _UNPACK_SET_INTRPT_MASK_REQUEST(payload)
         return message
@@ -2706,7 +2706,7 @@ class RstIntrptRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.mask,) = _UNPACK_RST_INTRPT_REQUEST(payload)
         return message
@@ -2766,7 +2766,7 @@ class GetIntrptMaskResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.mask,) = _UNPACK_GET_INTRPT_MASK_RESPONSE(payload)
         return message
@@ -2826,7 +2826,7 @@ class RstStatusRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.mask,) = _UNPACK_RST_STATUS_REQUEST(payload)
         return message
@@ -3088,7 +3088,7 @@ class SetMtrCmdRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_MTR_CMD_REQUEST(payload)
         if not -32767 <= value_raw <= 32767:
@@ -3151,7 +3151,7 @@ class GetMtrCmdResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_GET_MTR_CMD_RESPONSE(payload)
         if not -32767 <= value_raw <= 32767:
@@ -3197,7 +3197,7 @@ class SetBufMtrCmdRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_BUF_MTR_CMD_REQUEST(payload)
         if not -32767 <= value_raw <= 32767:
@@ -3262,7 +3262,7 @@ class GetBufMtrCmdResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_BUF_MTR_CMD_RESPONSE(payload)
         return message
@@ -3310,7 +3310,7 @@ class GetOutputModeResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (mode_raw,) = _UNPACK_GET_OUTPUT_MODE_RESPONSE(payload)
         message.mode = OutputMode.members.get(mode_raw, mode_raw)
@@ -3392,7 +3392,7 @@ class SetActlPosRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_ACTL_POS_REQUEST(payload)
         if not -1073741824 <= value_raw <= 1073741823:
@@ -3472,7 +3472,7 @@ class SetLmtSenseRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_SET_LMT_SENSE_REQUEST(payload)
         return message
@@ -3533,7 +3533,7 @@ class GetLmtSwtchResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_LMT_SWTCH_RESPONSE(payload)
         return message
@@ -3654,7 +3654,7 @@ class SetSmplTimeRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_SET_SMPL_TIME_REQUEST(payload)
         return message
@@ -3798,7 +3798,7 @@ class GetTimeResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_TIME_RESPONSE(payload)
         return message
@@ -3840,7 +3840,7 @@ class SetPhaseCntsRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (value_raw,) = _UNPACK_SET_PHASE_CNTS_REQUEST(payload)
         if not 129 <= value_raw <= 65535:
@@ -3896,7 +3896,7 @@ class SetPhaseOffsetRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_SET_PHASE_OFFSET_REQUEST(payload)
         return message
@@ -3949,7 +3949,7 @@ class SetPhaseTimeRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_SET_PHASE_TIME_REQUEST(payload)
         return message
@@ -4002,7 +4002,7 @@ class SetPhaseRequest(Request):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_SET_PHASE_REQUEST(payload)
         return message
@@ -4114,7 +4114,7 @@ class GetPhaseCntsResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_PHASE_CNTS_RESPONSE(payload)
         return message
@@ -4162,7 +4162,7 @@ class GetPhaseTimeResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_PHASE_TIME_RESPONSE(payload)
         return message
@@ -4215,7 +4215,7 @@ class GetPhaseOffsetResponse(Response):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (message.value,) = _UNPACK_GET_PHASE_OFFSET_RESPONSE(payload)
         return message
@@ -5678,12 +5678,12 @@ class StreamDecoder:
     def _request_size(self, buf: bytes, pos: int) -> int:
         """Bytes of the packet that begins here, 0 where none does."""
         message = _REQUESTS.get(buf[pos])
-        return message._measure(buf, pos + 1) + 1 if message else 0
+        return message.measure_payload(buf, pos + 1) + 1 if message else 0
 
     def _answer_size(self, buf: bytes, pos: int) -> int:
         if not self._expected:
             return 0
-        size = _RESPONSES[self._expected[0].ID]._measure(buf, pos)
+        size = _RESPONSES[self._expected[0].ID].measure_payload(buf, pos)
         return max(size, 0) + _CHECK_SIZE
 
     def _event(self, raw: bytes, pos: int, *, known: bool) -> Message | Fault:

@@ -222,12 +222,12 @@ class Message(BaseMessage):
             raise wrong_size(cls, data)
         head = bytes((len(data) + 4,)) + bytes(1) + _address(cls, node)
         try:
-            return cls._read(head + data + bytes(2))
+            return cls.from_checked(head + data + bytes(2))
         except (struct_error, LookupError):
             raise wrong_size(cls, data) from None
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         """The message in a whole frame without preamble and stuffing.
 
         Raises struct.error, LookupError or DecodeError.
@@ -271,7 +271,7 @@ class _Empty(Message):
         return _WHOLE_3(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw = _UNPACK_EMPTY(body)
         if length_raw != 4:
@@ -355,7 +355,7 @@ class NodeSetupRequest(Message):
         return _WHOLE_7(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
             length_raw,
@@ -435,7 +435,7 @@ class NodeInfoRequest(Message):
         return _WHOLE_3(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw = _UNPACK_NODE_INFO_REQUEST(body)
         if length_raw != 4:
@@ -550,7 +550,7 @@ class NodeInfoResponse(Message):
         return _WHOLE_14(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
             length_raw,
@@ -614,7 +614,7 @@ class NodeStartRequest(Message):
         return _WHOLE_3(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw = _UNPACK_NODE_START_REQUEST(body)
         if length_raw != 4:
@@ -662,7 +662,7 @@ class NodeStopRequest(Message):
         return _WHOLE_3(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw = _UNPACK_NODE_STOP_REQUEST(body)
         if length_raw != 4:
@@ -715,7 +715,7 @@ class NodeSyncRequest(Message):
         return _WHOLE_4(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, message.counter = _UNPACK_NODE_SYNC_REQUEST(body)
         if length_raw != 5:
@@ -790,7 +790,7 @@ class NodeProgramLoadRequest(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         if len(body) == 5:
             node_raw = body[2]
             if not 1 <= node_raw <= 16:
@@ -857,7 +857,7 @@ class NodeProgramLoadResponse(Message):
         return _WHOLE_4(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, message.counter = _UNPACK_NODE_PROGRAM_LOAD_RESPONSE(body)
         if length_raw != 5:
@@ -973,7 +973,7 @@ class MotorResponsePollResponse(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         motor_data_count = len(body) - 6
         if not 0 <= motor_data_count <= 25:
             raise LayoutError
@@ -1036,7 +1036,7 @@ class MotorRequestRequest(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         motor_data_count = len(body) - 5
         if not 1 <= motor_data_count <= 26:
             raise LayoutError
@@ -1132,7 +1132,7 @@ class MotionRequest(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
             length_raw,
@@ -1223,7 +1223,7 @@ class MotionResponse(Message):
         return _WHOLE_12(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
             length_raw,
@@ -1299,7 +1299,7 @@ class MotorPositionResponse(Message):
         return _WHOLE_7(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, message.position = _UNPACK_MOTOR_POSITION_RESPONSE(body)
         if length_raw != 8:
@@ -1388,7 +1388,7 @@ class PresetMotorPositionRequest(Message):
         return _WHOLE_7(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
             length_raw,
@@ -1460,7 +1460,7 @@ class ReadRequest(Message):
         return _WHOLE_5(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, size_raw, message.offset = _UNPACK_READ_REQUEST(body)
         if length_raw != 6:
@@ -1517,7 +1517,7 @@ class ReadResponse(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         data_count = len(body) - 5
         if not 1 <= data_count <= 26:
             raise LayoutError
@@ -1577,7 +1577,7 @@ class WriteRequest(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         data_count = len(body) - 6
         if not 1 <= data_count <= 25:
             raise LayoutError
@@ -1652,7 +1652,7 @@ class WriteReadRequest(Message):
         return _WHOLE_6(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, outputs_raw = _UNPACK_WRITE_READ_REQUEST(body)
         if length_raw != 7:
@@ -1711,7 +1711,7 @@ class WriteReadResponse(Message):
         return _WHOLE_6(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, inputs_raw = _UNPACK_WRITE_READ_RESPONSE(body)
         if length_raw != 7:
@@ -1770,7 +1770,7 @@ class SetOutputsRequest(Message):
         return _WHOLE_6(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, mask_raw = _UNPACK_SET_OUTPUTS_REQUEST(body)
         if length_raw != 7:
@@ -1843,7 +1843,7 @@ class ClearOutputsRequest(Message):
         return _WHOLE_6(_PREAMBLE, body, crc)
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         length_raw, node_raw, mask_raw = _UNPACK_CLEAR_OUTPUTS_REQUEST(body)
         if length_raw != 7:
@@ -1915,7 +1915,7 @@ class LoopBackRequest(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         data_count = len(body) - 6
         if not 1 <= data_count <= 25:
             raise LayoutError
@@ -1980,7 +1980,7 @@ class LoopBackResponse(Message):
         return _PREAMBLE + body + crc.to_bytes(2, "big")
 
     @classmethod
-    def _read(cls, body: bytes) -> Self:
+    def from_checked(cls, body: bytes) -> Self:
         data_count = len(body) - 6
         if not 1 <= data_count <= 25:
             raise LayoutError
@@ -2265,25 +2265,25 @@ _REQUESTS: dict[int, type[Message]] = {
     0xA4: LoopBackRequest,
 }
 _REQUEST_READERS: dict[int, Callable[[bytes], Message]] = {
-    0x01: NodeSetupRequest._read,
-    0x02: NodeInfoRequest._read,
-    0x03: NodeStartRequest._read,
-    0x04: NodeStopRequest._read,
-    0x05: NodeSyncRequest._read,
-    0x06: NodeProgramLoadRequest._read,
-    0x07: NodeResetRequest._read,
-    0x15: MotorResponsePollRequest._read,
-    0x16: MotorRequestRequest._read,
-    0x20: MotionRequest._read,
-    0x21: MotorPositionRequest._read,
-    0x22: ClearFifoRequest._read,
-    0x23: PresetMotorPositionRequest._read,
-    0x81: ReadRequest._read,
-    0x82: WriteRequest._read,
-    0x83: WriteReadRequest._read,
-    0x84: SetOutputsRequest._read,
-    0x85: ClearOutputsRequest._read,
-    0xA4: LoopBackRequest._read,
+    0x01: NodeSetupRequest.from_checked,
+    0x02: NodeInfoRequest.from_checked,
+    0x03: NodeStartRequest.from_checked,
+    0x04: NodeStopRequest.from_checked,
+    0x05: NodeSyncRequest.from_checked,
+    0x06: NodeProgramLoadRequest.from_checked,
+    0x07: NodeResetRequest.from_checked,
+    0x15: MotorResponsePollRequest.from_checked,
+    0x16: MotorRequestRequest.from_checked,
+    0x20: MotionRequest.from_checked,
+    0x21: MotorPositionRequest.from_checked,
+    0x22: ClearFifoRequest.from_checked,
+    0x23: PresetMotorPositionRequest.from_checked,
+    0x81: ReadRequest.from_checked,
+    0x82: WriteRequest.from_checked,
+    0x83: WriteReadRequest.from_checked,
+    0x84: SetOutputsRequest.from_checked,
+    0x85: ClearOutputsRequest.from_checked,
+    0xA4: LoopBackRequest.from_checked,
 }
 _RESPONSES: dict[int, type[Message]] = {
     0x01: NodeSetupResponse,
@@ -2304,22 +2304,22 @@ _RESPONSES: dict[int, type[Message]] = {
     0xA4: LoopBackResponse,
 }
 _RESPONSE_READERS: dict[int, Callable[[bytes], Message]] = {
-    0x01: NodeSetupResponse._read,
-    0x02: NodeInfoResponse._read,
-    0x06: NodeProgramLoadResponse._read,
-    0x07: NodeResetResponse._read,
-    0x15: MotorResponsePollResponse._read,
-    0x16: MotorRequestResponse._read,
-    0x20: MotionResponse._read,
-    0x21: MotorPositionResponse._read,
-    0x22: ClearFifoResponse._read,
-    0x23: PresetMotorPositionResponse._read,
-    0x81: ReadResponse._read,
-    0x82: WriteResponse._read,
-    0x83: WriteReadResponse._read,
-    0x84: SetOutputsResponse._read,
-    0x85: ClearOutputsResponse._read,
-    0xA4: LoopBackResponse._read,
+    0x01: NodeSetupResponse.from_checked,
+    0x02: NodeInfoResponse.from_checked,
+    0x06: NodeProgramLoadResponse.from_checked,
+    0x07: NodeResetResponse.from_checked,
+    0x15: MotorResponsePollResponse.from_checked,
+    0x16: MotorRequestResponse.from_checked,
+    0x20: MotionResponse.from_checked,
+    0x21: MotorPositionResponse.from_checked,
+    0x22: ClearFifoResponse.from_checked,
+    0x23: PresetMotorPositionResponse.from_checked,
+    0x81: ReadResponse.from_checked,
+    0x82: WriteResponse.from_checked,
+    0x83: WriteReadResponse.from_checked,
+    0x84: SetOutputsResponse.from_checked,
+    0x85: ClearOutputsResponse.from_checked,
+    0xA4: LoopBackResponse.from_checked,
 }
 _DIRECTIONS = {
     "request": (_REQUESTS, _REQUEST_READERS),
@@ -2401,7 +2401,7 @@ def _judge(
         text = f"no message has the number {number:#04x}"
         raise DecodeError(text, "unknown", offset=3, data=frame)
     try:
-        return message._read(frame[2:])
+        return message.from_checked(frame[2:])
     except (struct_error, LookupError):
         raise wrong_size(message, _payload(frame[2:])) from None
 

@@ -156,7 +156,7 @@ class Message(BaseMessage):
         """The message of a payload. Raises DecodeError."""
         data = as_bytes(payload)
         try:
-            message = cls._read(data)
+            message = cls.from_checked(data)
         except (struct_error, LookupError):
             raise wrong_size(cls, data) from None
         number = cls.DEFAULT_ADDRESS if address is None else address
@@ -166,7 +166,7 @@ class Message(BaseMessage):
         return message
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         """The message of a payload, but for its address.
 
         Raises struct.error, LookupError or DecodeError.
@@ -215,7 +215,7 @@ class CharacterTransfer(Message):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         characters_count = len(payload)
         if not 1 <= characters_count <= 256:
             raise LayoutError
@@ -293,7 +293,7 @@ class DirectVariableTransfer(Message):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (
             number_raw_0,
@@ -384,7 +384,7 @@ class KeypadOffset(Message):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (offset_raw_0,) = _UNPACK_KEYPAD_OFFSET(payload)
         if offset_raw_0 > 0x7F:
@@ -438,7 +438,7 @@ class KeypadMode(Message):
             return settled(self).to_bytes()
 
     @classmethod
-    def _read(cls, payload: bytes) -> Self:
+    def from_checked(cls, payload: bytes) -> Self:
         message = _new(cls)
         (mode_raw_0,) = _UNPACK_KEYPAD_MODE(payload)
         if mode_raw_0 > 0x7F:

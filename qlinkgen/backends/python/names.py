@@ -16,7 +16,7 @@ from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Attributes of every message, and what its methods call it.
-_METHODS = frozenset({"to_frame", "to_bytes", "from_bytes", "self", "cls"})
+_METHODS = frozenset({"to_frame", "to_bytes", "from_bytes", "from_checked", "measure_payload", "self", "cls"})
 #: Names that a module has for itself.
 _TAKEN = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError Codec
