@@ -13,10 +13,9 @@ from qlinkgen.cli.boundary import Failure
 def line(found: Any) -> str:
     """An object on one line; a Decimal becomes a number with all its digits."""
     try:
-        text = json.dumps(found)
+        return json.dumps(found)
     except TypeError:
-        text = _exact(found)
-    return text.replace("\x7f", "\\u007f")  # the one control character that JSON may hold as it is
+        return _exact(found)
 
 
 def _exact(found: Any) -> str:

@@ -195,7 +195,7 @@ def test_a_checksum_of_0_refuses_the_command_unless_it_is_the_right_one() -> Non
     chip = module("mc1231a")
     request = chip.SetVelRequest(value=1.0)
     assert chip.decode_response(chip.SetVelResponse().to_frame(request), request) == chip.SetVelResponse()
-    for wire, kind in ((b"\0\0", "illegal"), (b"\0\1", "crc"), (b"", "length"), (b"\0\0\0", "length")):
+    for wire, kind in ((b"\0\0", "illegal"), (b"\0\1", "crc"), (b"", "truncated"), (b"\0\0\0", "length")):
         with pytest.raises(chip.DecodeError) as caught:
             chip.decode_response(wire, request)
         assert caught.value.kind == kind

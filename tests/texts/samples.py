@@ -1,11 +1,10 @@
 """Texts that a schema may hold: ordinary ones that code has other uses for, and some that try to be code.
 
-The hostile ones leave a file called `canary` in the current folder where they are executed, or break a compile.
+The hostile ones leave a file called `canary` in the current folder if they are executed, or do not compile.
 """
 
 from __future__ import annotations
 
-#: What every other text is compared with.
 HARMLESS = "plain words"
 
 ORDINARY = (
@@ -62,3 +61,20 @@ HOSTILE = (
 )
 
 TEXTS = (*ORDINARY, *HOSTILE)
+
+
+def turned(step: int) -> list[tuple[str, ...]]:
+    """All texts, beginning with another one each time: to be put into slots in turn."""
+    return [(*TEXTS[first:], *TEXTS[:first]) for first in range(0, len(TEXTS), step)]
+
+
+#: Schemas and texts for their slots: each text alone in the richest schema, mixed in the others.
+CASES = (
+    *(("delimited", (text,)) for text in TEXTS),
+    *((name, texts) for name in ("marked", "packet") for texts in turned(6)),
+)
+
+
+def harmless(texts: tuple[str, ...]) -> tuple[str, ...]:
+    """As many texts that mean nothing to any language; equal units, say, are one in the output."""
+    return tuple(f"{HARMLESS} {number}" for number in range(len(texts)))

@@ -49,7 +49,7 @@ def kinds_of_slots() -> set[Kind]:
             if key in model.model_fields:
                 found.update((model.__name__, key) for part in _parts(hint) if _is_text(part))
                 for part in _parts(hint):
-                    if isinstance(part, type) and issubclass(part, BaseModel):
+                    if _is_model(part):
                         visit(part)
 
     visit(SchemaFile)
@@ -61,6 +61,14 @@ def _parts(hint: Any) -> Iterator[Any]:
     yield hint
     for part in typing.get_args(hint):
         yield from _parts(part)
+
+
+def _is_model(hint: Any) -> bool:
+    return isinstance(hint, type) and issubclass(hint, BaseModel)
+
+
+def _is_table(hint: Any) -> bool:
+    return getattr(hint, "__origin__", None) is dict
 
 
 def _is_text(hint: Any) -> bool:
@@ -76,9 +84,8 @@ def document(name: str) -> Any:
 
 
 def _write_out(data: Any, hint: Any) -> Any:
-    short = next(
-        (part for part in getattr(hint, "__metadata__", ()) if isinstance(part, kinds.ShortForm)), None
-    )
+    marks = getattr(hint, "__metadata__", ())
+    short = next((mark for mark in marks if isinstance(mark, kinds.ShortForm)), None)
     if short is not None and not isinstance(data, dict):
         data = {short.key: data}
     if isinstance(data, dict):
@@ -89,14 +96,12 @@ def _write_out(data: Any, hint: Any) -> Any:
 
 def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
     """Keys of a mapping with the annotation of what they hold."""
-    model = _first(
-        hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False
-    )
+    model = _first(hint, _is_model, through_dicts=False)
     if model is not None:
         hints = typing.get_type_hints(model, include_extras=True)
         yield from ((key, hints[key]) for key in data if key in hints)
         return
-    table = _first(hint, lambda part: typing.get_origin(part) is dict)
+    table = _first(hint, _is_table)
     if table is not None:
         yield from ((key, typing.get_args(table)[1]) for key in data)
 
@@ -104,7 +109,7 @@ def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
 def _first(hint: Any, wanted: Any, *, through_dicts: bool = True) -> Any:
     if wanted(hint):
         return hint
-    if typing.get_origin(hint) is dict and not through_dicts:
+    if _is_table(hint) and not through_dicts:
         return None
     inner = (_first(part, wanted, through_dicts=through_dicts) for part in typing.get_args(hint))
     return next((part for part in inner if part is not None), None)
@@ -137,9 +142,7 @@ def _slots(data: Any, hint: Any, path: tuple[str | int, ...], kind: Kind) -> Ite
         if any(map(_is_text, _parts(hint))):
             yield from (Slot((*path, index), kind) for index in range(len(data)))
     elif isinstance(data, dict):
-        model = _first(
-            hint, lambda part: isinstance(part, type) and issubclass(part, BaseModel), through_dicts=False
-        )
+        model = _first(hint, _is_model, through_dicts=False)
         members = dict(_members(data, hint))
         if model is not None:
             texts = typing.get_type_hints(model, include_extras=True)
@@ -165,19 +168,13 @@ def put(name: str, places: Iterable[Slot], texts: str | Sequence[str]) -> Any:
         parent = data
         for step in slot.path[:-1]:
             parent = parent[step]
-        parent[slot.path[-1]] = (
-            turn[0] if "attributes" in slot.path and is_label(slot) else turn[index % len(turn)]
-        )
+        parent[slot.path[-1]] = turn[0] if is_label(slot) else turn[index % len(turn)]
     return data
 
 
 def is_label(slot: Slot) -> bool:
     """Its text is a label: declared in one slot, used in others."""
-    return slot.kind in {
-        ("AttributeSpec", "values"),
-        ("DefaultsSpec", "attributes"),
-        ("CommandSpec", "attributes"),
-    }
+    return slot.kind[1] in {"values", "attributes"}
 
 
 def text_of(data: Any) -> str:

@@ -151,7 +151,7 @@ class Decoder:
                 self._values.append(f"message.{self.place.address} = {number}")
             case LengthPart() if self.place.unique:
                 # The receiver relies on it, so nothing but this compares the length with the size.
-                number = self._get(part.integer, f"{part.name}_raw", at)
+                number = self._size(part.integer, f"{part.name}_raw", at)
                 self._sizes += [f"if {number} != {self._length(part)}:", self._bad_layout]
             case LengthPart() | IdPart() | ConstantPart():
                 self._row(at).codes.append(f"{part.size}x")
@@ -198,15 +198,30 @@ class Decoder:
         taken = integers.get(integer, local, self.place.byteorder)
         if not taken.terms:
             return
+        self._refuse_stray(taken, name, offset)
+        self._values += joined(f"{local} = ", taken.terms, "|", _INDENT)
+        if integer.byteorder is None and integer.signed:
+            self._values.append(f"{local} = {integers.sign_extended(local, integer.bits)}")
+
+    def _size(self, integer: Integer, local: str, at: Size, name: str = "", offset: str = "") -> str:
+        """Unpack a number that sizes are compared with, before any value is judged."""
+        number = self._get(integer, local, at)
+        taken = integers.get(integer, local, self.place.byteorder)
+        if taken.terms:
+            terms = taken.terms
+            if integer.byteorder is None:
+                terms = integers.group_terms(integer, integers.own_bits(integer, taken.targets))
+            self._sizes += joined(f"{local} = ", terms, "|", _INDENT)
+        self._refuse_stray(taken, name, offset)
+        return number
+
+    def _refuse_stray(self, taken: integers.Get, name: str, offset: str) -> None:
         for sources, mask in taken.stray:
             seen = sources[0]
             if len(sources) > 1:
                 self._values += joined("stray = ", sources, "|", _INDENT)
                 seen = "stray"
             self._refuse(f"{seen} > 0x{mask:02X}", name, seen, offset)
-        self._values += joined(f"{local} = ", taken.terms, "|", _INDENT)
-        if integer.byteorder is None and integer.signed:
-            self._values.append(f"{local} = {integers.sign_extended(local, integer.bits)}")
 
     def _taken_rows(self) -> list[str]:
         """The statements that unpack the rows."""
@@ -340,17 +355,17 @@ class Decoder:
 
     def _count_step(self, step: CountStep, at: Size) -> None:
         """A count has been read with the sizes, but for a payload that one struct holds."""
-        strays = any(chunk.bits < 8 for chunk in step.integer.chunks)
-        if self._tabled is None and not strays:
+        local, offset = f"{step.name}_raw", _offset(step)
+        if self._tabled:
+            number = self._size(step.integer, local, at, step.name, offset)
+            items = f"len(message.{attribute(step.run)})"
+            expected = f"{step.scale} * {items}" if step.scale > 1 else items
+            self._sizes += [f"if {number} != {expected}:", self._bad_layout]
+        elif (taken := integers.get(step.integer, local, self.place.byteorder)).stray:
+            self._get(step.integer, local, at)
+            self._refuse_stray(taken, step.name, offset)
+        else:
             self._row(at).codes.append(f"{step.integer.size}x")
-            return
-        raw = self._get(step.integer, f"{step.name}_raw", at)
-        self._put_together(step.integer, raw, step.name, _offset(step))
-        if self._tabled is None:
-            return
-        items = f"len(message.{attribute(step.run)})"
-        expected = f"{step.scale} * {items}" if step.scale > 1 else items
-        self._sizes += [f"if {raw} != {expected}:", self._bad_layout]
 
     def _bits(self, step: BitsStep, at: Size) -> None:
         whole = f"{step.name}_whole"

@@ -82,7 +82,13 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
     if integer.byteorder is not None:
         return from_bytes(integer, slice_of(data, at(0), at(integer.size)))
     sources = tuple(f"{data}[{at(index)}]" for index in range(integer.size))
-    return f"({' | '.join(group_terms(integer, sources))})"
+    return f"({' | '.join(group_terms(integer, own_bits(integer, sources)))})"
+
+
+def own_bits(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
+    """The sources without the bits that belong to no chunk."""
+    pairs = zip(sources, integer.chunks, strict=True)
+    return tuple(f"({source} & 0x{chunk.mask:02X})" if chunk.bits < 8 else source for source, chunk in pairs)
 
 
 def stray(integer: Integer, sources: Sequence[str]) -> tuple[tuple[tuple[str, ...], int], ...]:
