@@ -86,20 +86,22 @@ class FieldBuilder:
 
     def _check_open_ends(self, fields: Sequence[Field], path: Path) -> None:
         open_ends = [field.name for field in fields if is_open(field)]
+        # An integer that is broken may have been the count of one of them.
+        counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
         for name in open_ends[1:]:
             what = f"{name} and {open_ends[0]} both take the rest of the payload"
             needs = ((*path, name), (*path, open_ends[0]))
-            # A count that is broken may have been the count of one of them.
-            counts = [(*path, field.name, "counts") for field in fields]
             hint = "give one of them a count, or a fixed size"
             self._report.error(
                 "two-open-ends", (*path, name), what, hint, of_key=True, needs=(*needs, *counts)
             )
             self._report.taint((*path, name))
         if open_ends:
-            self._check_counts_behind(open_ends[0], fields, path)
+            self._check_counts_behind(open_ends[0], fields, path, counts)
 
-    def _check_counts_behind(self, name: str, fields: Sequence[Field], path: Path) -> None:
+    def _check_counts_behind(
+        self, name: str, fields: Sequence[Field], path: Path, counts: Sequence[Path]
+    ) -> None:
         """Where a field takes what the counted ones leave, their counts come first."""
         order = [field.name for field in fields]
         for field in fields[order.index(name) + 1 :]:
@@ -109,7 +111,7 @@ class FieldBuilder:
             if count and order.index(count) > order.index(name):
                 what = f"{count} counts {field.name} and follows {name}, which takes the rest of the payload"
                 hint = f"move {count} before {name}, or give {name} a count"
-                needs = ((*path, name), (*path, count), (*path, field.name))
+                needs = ((*path, name), (*path, count), (*path, field.name), *counts)
                 self._report.error("bad-count", (*path, count, "counts"), what, hint, needs=needs)
 
     def _bounded(self, fields: Sequence[Field], path: Path) -> list[Field]:
