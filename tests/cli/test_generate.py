@@ -24,6 +24,7 @@ def files(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_everything_of_all_protocols(qlinkgen: Run, out: Path) -> None:
     result = qlinkgen("generate", "-o", out)
     assert result.code == 0
