@@ -33,8 +33,8 @@ def drivers(shared: Path, require_tool: Callable[..., str]) -> Iterator[Callable
     def get(name: str) -> Driver:
         if name not in running:
             flags = (
-                "-O1",
-                "-g",
+                "-O0",  # the optimiser could remove what a sanitizer is to see, and takes four times as long
+                "-g1",
                 "-std=c99",
                 *WARNINGS,
                 "-fsanitize=address,undefined",
