@@ -35,11 +35,11 @@ def test_on_the_virtual_clock() -> None:
 
 
 def test_over_a_pty() -> None:
-    result = bus_run.pty(600, seed=11, slack=0.15)  # the machine may be busy with other tests
+    result = bus_run.pty(300, seed=11, slack=0.15)  # the machine may be busy with other tests
     assert result.complaints == []
-    assert result.counts.total > 20
-    assert result.words > 100
-    assert result.account.outcomes["answered"] > 400
+    assert result.counts.total > 10
+    assert result.words > 50
+    assert result.account.outcomes["answered"] > 200
 
 
 def digest(seed: int, hash_seed: str) -> str:
