@@ -44,6 +44,9 @@ test: lint  ## Lint, types, layers, drift of the generated files, then every tes
 	@echo "== pytest"
 	@$(BIN)/python -m pytest -n auto --dist worksteal
 
+test-fast: setup  ## A minute of tests: no pseudo-terminal, no other program such as a compiler, nothing slow
+	@HYPOTHESIS_PROFILE=fast $(BIN)/python -m pytest -n auto --dist worksteal -m "not pty and not program and not slow"
+
 lint: setup  ## Everything of `test` that runs no test
 	@echo "== ruff"
 	@$(BIN)/ruff check --quiet

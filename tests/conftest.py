@@ -20,6 +20,8 @@ from typing import NoReturn
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.support import needs
+
 NO_SKIPS = os.environ.get("QLINKGEN_NO_SKIPS", "") not in {"", "0"}
 
 # The notice travels as text: under xdist a report is all that reaches the process that prints the summary.
@@ -34,6 +36,7 @@ settings.register_profile("dev", deadline=None)
 settings.register_profile(
     "ci", deadline=None, derandomize=True, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
+settings.register_profile("fast", deadline=None, max_examples=20)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "dev"))
 
 
@@ -45,8 +48,9 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_configure(config: pytest.Config) -> None:
     """Heed Ctrl-C and hang-ups: background jobs may not, and neither would the programs that tests start.
 
-    Also say which marker allows a skip.
+    Also say which marker allows a skip, and let `tests.support.needs` mark the tests.
     """
+    config.pluginmanager.register(needs)
     config.addinivalue_line(
         "markers", "optional_tool(name): may be skipped where this program is not to be had"
     )

@@ -47,7 +47,7 @@ def test_what_may_be_skipped(strict: str, outcome: str, tmp_path: Path) -> None:
         str(tmp_path),
         str(tmp_path),
     ]
-    environment = {**os.environ, "QLINKGEN_NO_SKIPS": strict}
+    environment = {**os.environ, "PYTHONPATH": str(CONFTEST.parents[1]), "QLINKGEN_NO_SKIPS": strict}
     done = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False
     )

@@ -25,7 +25,7 @@ from tests.support.cfuzz import FUZZER, TARGETS, compiled, program
 from tests.support.planted import Fault
 
 #: Seconds for each target, over all shipped protocols; the schemas of the tests get a little beside.
-SECONDS = int(os.environ.get("QLINKGEN_FUZZ_SECONDS", "60" if os.environ.get("CI") else "5"))
+SECONDS = int(os.environ.get("QLINKGEN_FUZZ_SECONDS", "20" if os.environ.get("CI") else "5"))
 OTHER_SECONDS = 2
 #: The fuzzers run beside other tests, and give way to them.
 NICE = ("nice", "-n", "15")

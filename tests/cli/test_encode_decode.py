@@ -407,6 +407,7 @@ def test_another_crc(qlinkgen: Run, protocol: str) -> None:
     assert qlinkgen("explain", "qlink", result.out.strip(), "--set", "crc=xmodem").code == 0
 
 
+@pytest.mark.slow
 @settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(data=st.binary(max_size=60), mixed=st.booleans())
 @pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])

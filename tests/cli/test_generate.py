@@ -24,6 +24,7 @@ def files(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_everything_of_all_protocols(qlinkgen: Run, out: Path) -> None:
     result = qlinkgen("generate", "-o", out)
     assert result.code == 0
@@ -271,7 +272,7 @@ def test_a_folder_that_cannot_be_written(qlinkgen: Run, tmp_path: Path) -> None:
 def test_equal_input_gives_equal_output(tmp_path: Path) -> None:
     """Under different hash seeds, in different folders, from different places."""
     texts = []
-    for seed in ("0", "1", "4711"):
+    for seed in ("0", "4711"):
         folder = tmp_path / seed
         (tmp_path / f"at{seed}").mkdir()
         subprocess.run(
@@ -282,7 +283,7 @@ def test_equal_input_gives_equal_output(tmp_path: Path) -> None:
             stdout=subprocess.DEVNULL,
         )
         texts.append({name: (folder / name).read_bytes() for name in files(folder)})
-    assert texts[0] == texts[1] == texts[2]
+    assert texts[0] == texts[1]
 
 
 def test_what_is_committed_is_up_to_date(qlinkgen: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -213,6 +213,7 @@ def test_wrong_usage(qlinkgen: Run, arguments: tuple[str, ...], text: str) -> No
     assert text in result.err
 
 
+@pytest.mark.pty
 def test_a_link_that_cannot_be_made(qlinkgen: Run, tmp_path: Path) -> None:
     taken = tmp_path / "taken"
     taken.write_text("mine")

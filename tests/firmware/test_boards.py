@@ -71,7 +71,7 @@ REQUESTS: tuple[qlink.Message, ...] = (
 HANDLER, ASLEEP = "uart0_interrupt", "board_wait"
 #: Seconds between the last byte but one and the last. The node has to be asleep by then, and is not always
 #: where this machine is busy: such an answer does not count, and the next time there is more.
-PAUSES = (0.01, 0.05, 0.2, 0.8)
+PAUSES = (0.01, 0.05, 0.2, 0.8, 3.0, 12.0)
 
 
 def compiled(port: str, baud: int, require_tool: Callable[..., str]) -> subprocess.CompletedProcess[str]:

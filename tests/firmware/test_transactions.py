@@ -18,7 +18,8 @@ from tests.soak.firmware_page import TITLE, as_text, put_into
 from tests.soak.firmware_run import Result, Soak, WrongAnswer
 from tests.soak.firmware_traffic import REQUESTS, Traffic, Unit
 
-TRANSACTIONS = 5_000
+#: `make soak` makes ten times as many.
+TRANSACTIONS = 2_000
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -27,9 +28,9 @@ def test_mixed_transactions_among_damage_strays_and_noise(target: str, firmware_
     print(as_text(result))
     assert result.transactions >= TRANSACTIONS
     assert set(result.asked) == set(REQUESTS), "every command was asked"
-    assert min(result.asked.values()) >= 20
+    assert min(result.asked.values()) >= 8
     assert result.answered > 0.6 * TRANSACTIONS
-    for kind, least in (("corrupted", 500), ("malformed", 250), ("stray", 250), ("noise", 250)):
+    for kind, least in (("corrupted", 200), ("malformed", 100), ("stray", 100), ("noise", 100)):
         assert result.sent[kind] > least
     assert result.effective < 0.2 * sum(result.sent.values()) - result.sent["request"] / 10
     assert result.comparisons >= TRANSACTIONS // firmware_run.COMPARED

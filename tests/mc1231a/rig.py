@@ -22,6 +22,7 @@ from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import Port, open_port
 from tests.support.memory_line import MemoryLine
+from tests.support.needs import decided_by_parameter
 
 BAUD = 115200
 #: Seconds of host slack; in real time what a busy machine needs.
@@ -40,6 +41,11 @@ class Setting:
     @property
     def name(self) -> str:
         return f"{self.face}-{self.transport}"
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Markers of a test in this setting."""
+        return frozenset({"pty"} if self.transport == "pty" else ())
 
 
 SETTINGS = [
@@ -185,6 +191,7 @@ def _line(setting: Setting, wire: Wire) -> Iterator[tuple[Port, Callable[[Callab
             yield port, port.do
 
 
+@decided_by_parameter
 @contextlib.contextmanager
 def make_rig(
     setting: Setting, *, illegal: tuple[str, ...] = (), forgets: float = 0.0, **options: Any

@@ -12,6 +12,7 @@ from tests.soak.host_run import Session
 KINDS = ("drop", "flip", "truncate", "delay", "late", "duplicate", "stray", "noise", "silent")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forgets", [0.0, 0.005])
 @pytest.mark.parametrize("faults", ["", "all=0.02", *(f"{kind}=0.02" for kind in KINDS)])
 def test_host_and_chip_set_agree(faults: str, forgets: float) -> None:

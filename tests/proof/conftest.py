@@ -11,11 +11,15 @@ import pytest
 from tests.proof import cases
 from tests.proof.outputs import COMPILED, OUTPUTS, COutput, Output
 from tests.support.cdriver import Driver, build
+from tests.support.needs import decided_by_parameter
 
 Make = Callable[[str, str], Output]
+#: Every output, as parameters.
+EVERY = [*OUTPUTS, *(pytest.param(name, marks=pytest.mark.program) for name in COMPILED)]
 
 
 @pytest.fixture(scope="session")
+@decided_by_parameter
 def make(shared: Path, require_tool: Callable[..., str]) -> Iterator[Make]:
     """Give a function that gives an output of a protocol, and makes it once."""
     made: dict[tuple[str, str], Output] = {}

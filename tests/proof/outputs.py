@@ -22,7 +22,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Blob, Scalar
 from qlinkgen.model.values import default_of, native_from_raw, raw_from_native
 from tests.proof import cases
-from tests.support.cdriver import Driver, raw_text
+from tests.support.cdriver import WARNINGS, Driver, raw_text
 
 
 class Refused(Exception):
@@ -263,11 +263,12 @@ OUTPUTS: dict[str, Callable[[str], Output]] = {
     "construct source": construct_source,
     "python": python_module,
 }
-#: Compiler and flags of what is compiled; the sanitizers end the program at the first undefined thing.
+#: Compiler and flags of what is compiled: optimised, with the warnings that need it; and under sanitizers,
+#: which end the program at the first undefined thing.
 COMPILED = {
-    "gcc": ("gcc", ("-O2", "-std=c99")),
+    "gcc": ("gcc", ("-O2", "-std=c99", *WARNINGS)),
     "clang": (
         "clang",
-        ("-O1", "-g", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+        ("-O0", "-g1", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
     ),
 }

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from tests.proof import cases
-from tests.proof.conftest import Make
-from tests.proof.outputs import COMPILED, OUTPUTS, Refused
+from tests.proof.conftest import EVERY, Make
+from tests.proof.outputs import Refused
 
 
 def rows(kind: str) -> list[tuple[str, Mapping[str, Any]]]:
@@ -42,7 +42,7 @@ def test_checksum(name: str, row: Mapping[str, Any]) -> None:
         assert sender.value(plain) == check
 
 
-@pytest.mark.parametrize("output", [*OUTPUTS, *COMPILED])
+@pytest.mark.parametrize("output", EVERY)
 def test_stuffing_is_undone_for_every_short_string(output: str, make: Make) -> None:
     made = make("qlink", output)
     message = cases.protocol("qlink").by_name["loop_back.request"]
@@ -58,7 +58,7 @@ def test_stuffing_is_undone_for_every_short_string(output: str, make: Make) -> N
         assert made.decode(message, wire, b"").fields == fields
 
 
-@pytest.mark.parametrize("output", [*OUTPUTS, *COMPILED])
+@pytest.mark.parametrize("output", EVERY)
 def test_document_example_of_stuffing_has_another_crc(output: str, make: Make) -> None:
     made = make("qlink", output)
     [example] = [row for row in cases.by_hand("qlink")["faults"] if row["kind"] == "crc"]

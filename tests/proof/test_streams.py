@@ -15,6 +15,9 @@ from tests.proof.conftest import Make
 from tests.proof.corruption import EVERY_KIND, corrupted
 from tests.proof.outputs import COutput
 
+#: One side of every comparison is compiled.
+pytestmark = pytest.mark.program
+
 NO_STREAM = ("mc1231a", "response")
 #: Frames that the C program takes in one line.
 _FRAMES = 800

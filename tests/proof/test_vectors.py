@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from tests.proof import cases
-from tests.proof.conftest import Make
-from tests.proof.outputs import COMPILED, OUTPUTS, Decoded, Refused
+from tests.proof.conftest import EVERY, Make
+from tests.proof.outputs import Decoded, Refused
 
-everywhere = pytest.mark.parametrize("output", [*OUTPUTS, *COMPILED])
+everywhere = pytest.mark.parametrize("output", EVERY)
 every_protocol = pytest.mark.parametrize("name", cases.PROTOCOLS)
 
 

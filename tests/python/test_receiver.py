@@ -42,6 +42,7 @@ def summary(events: Iterable[Any]) -> list[tuple[Any, ...]]:
     return [(e.kind, e.offset, e.raw) if hasattr(e, "kind") else ("message", repr(e), b"") for e in events]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "direction"), STREAMS)
 @settings(max_examples=80)
 @given(data=st.data())
@@ -76,6 +77,7 @@ def described(events: Iterable[Any]) -> list[tuple[object, ...]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "direction"), STREAMS)
 @settings(max_examples=80)
 @given(data=st.data())

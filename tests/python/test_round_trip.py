@@ -46,6 +46,7 @@ def test_every_message_survives(name: str, called: str, data: st.DataObject) -> 
 KINDS = {"crc", "stuffing", "length", "range", "unknown", "truncated", "frame", "illegal"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 @settings(max_examples=100)
 @given(data=st.data())

@@ -239,6 +239,7 @@ def test_behind_any_corruption_every_intact_frame_is_delivered(name: str) -> Non
     assert lost <= (6 if name == "kitchen_sink" else 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 def test_an_endless_stream_neither_grows_nor_slows_the_decoder(name: str) -> None:
     for direction in directions(name):

@@ -26,6 +26,7 @@ from tests.firmware.firmware import TARGETS
 from tests.firmware.node import FirmwareNode, RealPauses
 from tests.qlink.behaviour_drivers import AsyncFace
 from tests.support.memory_line import MemoryLine
+from tests.support.needs import decided_by_parameter
 
 T = TypeVar("T")
 #: Seconds of host slack: more than the longest answer takes; in real time what a busy machine needs.
@@ -50,6 +51,12 @@ class Setting:
     partial: float = 0.0
     changed: float = 0.0
     firmware: str = ""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Markers of a test in this setting."""
+        program = {"program"} if self.firmware else set()
+        return frozenset(program | ({"pty"} if self.transport == "pty" else set()))
 
     @property
     def faulty(self) -> bool:
@@ -246,6 +253,7 @@ class Rig:
         raise AssertionError("it never got so")
 
 
+@decided_by_parameter
 @contextlib.contextmanager
 def make_rig(setting: Setting, *nodes: Node, turnaround: float = 0.0, **options: Any) -> Iterator[Rig]:
     """Put nodes on a line, and a bus at its outside."""

@@ -23,6 +23,7 @@ from tests.qlink.behaviour_rig import (
     Slave,
     make_rig,
 )
+from tests.support.needs import decided_by_parameter
 
 __all__ = ["build_firmware", "firmware_line"]
 
@@ -61,6 +62,7 @@ def _maker(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
         yield make
 
 
+@decided_by_parameter
 def _nodes(
     setting: Setting, slaves: tuple[Slave, ...], request: pytest.FixtureRequest, stack: contextlib.ExitStack
 ) -> list[Node]:

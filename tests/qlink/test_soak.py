@@ -18,6 +18,7 @@ from tests.soak.bus_run import LATE, Result, Soak
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 def test_on_the_virtual_clock() -> None:
     result = bus_run.virtual(12_000, seed=11)
     assert result.complaints == []
@@ -34,11 +35,11 @@ def test_on_the_virtual_clock() -> None:
 
 
 def test_over_a_pty() -> None:
-    result = bus_run.pty(600, seed=11, slack=0.15)  # the machine may be busy with other tests
+    result = bus_run.pty(300, seed=11, slack=0.15)  # the machine may be busy with other tests
     assert result.complaints == []
-    assert result.counts.total > 20
-    assert result.words > 100
-    assert result.account.outcomes["answered"] > 400
+    assert result.counts.total > 10
+    assert result.words > 50
+    assert result.account.outcomes["answered"] > 200
 
 
 def digest(seed: int, hash_seed: str) -> str:
@@ -51,6 +52,7 @@ def digest(seed: int, hash_seed: str) -> str:
     return run.stdout.strip()
 
 
+@pytest.mark.slow
 def test_a_seed_always_gives_the_same_log() -> None:
     here = bus_run.virtual(1500, seed=5)
     assert here.account.digest == bus_run.virtual(1500, seed=5).account.digest == digest(5, "1")
@@ -71,6 +73,7 @@ def alone(rates: dict[str, RateLike]) -> Result:
     return soak.run("alone", VirtualPort(soak.wire), bus_run.SLACK, 4000)
 
 
+@pytest.mark.slow
 class TestEachFaultAlone:
     """Every node is there, so the sums are exact: what was injected is what was counted."""
 

@@ -113,6 +113,7 @@ def mutate(data: Any, chance: random.Random) -> None:
         container[new] = container.pop(key) if kind == 3 else copy.deepcopy(chance.choice(ODD))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEXTS)
 def test_changed_nodes(name: str) -> None:
     chance = random.Random(f"nodes {name}")

@@ -132,6 +132,7 @@ def test_first_line_names_the_json_schema() -> None:
         assert (find(name).parent / line.partition("=")[2]).resolve().is_file()
 
 
+@pytest.mark.slow
 def test_loading_is_linear() -> None:
     """A schema of 1,000 messages costs about ten times one of 100."""
     small, large = (_generated(count) for count in (100, 1000))

@@ -21,6 +21,7 @@ from qlinkgen.protocols.trio import (
 from qlinkgen.sim.port_ring import PortRing
 from qlinkgen.sim.virtual_ring import VirtualRing
 from qlinkgen.transport import Port, memory_ring, open_port
+from tests.support.needs import decided_by_parameter
 
 #: Seconds that a wait may take where it must not fail; a busy machine needs some.
 PATIENCE = 20.0
@@ -40,6 +41,11 @@ class Setting:
     @property
     def name(self) -> str:
         return f"{self.face}-{self.transport}"
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Markers of a test in this setting."""
+        return frozenset({"pty"} if self.transport == "pty" else ())
 
 
 SETTINGS = [
@@ -100,6 +106,7 @@ class Rig:
         self.faces[0].sleep(0.05)
 
 
+@decided_by_parameter
 @contextlib.contextmanager
 def make_rig(setting: Setting, ring: str, **options: Any) -> Iterator[Rig]:
     """Make a ring of these nodes and a face for each."""
