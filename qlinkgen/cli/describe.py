@@ -92,7 +92,9 @@ def step_text(scalar: Scalar) -> str:
 
 
 def default_text(value: Value) -> str:
-    """The default as the command line takes it."""
+    """The default as the command line takes it, or that there is none."""
+    if value.required:
+        return "required"
     shown = to_json(value, default_of(value))
     if isinstance(shown, list):
         return "none" if not shown else ",".join(map(str, shown))
