@@ -8,6 +8,7 @@ import click
 
 import qlinkgen
 from qlinkgen.cli.boundary import debug_option, run
+from qlinkgen.model.spelling import similar
 
 #: Command to the one line of `qlinkgen --help`; the command itself is `command` in the module of its name.
 COMMANDS = {
@@ -42,6 +43,18 @@ class LazyGroup(click.Group):
         if not any(each.name == "debug" for each in command.params):
             command.params.append(debug_option(hidden=True))  # at the end of a line that has failed
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; one that does not exist may be a misspelt one."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            if close := similar(args[0], COMMANDS):
+                text = f"{error.message} Did you mean {close[0]}?"
+                raise click.UsageError(text, ctx) from None
+            raise
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands from the table above."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 from collections.abc import Iterable
@@ -17,6 +16,7 @@ from qlinkgen.errors import SchemaError
 from qlinkgen.model.checksum import candidates
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.spelling import similar
 from qlinkgen.model.texts import visible
 
 
@@ -69,7 +69,7 @@ def find_message(protocol: Protocol, name: str) -> Message:
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """A hint naming the closest known words, or ""."""
-    close = difflib.get_close_matches(word, list(known), n=2, cutoff=0.6)
+    close = similar(word, known, most=2)
     return f"did you mean {' or '.join(close)}?" if close else ""
 
 

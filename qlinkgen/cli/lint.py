@@ -4,42 +4,83 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import re
+from pathlib import Path
 
 import click
 
-from qlinkgen.cli.boundary import FINE, USAGE, WRONG
+from qlinkgen.cli.boundary import FINE, USAGE, WRONG, Failure
 from qlinkgen.cli.common import find_schema, on_terminal
 from qlinkgen.errors import Fault
 from qlinkgen.model.texts import visible
 
+#: The key that every schema has.
+_MARK = re.compile(r"""^\{?\s*["']?qlinkgen["']?\s*:""", re.MULTILINE)
+
 
 @click.command("lint")
-@click.argument("schemas", metavar="SCHEMA...", nargs=-1, required=True)
+@click.argument("schemas", metavar="SCHEMA|DIR...", nargs=-1, required=True)
 @click.option(
     "--format", "form", type=click.Choice(["text", "json"]), default="text", help="json: a list of objects."
 )
 def command(schemas: tuple[str, ...], form: str) -> int:
     """Check schema files and report every fault of each: file:line:col: error[RULE]: what is wrong; hint.
 
+    Of a folder, every .yaml and .yml file in it and below that has a key "qlinkgen" is checked, and named.
+
     Exit code 1 if there is an error, 2 if a file cannot be read; warnings do not count. docs/rules.md
     explains the rules.
     """
-    faults = [fault for schema in schemas for fault in _faults(schema)]
+    files = [file for schema in schemas for file in _files(schema)]
+    faults = [fault for file in files for fault in _faults(file)]
     if form == "json":
         click.echo(json.dumps([dataclasses.asdict(fault) for fault in faults], indent=2))
     else:
         for fault in faults:
             click.echo(_coloured(fault) if on_terminal() else visible(str(fault)))
-        _summary(len(schemas), faults)
+        _summary(len(files), faults)
     if any(fault.rule == "file-unreadable" for fault in faults):
         return USAGE
     return WRONG if any(fault.severity == "error" for fault in faults) else FINE
 
 
-def _faults(schema: str) -> list[Fault]:
+def _files(schema: str) -> list[Path]:
+    """The file that is meant, or those in a folder."""
+    path = Path(schema)
+    if not path.is_dir():
+        return [find_schema(schema)]
+    found: list[Path] = []
+    others: list[Path] = []
+    for folder, folders, names in os.walk(path):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        for name in sorted(names):
+            if name.endswith((".yaml", ".yml")):
+                file = Path(folder, name)
+                (found if _is_schema(file) else others).append(file)
+    if not found:
+        raise Failure(f"there is no schema in {schema}: no .yaml or .yml file in it has a key 'qlinkgen'")
+    click.echo(f"{schema}: {', '.join(str(each.relative_to(path)) for each in found)}", err=True)
+    if others:
+        left = ", ".join(str(each.relative_to(path)) for each in others)
+        click.echo(f"{schema}: not checked, without a key 'qlinkgen': {left}", err=True)
+    return found
+
+
+def _is_schema(file: Path) -> bool:
+    """Whether a file says that it is one. One that cannot be read is taken for one, and reported."""
+    from qlinkgen.schema.loader import read_regular  # noqa: PLC0415  # pydantic takes a while
+
+    try:
+        return bool(_MARK.search(read_regular(file)))
+    except (OSError, UnicodeDecodeError):
+        return True
+
+
+def _faults(file: Path) -> list[Fault]:
     from qlinkgen.schema import lint  # noqa: PLC0415  # pydantic takes a while
 
-    return lint(find_schema(schema))
+    return lint(file)
 
 
 def _coloured(fault: Fault) -> str:

@@ -100,7 +100,8 @@ def command(  # noqa: PLR0917  # click passes them by name
 
     PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. MESSAGE and values are
     written as for encode. A request that nobody answers prints nothing. One that must not be repeated is sent
-    once, whatever --attempts says. The counter of a motion is the one that is given.
+    once, whatever --attempts says, and so is a message that belongs to no command: no answer is expected. The
+    counter of a motion is the one that is given.
 
     On a ring this is one more place for as long as it lasts: it sends on what comes, prints what is for it,
     and leaves after --seconds, as soon as nothing is under way. Nothing tells whether a message has arrived.

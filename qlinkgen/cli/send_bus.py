@@ -20,6 +20,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.conversation import timing_of
+from qlinkgen.transport.port import Ability, Port
 
 
 def send_on_bus(
@@ -35,8 +36,12 @@ def send_on_bus(
     echo: str | None,
     accepts: Mapping[str, Accepts] | None,
 ) -> None:
-    """Ask, and print the answer."""
+    """Ask, and print the answer; send a message that belongs to no command, which nothing answers."""
     with open_line(port, speed(protocol, baud), line) as opened:
+        if request.NAME not in {command.request.name for command in protocol.commands}:
+            _tell(opened, request.to_frame(), codec.BUS.bits_per_byte)
+            click.echo(f"qlinkgen: {request.NAME} was sent; no answer is expected", err=True)
+            return
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)
         engine = MasterEngine(codec, timing, echo=echo_mode(protocol, echo), accepts=accepts)
         reply = _transact(protocol, BlockingMaster(engine, opened), request)
@@ -44,17 +49,18 @@ def send_on_bus(
         click.echo(jsonlines.line(message_record(protocol, reply.response)))
 
 
+def _tell(port: Port, frame: bytes, bits_per_byte: int) -> None:
+    """Send a frame, and stay until it has left."""
+    port.write(frame)
+    if port.capabilities.paced is not Ability.NO:
+        port.sleep(len(frame) * bits_per_byte / port.baud)
+
+
 def check_request(protocol: Protocol, message: Message) -> None:
-    """Refuse a message that asks nothing."""
-    requests = {command.request.name: command.name for command in protocol.commands}
-    if message.name in requests:
-        return
-    if message.command in requests.values():
+    """Refuse the response of a command. A message that belongs to no command may be sent by anybody."""
+    command = protocol.command_of(message)
+    if command is not None and message is command.response:
         raise Failure(f"{message.name} is what a node answers; send its request, {message.command}")
-    raise Failure(
-        f"{message.name} belongs to no command, so nothing says what answers it; "
-        f"`qlinkgen show {protocol.name}` lists the commands"
-    )
 
 
 def _transact(protocol: Protocol, master: BlockingMaster, request: Any) -> Reply:

@@ -101,4 +101,9 @@ def _kind(name: str, crc: str | None) -> Kind:
             f"asks and nodes answer (bus kind master_slave); of a {kind.value} it has {known} alone"
         )
     check_options(protocol.name, kind, BELONGS)
+    if not protocol.commands:
+        raise Failure(
+            f"{protocol.name} has no commands, only messages, so its nodes have nothing to answer; "
+            "`qlinkgen send` puts its messages on a line"
+        )
     return kind

@@ -9,7 +9,6 @@ language.
 
 from __future__ import annotations
 
-import difflib
 import functools
 import re
 from collections.abc import Iterable
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from qlinkgen.errors import QlinkgenError
+from qlinkgen.model.spelling import similar
 
 __all__ = ["SUMS", "Algorithm", "Checksum", "Sum", "UnknownAlgorithm", "candidates", "catalogue", "find"]
 
@@ -255,7 +255,7 @@ def candidates(name: str) -> tuple[Algorithm, ...]:
 
 def _similar(key: str) -> tuple[str, ...]:
     known = {_key(name): name for each in _by_name().values() for name in each.names}
-    return tuple(known[match] for match in difflib.get_close_matches(key, known, n=3))
+    return tuple(known[match] for match in similar(key, known, most=3))
 
 
 def _key(name: str) -> str:

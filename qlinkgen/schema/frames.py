@@ -187,7 +187,8 @@ class FrameBuilder:
         high = self._parts.payload_size(*places["payload"])[1]
         frame, id_name = self._file.frame, str(id_place[-1])
         if "checksum" not in places:
-            return PacketFrame(id_name, high, doc=frame.doc, section=frame.section)
+            # Words are what a check value adds up; without one a message may have any size.
+            return PacketFrame(id_name, high, word_size=1, doc=frame.doc, section=frame.section)
         check, check_place = places["checksum"]
         checksum = self._packet_checksum(check, specs, check_place)
         if checksum is None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
+import os
+import stat
 from pathlib import Path as FilePath
 
 from qlinkgen._resources import schemas_dir
@@ -16,10 +19,12 @@ from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.messages import MessageBuilder
 from qlinkgen.schema.names import check_names
 from qlinkgen.schema.report import Reporter, did_you_mean
-from qlinkgen.schema.source import Position, parse
+from qlinkgen.schema.source import parse
 from qlinkgen.schema.structure import check_structure
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
+
+_KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 
 
 def shipped() -> tuple[str, ...]:
@@ -79,20 +84,27 @@ def loads(text: str, file: str, *, crc: str | None = None) -> tuple[Protocol | N
 
 def _load(path: FilePath, crc: str | None) -> tuple[Protocol | None, list[Fault]]:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        place = Position(1, 1)
-        fault = Fault(
-            str(path),
-            place.line,
-            place.column,
-            "file-unreadable",
-            f"cannot read it: {reason}",
-            "check the path",
-        )
-        return None, [fault]
+        what = f"cannot read it: {reason}"
+        return None, [Fault(str(path), 1, 1, "file-unreadable", what, "check the path")]
     return loads(text, str(path), crc=crc)
+
+
+def read_regular(path: FilePath) -> str:
+    """Return the text of a file. Raises OSError, also for what is not a regular file and may have no end."""
+    # Opening a FIFO waits for its writer otherwise.
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if not stat.S_ISREG(mode):
+            kind = _KINDS.get(stat.S_IFMT(mode), "a device")
+            raise OSError(errno.EINVAL, f"it is {kind}, not a file", str(path))
+        with os.fdopen(descriptor, encoding="utf-8", closefd=False) as file:
+            return file.read()
+    finally:
+        os.close(descriptor)
 
 
 def _build(data: object, report: Reporter, text: str, file_name: str, crc: str | None) -> Protocol | None:

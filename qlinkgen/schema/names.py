@@ -22,6 +22,9 @@ from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
+#: Most characters of a name. In C it gets the names of the protocol and the message before it and a suffix
+#: after it, and compilers need to look at 63 characters only (C99, 5.2.4.1).
+MAX_NAME = 40
 _NAME = re.compile(NAME_PATTERN.removesuffix("$") + r"\Z")
 _BUILTIN = frozenset(dir(builtins))
 #: Macros that the C header defines for each message.
@@ -63,6 +66,11 @@ class _Checker:
         self._report.error(rule, path, what, hint, of_key=True, needs=())
 
     def spelling(self, name: str, path: Path) -> bool:
+        if len(name) > MAX_NAME:
+            what = f"{shown(name)} has {len(name)} characters"
+            hint = f"use at most {MAX_NAME}: C compilers may tell names apart by 63 characters alone"
+            self._error("bad-name", path, what, hint)
+            return False
         if _NAME.match(name):
             return True
         hint = "use lower case letters, digits and underscores, beginning with a letter"

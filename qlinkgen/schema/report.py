@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 from qlinkgen.errors import Fault
+from qlinkgen.model.spelling import similar
 from qlinkgen.schema.rules import RULES
 from qlinkgen.schema.source import Path, Position, Source
 
@@ -89,10 +89,8 @@ def _one_line(text: str) -> str:
 
 def did_you_mean(word: str, known: Iterable[object], otherwise: str = "") -> str:
     """A hint naming the closest known word, or else ``otherwise``."""
-    # Words of hundreds of characters are no misspelling, and comparing them takes long.
-    by_lower_case = {str(each).lower(): str(each) for each in known}
-    close = difflib.get_close_matches(word[:80].lower(), by_lower_case, n=1, cutoff=0.6)
-    return f"did you mean '{by_lower_case[close[0]]}'?" if close else otherwise
+    close = similar(word, map(str, known))
+    return f"did you mean '{close[0]}'?" if close else otherwise
 
 
 def listed(words: Iterable[object], last: str = "and") -> str:

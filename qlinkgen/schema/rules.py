@@ -61,7 +61,7 @@ _ALL = (
     ),
     Rule(
         "bad-name",
-        "Names are lower case letters, digits and underscores, and begin with a letter.",
+        "Names are at most 40 lower case letters, digits and underscores, and begin with a letter.",
         "They become names in Python and C.",
     ),
     Rule(

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import qlinkgen as package
+from qlinkgen.cli import COMMANDS
 from tests.cli.conftest import Run
 from tests.cli.full_disk import FULL_DISK
 
@@ -56,6 +57,18 @@ def test_wrong_usage(qlinkgen: Run, arguments: tuple[str, ...]) -> None:
     assert result.code == 2
     assert "Usage: qlinkgen" in result.err
     assert result.out == ""
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_misspelt_command(qlinkgen: Run, command: str) -> None:
+    """One character too few, too many or swapped: the right one is proposed."""
+    wrong = {command[:-1], command + "x", command[1:], command[0] + command[2] + command[1] + command[3:]}
+    for word in wrong - set(COMMANDS):
+        result = qlinkgen(word)
+        assert result.code == 2
+        assert f"No such command '{word}'. Did you mean {command}?" in result.err
+    for word in ("zzz", "x", "x" * 500):
+        assert "Did you mean" not in qlinkgen(word).err
 
 
 def test_a_reader_that_goes_away() -> None:

@@ -88,6 +88,34 @@ def test_bits_counts_and_steps_of_an_own_schema(qlinkgen: Run, thermo: Path) -> 
     assert "degC" in out
 
 
+def test_defaults_that_there_are(qlinkgen: Run, thermo: Path) -> None:
+    """A value that the caller has to give has no default, whatever vectors use in its place."""
+    fields = {
+        "free": ("u8", "0"),
+        "given": ("{type: u8, default: 7}", "7"),
+        "bounded": ("{type: u8, range: 5..9}", "required"),
+        "scaled": ("{type: i16, scale: 1/10, range: 1..20}", "required"),
+        "list": ('"u8[2..4]"', "required"),
+        "some": ('"u8[0..4]"', "none"),
+        "blob": ('"bytes[3]"', "required"),
+        "filled": ('{type: "bytes[2]", default: "0102"}', "0102"),
+        "word": ('"text[1..4]"', "required"),
+        "fixed": ("{type: u8, const: 3}", ""),
+        "spare": ("{type: u8, reserved: true}", ""),
+        "low": ("{type: u8, bits: {inner: {at: 0..3, range: 2..5}}}", ""),
+    }
+    text, out, at = thermo.read_text(), [""], 0
+    for name, (kind, default) in fields.items():
+        thermo.write_text(text.replace("request: {first: u8}", f"request: {{{name}: {kind}}}"))
+        out = qlinkgen("show", thermo, "get_log.request").lines
+        (head,) = [line for line in out if line.startswith("offset")]
+        row = next(line for line in out if line.split()[1:2] == [name])
+        at = head.index("default") if "default" in head else len(row)
+        assert row[at:].split("  ")[0].strip() == default, (name, out)
+    row = next(line for line in out if line.split()[1:2] == ["inner"])
+    assert row[at:].strip() == "required"
+
+
 def test_unknown_names(qlinkgen: Run) -> None:
     result = qlinkgen("show", "qlink", "moton")
     assert result.code == 2

@@ -154,6 +154,18 @@ def test_a_schema_of_the_user(schema: str, request_: str, answer: dict[str, obje
     assert found == {"message": f"{command}.response", address: 7, "fields": answer}
 
 
+def test_a_schema_without_commands(tmp_path: Path, qlinkgen: Run) -> None:
+    text = (REPOSITORY / "tests" / "schemas" / "modbus_rtu.yaml").read_text()
+    file = tmp_path / "talk.yaml"
+    file.write_text(
+        text[: text.index("\ncommands:")] + "\nmessages:\n  hello: {id: 1, fields: {value: u8}}\n"
+    )
+    assert qlinkgen("lint", file).code == 0, qlinkgen("lint", file).out
+    result = qlinkgen("simulate", file)
+    assert (result.code, result.out) == (2, "")
+    assert "modbus_rtu has no commands, only messages, so its nodes have nothing to answer" in result.err
+
+
 def test_frames_without_addresses(tmp_path: Path, qlinkgen: Run) -> None:
     file = tmp_path / "probe.yaml"
     file.write_text(

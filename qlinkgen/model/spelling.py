@@ -1,0 +1,42 @@
+"""Which known word was probably meant by an unknown one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+#: A word longer than this is no misspelling, and comparing it takes long.
+_LONGEST = 80
+
+
+def similar(word: str, known: Iterable[str], most: int = 1) -> tuple[str, ...]:
+    """Return the known words that differ from a word as typing errors do, the nearest first.
+
+    An error is a character too many, too few or wrong, or two that are swapped; one is allowed for every four
+    characters. In a word of three a wrong character is too much: `f32` is not `u32`, nor `lrc` `arc`.
+    """
+    asked = word[:_LONGEST].lower()
+    found = []
+    for each in known:
+        errors = _errors(asked, each.lower())
+        if errors <= max(1, len(asked) // 4) and not (len(asked) <= 3 and _one_replaced(asked, each.lower())):
+            found.append((errors, each))
+    return tuple(each for _, each in sorted(found)[:most])
+
+
+def _one_replaced(word: str, other: str) -> bool:
+    return len(word) == len(other) and sum(a != b for a, b in zip(word, other, strict=True)) == 1
+
+
+def _errors(word: str, other: str) -> int:
+    """Typing errors between two words: insertions, deletions, replacements, swaps of neighbours."""
+    before: list[int] = []
+    row = list(range(len(other) + 1))
+    for at, character in enumerate(word, 1):
+        rows = [at]
+        for to, wanted in enumerate(other, 1):
+            cost = min(row[to] + 1, rows[to - 1] + 1, row[to - 1] + (character != wanted))
+            if at > 1 < to and character == other[to - 2] and word[at - 2] == wanted:
+                cost = min(cost, before[to - 2] + 1)
+            rows.append(cost)
+        before, row = row, rows
+    return row[-1]
