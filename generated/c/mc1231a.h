@@ -986,29 +986,19 @@ static inline int mc1231a_set_2_request_to_frame(uint8_t *wire, size_t capacity)
 #define MC1231A_SET_2_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_SET_2_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_set_2_response {
-    mc1231a_axis_status_t status; /* Status of the axis; flags axis_status */
-} mc1231a_set_2_response_t;
-
-#define MC1231A_SET_2_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_set_2_response_t;
+#define MC1231A_SET_2_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_set_2_response_encode(
     const mc1231a_set_2_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_SET_2_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_2_response_decode(mc1231a_set_2_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_2_response_to_frame(
@@ -1055,29 +1045,19 @@ static inline int mc1231a_set_i_request_to_frame(uint8_t *wire, size_t capacity)
 #define MC1231A_SET_I_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_SET_I_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_set_i_response {
-    mc1231a_axis_status_t status; /* Status of the axis; flags axis_status */
-} mc1231a_set_i_response_t;
-
-#define MC1231A_SET_I_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_set_i_response_t;
+#define MC1231A_SET_I_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_set_i_response_encode(
     const mc1231a_set_i_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_SET_I_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_i_response_decode(mc1231a_set_i_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_i_response_to_frame(
@@ -1881,30 +1861,20 @@ static inline int mc1231a_get_vel_request_to_frame(uint8_t *wire, size_t capacit
 #define MC1231A_GET_VEL_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_VEL_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_vel_response {
-    mc1231a_velocity_t value; /* Buffered velocity; in steps of 1/2^16 counts/sample */
-} mc1231a_get_vel_response_t;
-
-#define MC1231A_GET_VEL_RESPONSE_INIT { 0UL }
+/* value: Buffered velocity; in steps of 1/2^16 counts/sample */
+typedef mc1231a_set_vel_request_t mc1231a_get_vel_response_t;
+#define MC1231A_GET_VEL_RESPONSE_INIT MC1231A_SET_VEL_REQUEST_INIT
 
 static inline int mc1231a_get_vel_response_encode(
     const mc1231a_get_vel_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, message->value);
-    return (int)MC1231A_GET_VEL_RESPONSE_MAX_SIZE;
+    return mc1231a_set_vel_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_vel_response_decode(
     mc1231a_get_vel_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_vel_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_vel_response_to_frame(
@@ -2019,30 +1989,20 @@ static inline int mc1231a_get_max_acc_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_MAX_ACC_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MAX_ACC_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_max_acc_response {
-    mc1231a_peak_acceleration_t value; /* Buffered S-curve acceleration; in steps of 1/2^16 counts/sample^2 */
-} mc1231a_get_max_acc_response_t;
-
-#define MC1231A_GET_MAX_ACC_RESPONSE_INIT { 0U }
+/* value: Buffered S-curve acceleration; in steps of 1/2^16 counts/sample^2 */
+typedef mc1231a_set_max_acc_request_t mc1231a_get_max_acc_response_t;
+#define MC1231A_GET_MAX_ACC_RESPONSE_INIT MC1231A_SET_MAX_ACC_REQUEST_INIT
 
 static inline int mc1231a_get_max_acc_response_encode(
     const mc1231a_get_max_acc_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_MAX_ACC_RESPONSE_MAX_SIZE;
+    return mc1231a_set_max_acc_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_max_acc_response_decode(
     mc1231a_get_max_acc_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_max_acc_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_max_acc_response_to_frame(
@@ -2086,30 +2046,20 @@ static inline int mc1231a_get_jerk_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_JERK_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_JERK_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_jerk_response {
-    mc1231a_jerk_t value; /* Buffered jerk; in steps of 1/2^32 counts/sample^3 */
-} mc1231a_get_jerk_response_t;
-
-#define MC1231A_GET_JERK_RESPONSE_INIT { 0UL }
+/* value: Buffered jerk; in steps of 1/2^32 counts/sample^3 */
+typedef mc1231a_set_jerk_request_t mc1231a_get_jerk_response_t;
+#define MC1231A_GET_JERK_RESPONSE_INIT MC1231A_SET_JERK_REQUEST_INIT
 
 static inline int mc1231a_get_jerk_response_encode(
     const mc1231a_get_jerk_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, message->value);
-    return (int)MC1231A_GET_JERK_RESPONSE_MAX_SIZE;
+    return mc1231a_set_jerk_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_jerk_response_decode(
     mc1231a_get_jerk_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_jerk_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_jerk_response_to_frame(
@@ -2153,30 +2103,20 @@ static inline int mc1231a_get_ratio_request_to_frame(uint8_t *wire, size_t capac
 #define MC1231A_GET_RATIO_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_RATIO_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_ratio_response {
-    mc1231a_gear_ratio_t value; /* Buffered gear ratio; in steps of 1/2^16 */
-} mc1231a_get_ratio_response_t;
-
-#define MC1231A_GET_RATIO_RESPONSE_INIT { 0L }
+/* value: Buffered gear ratio; in steps of 1/2^16 */
+typedef mc1231a_set_ratio_request_t mc1231a_get_ratio_response_t;
+#define MC1231A_GET_RATIO_RESPONSE_INIT MC1231A_SET_RATIO_REQUEST_INIT
 
 static inline int mc1231a_get_ratio_response_encode(
     const mc1231a_get_ratio_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_RATIO_RESPONSE_MAX_SIZE;
+    return mc1231a_set_ratio_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_ratio_response_decode(
     mc1231a_get_ratio_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_ratio_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_ratio_response_to_frame(
@@ -2220,30 +2160,20 @@ static inline int mc1231a_get_trgt_pos_request_to_frame(uint8_t *wire, size_t ca
 #define MC1231A_GET_TRGT_POS_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_TRGT_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_trgt_pos_response {
-    mc1231a_position_t value; /* Profile target position; in counts */
-} mc1231a_get_trgt_pos_response_t;
-
-#define MC1231A_GET_TRGT_POS_RESPONSE_INIT { 0L }
+/* value: Profile target position; in counts */
+typedef mc1231a_get_pos_response_t mc1231a_get_trgt_pos_response_t;
+#define MC1231A_GET_TRGT_POS_RESPONSE_INIT MC1231A_GET_POS_RESPONSE_INIT
 
 static inline int mc1231a_get_trgt_pos_response_encode(
     const mc1231a_get_trgt_pos_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_TRGT_POS_RESPONSE_MAX_SIZE;
+    return mc1231a_get_pos_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_trgt_pos_response_decode(
     mc1231a_get_trgt_pos_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_pos_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_trgt_pos_response_to_frame(
@@ -2415,35 +2345,19 @@ static inline int mc1231a_set_kp_response_from_frame(uint16_t request_sum, const
 #define MC1231A_SET_KD_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_KD_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_kd_request {
-    mc1231a_gain_t value; /* Derivative gain; 0..32767 */
-} mc1231a_set_kd_request_t;
-
-#define MC1231A_SET_KD_REQUEST_INIT { 0U }
+/* value: Derivative gain; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_kd_request_t;
+#define MC1231A_SET_KD_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_kd_request_encode(
     const mc1231a_set_kd_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_KD_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_kd_request_decode(mc1231a_set_kd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_kd_request_to_frame(
@@ -2488,35 +2402,19 @@ static inline int mc1231a_set_kd_response_from_frame(uint16_t request_sum, const
 #define MC1231A_SET_KI_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_KI_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_ki_request {
-    mc1231a_gain_t value; /* Integral gain; 0..32767 */
-} mc1231a_set_ki_request_t;
-
-#define MC1231A_SET_KI_REQUEST_INIT { 0U }
+/* value: Integral gain; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_ki_request_t;
+#define MC1231A_SET_KI_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_ki_request_encode(
     const mc1231a_set_ki_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_KI_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_ki_request_decode(mc1231a_set_ki_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_ki_request_to_frame(
@@ -2562,36 +2460,20 @@ static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const
 #define MC1231A_SET_KVFF_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_KVFF_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_kvff_request {
-    mc1231a_gain_t value; /* Velocity feed-forward gain; 0..32767 */
-} mc1231a_set_kvff_request_t;
-
-#define MC1231A_SET_KVFF_REQUEST_INIT { 0U }
+/* value: Velocity feed-forward gain; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_kvff_request_t;
+#define MC1231A_SET_KVFF_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_kvff_request_encode(
     const mc1231a_set_kvff_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_KVFF_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_kvff_request_decode(
     mc1231a_set_kvff_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_kvff_request_to_frame(
@@ -2638,36 +2520,20 @@ static inline int mc1231a_set_kvff_response_from_frame(uint16_t request_sum, con
 #define MC1231A_SET_I_LM_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_I_LM_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_i_lm_request {
-    mc1231a_gain_t value; /* Integration limit; 0..32767 */
-} mc1231a_set_i_lm_request_t;
-
-#define MC1231A_SET_I_LM_REQUEST_INIT { 0U }
+/* value: Integration limit; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_i_lm_request_t;
+#define MC1231A_SET_I_LM_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_i_lm_request_encode(
     const mc1231a_set_i_lm_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_I_LM_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_i_lm_request_decode(
     mc1231a_set_i_lm_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_i_lm_request_to_frame(
@@ -2713,36 +2579,20 @@ static inline int mc1231a_set_i_lm_response_from_frame(uint16_t request_sum, con
 #define MC1231A_SET_MTR_LMT_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_MTR_LMT_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_mtr_lmt_request {
-    mc1231a_gain_t value; /* Ceiling of the filter output; 0..32767 */
-} mc1231a_set_mtr_lmt_request_t;
-
-#define MC1231A_SET_MTR_LMT_REQUEST_INIT { 0U }
+/* value: Ceiling of the filter output; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_mtr_lmt_request_t;
+#define MC1231A_SET_MTR_LMT_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_mtr_lmt_request_encode(
     const mc1231a_set_mtr_lmt_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_MTR_LMT_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_mtr_lmt_request_decode(
     mc1231a_set_mtr_lmt_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_mtr_lmt_request_to_frame(
@@ -2868,36 +2718,20 @@ static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum,
 #define MC1231A_SET_POS_ERR_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_POS_ERR_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_pos_err_request {
-    mc1231a_gain_t value; /* Position-error limit that raises motion error; 0..32767 */
-} mc1231a_set_pos_err_request_t;
-
-#define MC1231A_SET_POS_ERR_REQUEST_INIT { 0U }
+/* value: Position-error limit that raises motion error; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_pos_err_request_t;
+#define MC1231A_SET_POS_ERR_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_pos_err_request_encode(
     const mc1231a_set_pos_err_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_POS_ERR_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_pos_err_request_decode(
     mc1231a_set_pos_err_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_pos_err_request_to_frame(
@@ -3033,30 +2867,20 @@ static inline int mc1231a_get_kd_request_to_frame(uint8_t *wire, size_t capacity
 #define MC1231A_GET_KD_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_KD_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_kd_response {
-    uint16_t value; /* Buffered derivative gain */
-} mc1231a_get_kd_response_t;
-
-#define MC1231A_GET_KD_RESPONSE_INIT { 0U }
+/* value: Buffered derivative gain */
+typedef mc1231a_get_kp_response_t mc1231a_get_kd_response_t;
+#define MC1231A_GET_KD_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_kd_response_encode(
     const mc1231a_get_kd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_KD_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_kd_response_decode(
     mc1231a_get_kd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_kd_response_to_frame(
@@ -3100,30 +2924,20 @@ static inline int mc1231a_get_ki_request_to_frame(uint8_t *wire, size_t capacity
 #define MC1231A_GET_KI_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_KI_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_ki_response {
-    uint16_t value; /* Buffered integral gain */
-} mc1231a_get_ki_response_t;
-
-#define MC1231A_GET_KI_RESPONSE_INIT { 0U }
+/* value: Buffered integral gain */
+typedef mc1231a_get_kp_response_t mc1231a_get_ki_response_t;
+#define MC1231A_GET_KI_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_ki_response_encode(
     const mc1231a_get_ki_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_KI_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_ki_response_decode(
     mc1231a_get_ki_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_ki_response_to_frame(
@@ -3167,30 +2981,20 @@ static inline int mc1231a_get_kvff_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_KVFF_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_KVFF_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_kvff_response {
-    uint16_t value; /* Buffered velocity feed-forward gain */
-} mc1231a_get_kvff_response_t;
-
-#define MC1231A_GET_KVFF_RESPONSE_INIT { 0U }
+/* value: Buffered velocity feed-forward gain */
+typedef mc1231a_get_kp_response_t mc1231a_get_kvff_response_t;
+#define MC1231A_GET_KVFF_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_kvff_response_encode(
     const mc1231a_get_kvff_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_KVFF_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_kvff_response_decode(
     mc1231a_get_kvff_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_kvff_response_to_frame(
@@ -3234,30 +3038,20 @@ static inline int mc1231a_get_i_lm_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_I_LM_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_I_LM_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_i_lm_response {
-    uint16_t value; /* Buffered integration limit */
-} mc1231a_get_i_lm_response_t;
-
-#define MC1231A_GET_I_LM_RESPONSE_INIT { 0U }
+/* value: Buffered integration limit */
+typedef mc1231a_get_kp_response_t mc1231a_get_i_lm_response_t;
+#define MC1231A_GET_I_LM_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_i_lm_response_encode(
     const mc1231a_get_i_lm_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_I_LM_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_i_lm_response_decode(
     mc1231a_get_i_lm_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_i_lm_response_to_frame(
@@ -3301,36 +3095,20 @@ static inline int mc1231a_get_mtr_lmt_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_MTR_LMT_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MTR_LMT_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mtr_lmt_response {
-    mc1231a_gain_t value; /* Filter output ceiling; 0..32767 */
-} mc1231a_get_mtr_lmt_response_t;
-
-#define MC1231A_GET_MTR_LMT_RESPONSE_INIT { 0U }
+/* value: Filter output ceiling; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_get_mtr_lmt_response_t;
+#define MC1231A_GET_MTR_LMT_RESPONSE_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_get_mtr_lmt_response_encode(
     const mc1231a_get_mtr_lmt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_MTR_LMT_RESPONSE_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mtr_lmt_response_decode(
     mc1231a_get_mtr_lmt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mtr_lmt_response_to_frame(
@@ -3374,36 +3152,20 @@ static inline int mc1231a_get_mtr_bias_request_to_frame(uint8_t *wire, size_t ca
 #define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mtr_bias_response {
-    mc1231a_motor_command_t value; /* Filter DC offset; -32767..32767 */
-} mc1231a_get_mtr_bias_response_t;
-
-#define MC1231A_GET_MTR_BIAS_RESPONSE_INIT { 0 }
+/* value: Filter DC offset; -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_get_mtr_bias_response_t;
+#define MC1231A_GET_MTR_BIAS_RESPONSE_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_get_mtr_bias_response_encode(
     const mc1231a_get_mtr_bias_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_GET_MTR_BIAS_RESPONSE_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mtr_bias_response_decode(
     mc1231a_get_mtr_bias_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mtr_bias_response_to_frame(
@@ -3450,30 +3212,20 @@ static inline int mc1231a_get_pos_err_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_POS_ERR_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_POS_ERR_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_pos_err_response {
-    uint16_t value; /* Position-error limit */
-} mc1231a_get_pos_err_response_t;
-
-#define MC1231A_GET_POS_ERR_RESPONSE_INIT { 0U }
+/* value: Position-error limit */
+typedef mc1231a_get_kp_response_t mc1231a_get_pos_err_response_t;
+#define MC1231A_GET_POS_ERR_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_pos_err_response_encode(
     const mc1231a_get_pos_err_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_POS_ERR_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_pos_err_response_decode(
     mc1231a_get_pos_err_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_pos_err_response_to_frame(
@@ -4303,30 +4055,20 @@ static inline int mc1231a_get_brk_pnt_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_BRK_PNT_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_BRK_PNT_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_brk_pnt_response {
-    int32_t value; /* Cycles for a time breakpoint, else counts */
-} mc1231a_get_brk_pnt_response_t;
-
-#define MC1231A_GET_BRK_PNT_RESPONSE_INIT { 0L }
+/* value: Cycles for a time breakpoint, else counts */
+typedef mc1231a_set_brk_pnt_request_t mc1231a_get_brk_pnt_response_t;
+#define MC1231A_GET_BRK_PNT_RESPONSE_INIT MC1231A_SET_BRK_PNT_REQUEST_INIT
 
 static inline int mc1231a_get_brk_pnt_response_encode(
     const mc1231a_get_brk_pnt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_BRK_PNT_RESPONSE_MAX_SIZE;
+    return mc1231a_set_brk_pnt_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_brk_pnt_response_decode(
     mc1231a_get_brk_pnt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_brk_pnt_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_brk_pnt_response_to_frame(
@@ -4441,30 +4183,20 @@ static inline int mc1231a_get_intrpt_request_to_frame(uint8_t *wire, size_t capa
 #define MC1231A_GET_INTRPT_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_INTRPT_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_intrpt_response {
-    mc1231a_axis_status_t status; /* Status of the axis; flags axis_status */
-} mc1231a_get_intrpt_response_t;
-
-#define MC1231A_GET_INTRPT_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_get_intrpt_response_t;
+#define MC1231A_GET_INTRPT_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_get_intrpt_response_encode(
     const mc1231a_get_intrpt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_GET_INTRPT_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_intrpt_response_decode(
     mc1231a_get_intrpt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_intrpt_response_to_frame(
@@ -4494,30 +4226,20 @@ static inline int mc1231a_get_intrpt_response_from_frame(
 #define MC1231A_RST_INTRPT_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_RST_INTRPT_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_rst_intrpt_request {
-    mc1231a_event_mask_t mask; /* Events to keep: 0 clears one; flags event_mask */
-} mc1231a_rst_intrpt_request_t;
-
-#define MC1231A_RST_INTRPT_REQUEST_INIT { 0U }
+/* mask: Events to keep: 0 clears one; flags event_mask */
+typedef mc1231a_set_intrpt_mask_request_t mc1231a_rst_intrpt_request_t;
+#define MC1231A_RST_INTRPT_REQUEST_INIT MC1231A_SET_INTRPT_MASK_REQUEST_INIT
 
 static inline int mc1231a_rst_intrpt_request_encode(
     const mc1231a_rst_intrpt_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->mask);
-    return (int)MC1231A_RST_INTRPT_REQUEST_MAX_SIZE;
+    return mc1231a_set_intrpt_mask_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_rst_intrpt_request_decode(
     mc1231a_rst_intrpt_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->mask = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_intrpt_mask_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_rst_intrpt_request_to_frame(
@@ -4579,30 +4301,20 @@ static inline int mc1231a_get_intrpt_mask_request_to_frame(uint8_t *wire, size_t
 #define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_intrpt_mask_response {
-    mc1231a_event_mask_t mask; /* Events that may interrupt: 1 lets one through; flags event_mask */
-} mc1231a_get_intrpt_mask_response_t;
-
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_INIT { 0U }
+/* mask: Events that may interrupt: 1 lets one through; flags event_mask */
+typedef mc1231a_set_intrpt_mask_request_t mc1231a_get_intrpt_mask_response_t;
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_INIT MC1231A_SET_INTRPT_MASK_REQUEST_INIT
 
 static inline int mc1231a_get_intrpt_mask_response_encode(
     const mc1231a_get_intrpt_mask_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->mask);
-    return (int)MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_SIZE;
+    return mc1231a_set_intrpt_mask_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_intrpt_mask_response_decode(
     mc1231a_get_intrpt_mask_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->mask = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_intrpt_mask_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_intrpt_mask_response_to_frame(
@@ -4667,30 +4379,20 @@ static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, c
 #define MC1231A_RST_STATUS_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_RST_STATUS_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_rst_status_request {
-    mc1231a_event_mask_t mask; /* Events to keep: 0 clears one; flags event_mask */
-} mc1231a_rst_status_request_t;
-
-#define MC1231A_RST_STATUS_REQUEST_INIT { 0U }
+/* mask: Events to keep: 0 clears one; flags event_mask */
+typedef mc1231a_set_intrpt_mask_request_t mc1231a_rst_status_request_t;
+#define MC1231A_RST_STATUS_REQUEST_INIT MC1231A_SET_INTRPT_MASK_REQUEST_INIT
 
 static inline int mc1231a_rst_status_request_encode(
     const mc1231a_rst_status_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->mask);
-    return (int)MC1231A_RST_STATUS_REQUEST_MAX_SIZE;
+    return mc1231a_set_intrpt_mask_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_rst_status_request_decode(
     mc1231a_rst_status_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->mask = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_intrpt_mask_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_rst_status_request_to_frame(
@@ -4752,30 +4454,20 @@ static inline int mc1231a_get_status_request_to_frame(uint8_t *wire, size_t capa
 #define MC1231A_GET_STATUS_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_STATUS_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_status_response {
-    mc1231a_axis_status_t status; /* Status of the axis; flags axis_status */
-} mc1231a_get_status_response_t;
-
-#define MC1231A_GET_STATUS_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_get_status_response_t;
+#define MC1231A_GET_STATUS_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_get_status_response_encode(
     const mc1231a_get_status_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_GET_STATUS_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_status_response_decode(
     mc1231a_get_status_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_status_response_to_frame(
@@ -4822,30 +4514,20 @@ static inline int mc1231a_get_mode_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_MODE_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MODE_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mode_response {
-    uint16_t value; /* Mode bits; their layout was not found */
-} mc1231a_get_mode_response_t;
-
-#define MC1231A_GET_MODE_RESPONSE_INIT { 0U }
+/* value: Mode bits; their layout was not found */
+typedef mc1231a_get_kp_response_t mc1231a_get_mode_response_t;
+#define MC1231A_GET_MODE_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_mode_response_encode(
     const mc1231a_get_mode_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_MODE_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mode_response_decode(
     mc1231a_get_mode_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mode_response_to_frame(
@@ -4963,30 +4645,20 @@ static inline int mc1231a_get_capt_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_CAPT_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_CAPT_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_capt_response {
-    mc1231a_position_t value; /* Captured position; in counts */
-} mc1231a_get_capt_response_t;
-
-#define MC1231A_GET_CAPT_RESPONSE_INIT { 0L }
+/* value: Captured position; in counts */
+typedef mc1231a_get_pos_response_t mc1231a_get_capt_response_t;
+#define MC1231A_GET_CAPT_RESPONSE_INIT MC1231A_GET_POS_RESPONSE_INIT
 
 static inline int mc1231a_get_capt_response_encode(
     const mc1231a_get_capt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_CAPT_RESPONSE_MAX_SIZE;
+    return mc1231a_get_pos_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_capt_response_decode(
     mc1231a_get_capt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_pos_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_capt_response_to_frame(
@@ -5161,36 +4833,20 @@ static inline int mc1231a_mtr_off_response_from_frame(uint16_t request_sum, cons
 #define MC1231A_SET_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_mtr_cmd_request {
-    mc1231a_motor_command_t value; /* Manual motor command (open loop only); -32767..32767 */
-} mc1231a_set_mtr_cmd_request_t;
-
-#define MC1231A_SET_MTR_CMD_REQUEST_INIT { 0 }
+/* value: Manual motor command (open loop only); -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_set_mtr_cmd_request_t;
+#define MC1231A_SET_MTR_CMD_REQUEST_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_set_mtr_cmd_request_encode(
     const mc1231a_set_mtr_cmd_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_SET_MTR_CMD_REQUEST_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_mtr_cmd_request_decode(
     mc1231a_set_mtr_cmd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_mtr_cmd_request_to_frame(
@@ -5250,36 +4906,20 @@ static inline int mc1231a_get_mtr_cmd_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mtr_cmd_response {
-    mc1231a_motor_command_t value; /* Motor command now being output; -32767..32767 */
-} mc1231a_get_mtr_cmd_response_t;
-
-#define MC1231A_GET_MTR_CMD_RESPONSE_INIT { 0 }
+/* value: Motor command now being output; -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_get_mtr_cmd_response_t;
+#define MC1231A_GET_MTR_CMD_RESPONSE_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_get_mtr_cmd_response_encode(
     const mc1231a_get_mtr_cmd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_GET_MTR_CMD_RESPONSE_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mtr_cmd_response_decode(
     mc1231a_get_mtr_cmd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mtr_cmd_response_to_frame(
@@ -5310,36 +4950,20 @@ static inline int mc1231a_get_mtr_cmd_response_from_frame(
 #define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_buf_mtr_cmd_request {
-    mc1231a_motor_command_t value; /* The buffered motor command; -32767..32767 */
-} mc1231a_set_buf_mtr_cmd_request_t;
-
-#define MC1231A_SET_BUF_MTR_CMD_REQUEST_INIT { 0 }
+/* value: The buffered motor command; -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_set_buf_mtr_cmd_request_t;
+#define MC1231A_SET_BUF_MTR_CMD_REQUEST_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_set_buf_mtr_cmd_request_encode(
     const mc1231a_set_buf_mtr_cmd_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_buf_mtr_cmd_request_decode(
     mc1231a_set_buf_mtr_cmd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_buf_mtr_cmd_request_to_frame(
@@ -5402,30 +5026,20 @@ static inline int mc1231a_get_buf_mtr_cmd_request_to_frame(uint8_t *wire, size_t
 #define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_buf_mtr_cmd_response {
-    int16_t value; /* Buffered motor command */
-} mc1231a_get_buf_mtr_cmd_response_t;
-
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_INIT { 0 }
+/* value: Buffered motor command */
+typedef mc1231a_get_intgr_response_t mc1231a_get_buf_mtr_cmd_response_t;
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_INIT MC1231A_GET_INTGR_RESPONSE_INIT
 
 static inline int mc1231a_get_buf_mtr_cmd_response_encode(
     const mc1231a_get_buf_mtr_cmd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_SIZE;
+    return mc1231a_get_intgr_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_buf_mtr_cmd_response_decode(
     mc1231a_get_buf_mtr_cmd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_intgr_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_buf_mtr_cmd_response_to_frame(
@@ -5592,36 +5206,20 @@ static inline int mc1231a_axis_off_response_from_frame(uint16_t request_sum, con
 #define MC1231A_SET_ACTL_POS_REQUEST_MAX_FRAME_SIZE 5U
 #define MC1231A_SET_ACTL_POS_REQUEST_MAX_WIRE_SIZE 5U
 
-typedef struct mc1231a_set_actl_pos_request {
-    mc1231a_destination_t value; /* The actual position; in counts; -1073741824..1073741823 */
-} mc1231a_set_actl_pos_request_t;
-
-#define MC1231A_SET_ACTL_POS_REQUEST_INIT { 0L }
+/* value: The actual position; in counts; -1073741824..1073741823 */
+typedef mc1231a_set_pos_request_t mc1231a_set_actl_pos_request_t;
+#define MC1231A_SET_ACTL_POS_REQUEST_INIT MC1231A_SET_POS_REQUEST_INIT
 
 static inline int mc1231a_set_actl_pos_request_encode(
     const mc1231a_set_actl_pos_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_SET_ACTL_POS_REQUEST_MAX_SIZE;
+    return mc1231a_set_pos_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_actl_pos_request_decode(
     mc1231a_set_actl_pos_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_pos_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_actl_pos_request_to_frame(
@@ -5683,30 +5281,20 @@ static inline int mc1231a_get_actl_pos_request_to_frame(uint8_t *wire, size_t ca
 #define MC1231A_GET_ACTL_POS_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_ACTL_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_actl_pos_response {
-    mc1231a_position_t value; /* Actual position; in counts */
-} mc1231a_get_actl_pos_response_t;
-
-#define MC1231A_GET_ACTL_POS_RESPONSE_INIT { 0L }
+/* value: Actual position; in counts */
+typedef mc1231a_get_pos_response_t mc1231a_get_actl_pos_response_t;
+#define MC1231A_GET_ACTL_POS_RESPONSE_INIT MC1231A_GET_POS_RESPONSE_INIT
 
 static inline int mc1231a_get_actl_pos_response_encode(
     const mc1231a_get_actl_pos_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_ACTL_POS_RESPONSE_MAX_SIZE;
+    return mc1231a_get_pos_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_actl_pos_response_decode(
     mc1231a_get_actl_pos_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_pos_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_actl_pos_response_to_frame(
@@ -5822,30 +5410,20 @@ static inline int mc1231a_get_lmt_swtch_request_to_frame(uint8_t *wire, size_t c
 #define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_lmt_swtch_response {
-    mc1231a_limit_switches_t value; /* Limit inputs; 1 is set; flags limit_switches */
-} mc1231a_get_lmt_swtch_response_t;
-
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_INIT { 0U }
+/* value: Limit inputs; 1 is set; flags limit_switches */
+typedef mc1231a_set_lmt_sense_request_t mc1231a_get_lmt_swtch_response_t;
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_INIT MC1231A_SET_LMT_SENSE_REQUEST_INIT
 
 static inline int mc1231a_get_lmt_swtch_response_encode(
     const mc1231a_get_lmt_swtch_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_SIZE;
+    return mc1231a_set_lmt_sense_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_lmt_swtch_response_decode(
     mc1231a_get_lmt_swtch_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_lmt_sense_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_lmt_swtch_response_to_frame(
@@ -5970,30 +5548,20 @@ static inline int mc1231a_get_home_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_HOME_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_HOME_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_home_response {
-    uint16_t value; /* One bit for each axis, as inferred */
-} mc1231a_get_home_response_t;
-
-#define MC1231A_GET_HOME_RESPONSE_INIT { 0U }
+/* value: One bit for each axis, as inferred */
+typedef mc1231a_get_kp_response_t mc1231a_get_home_response_t;
+#define MC1231A_GET_HOME_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_home_response_encode(
     const mc1231a_get_home_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_HOME_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_home_response_decode(
     mc1231a_get_home_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_home_response_to_frame(
@@ -6023,30 +5591,20 @@ static inline int mc1231a_get_home_response_from_frame(
 #define MC1231A_SET_SMPL_TIME_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_SMPL_TIME_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_smpl_time_request {
-    uint16_t value; /* Servo loop time; its unit was not found */
-} mc1231a_set_smpl_time_request_t;
-
-#define MC1231A_SET_SMPL_TIME_REQUEST_INIT { 0U }
+/* value: Servo loop time; its unit was not found */
+typedef mc1231a_get_kp_response_t mc1231a_set_smpl_time_request_t;
+#define MC1231A_SET_SMPL_TIME_REQUEST_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_set_smpl_time_request_encode(
     const mc1231a_set_smpl_time_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_SMPL_TIME_REQUEST_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_smpl_time_request_decode(
     mc1231a_set_smpl_time_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_smpl_time_request_to_frame(
@@ -6111,30 +5669,20 @@ static inline int mc1231a_get_smpl_time_request_to_frame(uint8_t *wire, size_t c
 #define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_smpl_time_response {
-    uint16_t value; /* Servo loop time; its unit was not found */
-} mc1231a_get_smpl_time_response_t;
-
-#define MC1231A_GET_SMPL_TIME_RESPONSE_INIT { 0U }
+/* value: Servo loop time; its unit was not found */
+typedef mc1231a_get_kp_response_t mc1231a_get_smpl_time_response_t;
+#define MC1231A_GET_SMPL_TIME_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_smpl_time_response_encode(
     const mc1231a_get_smpl_time_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_SMPL_TIME_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_smpl_time_response_decode(
     mc1231a_get_smpl_time_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_smpl_time_response_to_frame(
@@ -6216,30 +5764,20 @@ static inline int mc1231a_get_vrsn_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_VRSN_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_VRSN_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_vrsn_response {
-    uint16_t value; /* Packed version; its layout was not found */
-} mc1231a_get_vrsn_response_t;
-
-#define MC1231A_GET_VRSN_RESPONSE_INIT { 0U }
+/* value: Packed version; its layout was not found */
+typedef mc1231a_get_kp_response_t mc1231a_get_vrsn_response_t;
+#define MC1231A_GET_VRSN_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_vrsn_response_encode(
     const mc1231a_get_vrsn_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_VRSN_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_vrsn_response_decode(
     mc1231a_get_vrsn_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_vrsn_response_to_frame(
@@ -6562,30 +6100,20 @@ static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_su
 #define MC1231A_SET_PHASE_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_PHASE_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_phase_request {
-    mc1231a_phase_angle_t value; /* Phase angle; encoder counts assumed; in counts */
-} mc1231a_set_phase_request_t;
-
-#define MC1231A_SET_PHASE_REQUEST_INIT { 0U }
+/* value: Phase angle; encoder counts assumed; in counts */
+typedef mc1231a_set_phase_offset_request_t mc1231a_set_phase_request_t;
+#define MC1231A_SET_PHASE_REQUEST_INIT MC1231A_SET_PHASE_OFFSET_REQUEST_INIT
 
 static inline int mc1231a_set_phase_request_encode(
     const mc1231a_set_phase_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_PHASE_REQUEST_MAX_SIZE;
+    return mc1231a_set_phase_offset_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_phase_request_decode(
     mc1231a_set_phase_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_phase_offset_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_phase_request_to_frame(
@@ -6688,30 +6216,20 @@ static inline int mc1231a_get_phase_info_request_to_frame(uint8_t *wire, size_t 
 #define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_phase_info_response {
-    uint16_t value; /* Commutation flags; their layout was not found; not confirmed */
-} mc1231a_get_phase_info_response_t;
-
-#define MC1231A_GET_PHASE_INFO_RESPONSE_INIT { 0U }
+/* value: Commutation flags; their layout was not found; not confirmed */
+typedef mc1231a_get_kp_response_t mc1231a_get_phase_info_response_t;
+#define MC1231A_GET_PHASE_INFO_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_phase_info_response_encode(
     const mc1231a_get_phase_info_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_PHASE_INFO_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_phase_info_response_decode(
     mc1231a_get_phase_info_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_phase_info_response_to_frame(
@@ -6822,30 +6340,20 @@ static inline int mc1231a_get_phase_time_request_to_frame(uint8_t *wire, size_t 
 #define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_phase_time_response {
-    mc1231a_sample_times_t value; /* Initialisation duration; in samples */
-} mc1231a_get_phase_time_response_t;
-
-#define MC1231A_GET_PHASE_TIME_RESPONSE_INIT { 0U }
+/* value: Initialisation duration; in samples */
+typedef mc1231a_set_phase_time_request_t mc1231a_get_phase_time_response_t;
+#define MC1231A_GET_PHASE_TIME_RESPONSE_INIT MC1231A_SET_PHASE_TIME_REQUEST_INIT
 
 static inline int mc1231a_get_phase_time_response_encode(
     const mc1231a_get_phase_time_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_PHASE_TIME_RESPONSE_MAX_SIZE;
+    return mc1231a_set_phase_time_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_phase_time_response_decode(
     mc1231a_get_phase_time_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_phase_time_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_phase_time_response_to_frame(
@@ -6892,30 +6400,20 @@ static inline int mc1231a_get_phase_offset_request_to_frame(uint8_t *wire, size_
 #define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_phase_offset_response {
-    mc1231a_phase_angle_t value; /* Phase offset; in counts */
-} mc1231a_get_phase_offset_response_t;
-
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT { 0U }
+/* value: Phase offset; in counts */
+typedef mc1231a_set_phase_offset_request_t mc1231a_get_phase_offset_response_t;
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT MC1231A_SET_PHASE_OFFSET_REQUEST_INIT
 
 static inline int mc1231a_get_phase_offset_response_encode(
     const mc1231a_get_phase_offset_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_SIZE;
+    return mc1231a_set_phase_offset_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_phase_offset_response_decode(
     mc1231a_get_phase_offset_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_phase_offset_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_phase_offset_response_to_frame(

@@ -1003,30 +1003,20 @@ static inline int qlink_node_program_load_request_to_frame(
 #define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_FRAME_SIZE 8U
 #define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_WIRE_SIZE 11U
 
-typedef struct qlink_node_program_load_response {
-    uint8_t counter; /* Counter of the request that is acknowledged */
-} qlink_node_program_load_response_t;
-
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT { 0U }
+/* counter: Counter of the request that is acknowledged */
+typedef qlink_node_sync_request_t qlink_node_program_load_response_t;
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT QLINK_NODE_SYNC_REQUEST_INIT
 
 static inline int qlink_node_program_load_response_encode(
     const qlink_node_program_load_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 1U) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    payload[0] = message->counter;
-    return (int)QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE;
+    return qlink_node_sync_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_node_program_load_response_decode(
     qlink_node_program_load_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 1U) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->counter = payload[0];
-    return QLINK_OK;
+    return qlink_node_sync_request_decode(message, payload, size);
 }
 
 static inline int qlink_node_program_load_response_to_frame(
@@ -1450,30 +1440,20 @@ static inline int qlink_clear_fifo_response_to_frame(uint8_t node, uint8_t *wire
 #define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE 11U
 #define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_WIRE_SIZE 17U
 
-typedef struct qlink_preset_motor_position_request {
-    qlink_position_t position; /* Position that the motor has from now on; in encoder counts */
-} qlink_preset_motor_position_request_t;
-
-#define QLINK_PRESET_MOTOR_POSITION_REQUEST_INIT { 0L }
+/* position: Position that the motor has from now on; in encoder counts */
+typedef qlink_motor_position_response_t qlink_preset_motor_position_request_t;
+#define QLINK_PRESET_MOTOR_POSITION_REQUEST_INIT QLINK_MOTOR_POSITION_RESPONSE_INIT
 
 static inline int qlink_preset_motor_position_request_encode(
     const qlink_preset_motor_position_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    qlink_put_u32_be_(payload, (uint32_t)message->position);
-    return (int)QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE;
+    return qlink_motor_position_response_encode(message, payload, capacity);
 }
 
 static inline int qlink_preset_motor_position_request_decode(
     qlink_preset_motor_position_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->position = (int32_t)qlink_get_u32_be_(payload);
-    return QLINK_OK;
+    return qlink_motor_position_response_decode(message, payload, size);
 }
 
 static inline int qlink_preset_motor_position_request_to_frame(
@@ -1864,33 +1844,20 @@ static inline int qlink_set_outputs_response_to_frame(uint8_t node, uint8_t *wir
 #define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_FRAME_SIZE 10U
 #define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_WIRE_SIZE 15U
 
-typedef struct qlink_clear_outputs_request {
-    qlink_io24_t mask; /* Bit 0 is output 1 */
-} qlink_clear_outputs_request_t;
-
-#define QLINK_CLEAR_OUTPUTS_REQUEST_INIT { 0UL }
+/* mask: Bit 0 is output 1 */
+typedef qlink_set_outputs_request_t qlink_clear_outputs_request_t;
+#define QLINK_CLEAR_OUTPUTS_REQUEST_INIT QLINK_SET_OUTPUTS_REQUEST_INIT
 
 static inline int qlink_clear_outputs_request_encode(
     const qlink_clear_outputs_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->mask > 16777215UL) {
-        return QLINK_ERROR_RANGE;
-    }
-    if (capacity < 3U) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    qlink_put_u24_le_(payload, message->mask);
-    return (int)QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE;
+    return qlink_set_outputs_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_clear_outputs_request_decode(
     qlink_clear_outputs_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 3U) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->mask = qlink_get_u24_le_(payload);
-    return QLINK_OK;
+    return qlink_set_outputs_request_decode(message, payload, size);
 }
 
 static inline int qlink_clear_outputs_request_to_frame(
@@ -1928,44 +1895,21 @@ static inline int qlink_clear_outputs_response_to_frame(uint8_t node, uint8_t *w
 #define QLINK_LOOP_BACK_REQUEST_MAX_FRAME_SIZE 33U
 #define QLINK_LOOP_BACK_REQUEST_MAX_WIRE_SIZE 61U
 
-typedef struct qlink_loop_back_request {
-    uint8_t offset; /* Returned as it is */
-    uint8_t data_size; /* bytes in data */
-    uint8_t data[25]; /* Returned as it is */
-} qlink_loop_back_request_t;
-
-#define QLINK_LOOP_BACK_REQUEST_INIT { 0U, 1U, {0} }
+/* offset: Returned as it is */
+/* data: Returned as it is */
+typedef qlink_write_request_t qlink_loop_back_request_t;
+#define QLINK_LOOP_BACK_REQUEST_INIT QLINK_WRITE_REQUEST_INIT
 
 static inline int qlink_loop_back_request_encode(
     const qlink_loop_back_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t data_count = message->data_size;
-    const size_t size = 1U + (size_t)data_count;
-
-    if ((data_count < 1U) || (data_count > 25U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    if (capacity < size) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    payload[0] = message->offset;
-    for (uint8_t index = 0U; index < data_count; ++index) {
-        payload[1U + index] = message->data[index];
-    }
-    return (int)size;
+    return qlink_write_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_loop_back_request_decode(
     qlink_loop_back_request_t *message, const uint8_t *payload, size_t size)
 {
-    if ((size < 2U) || (size > 26U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    const size_t data_count = size - 1U;
-    message->offset = payload[0];
-    message->data_size = (uint8_t)data_count;
-    qlink_copy_(message->data, &payload[1], data_count);
-    return QLINK_OK;
+    return qlink_write_request_decode(message, payload, size);
 }
 
 static inline int qlink_loop_back_request_to_frame(
@@ -1991,44 +1935,21 @@ static inline int qlink_loop_back_request_to_frame(
 #define QLINK_LOOP_BACK_RESPONSE_MAX_FRAME_SIZE 33U
 #define QLINK_LOOP_BACK_RESPONSE_MAX_WIRE_SIZE 61U
 
-typedef struct qlink_loop_back_response {
-    uint8_t offset; /* Offset of the request */
-    uint8_t data_size; /* bytes in data */
-    uint8_t data[25]; /* Data of the request */
-} qlink_loop_back_response_t;
-
-#define QLINK_LOOP_BACK_RESPONSE_INIT { 0U, 1U, {0} }
+/* offset: Offset of the request */
+/* data: Data of the request */
+typedef qlink_write_request_t qlink_loop_back_response_t;
+#define QLINK_LOOP_BACK_RESPONSE_INIT QLINK_WRITE_REQUEST_INIT
 
 static inline int qlink_loop_back_response_encode(
     const qlink_loop_back_response_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t data_count = message->data_size;
-    const size_t size = 1U + (size_t)data_count;
-
-    if ((data_count < 1U) || (data_count > 25U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    if (capacity < size) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    payload[0] = message->offset;
-    for (uint8_t index = 0U; index < data_count; ++index) {
-        payload[1U + index] = message->data[index];
-    }
-    return (int)size;
+    return qlink_write_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_loop_back_response_decode(
     qlink_loop_back_response_t *message, const uint8_t *payload, size_t size)
 {
-    if ((size < 2U) || (size > 26U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    const size_t data_count = size - 1U;
-    message->offset = payload[0];
-    message->data_size = (uint8_t)data_count;
-    qlink_copy_(message->data, &payload[1], data_count);
-    return QLINK_OK;
+    return qlink_write_request_decode(message, payload, size);
 }
 
 static inline int qlink_loop_back_response_to_frame(

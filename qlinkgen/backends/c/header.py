@@ -40,6 +40,7 @@ class Header:
         self._names = Names(protocol)
         self._layouts = Layouts(protocol.name)
         self._types = Types(self._plan, self._names)
+        self._writer = MessageWriter(self._names, self._layouts, self._types)
         self._kept = tuple(message for message in protocol.messages if self._wanted(message))
         self._present = {message.name for message in self._kept}
         self._section = frame_section(protocol, self._layouts)
@@ -147,8 +148,7 @@ class Header:
         return f"#define {self._names.constant(message)}_ID 0x{message.id:02X}\n"
 
     def _message(self, message: Message) -> str:
-        writer = MessageWriter(self._names, self._layouts, self._types)
-        view = writer.render(self._plan.by_name[message.name])
+        view = self._writer.render(self._plan.by_name[message.name])
         view["early_id"] = self._section.needs_ids
         if self._encoded(message):
             view["to_frame"] = self._section.to_frame(self._names, self._address, message)
@@ -201,7 +201,7 @@ class Header:
             "banner": [piece for line in banner(protocol) for piece in c_text.comment(line, WIDTH)],
             "about": c_text.comment(protocol.doc, WIDTH),
             "options": option_lines(self._names.upper, self._section.check),
-            "example": example_lines(protocol, self._names, self._section, self._kept, self._options.role),
+            "example": example_lines(self._plan, self._names, self._section),
             "max_wire_size": max(
                 sizes.protocol_max_wire_size(protocol), self._section.view.get("max_wire", 0)
             ),

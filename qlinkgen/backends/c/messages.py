@@ -27,19 +27,25 @@ class Member:
 
 
 class MessageWriter:
-    """Lowers messages to what the template places."""
+    """Lowers messages to what the template places.
+
+    Messages with the same payload have one struct and one body of each function, those of the first of them.
+    """
 
     def __init__(self, names: Names, layouts: Layouts, types: Types) -> None:
         """All of it is shared by the whole header."""
         self._names = names
         self._layouts = layouts
         self._types = types
+        self._first: dict[object, str] = {}
 
     def render(self, plan: MessagePlan) -> dict[str, Any]:
         """The message for the template; only the directions that are kept have statements."""
         message, payload = plan.message, plan.payload
         head = message_head(self._names.command_of(message), message)
         notes = {value.name: member_note(value) for value in message.values}
+        members = [member for each in payload.settable for member in self._members(each, notes[each.name])]
+        shape = payload, tuple(member.declaration for member in members)
         return {
             "name": message.name,
             "stem": self._names.stem(message),
@@ -54,13 +60,12 @@ class MessageWriter:
             "max_wire_size": plan.wire_size,
             "has_struct": bool(payload.settable),
             "has_bytes": bool(payload.steps),
-            "members": [
-                member for each in payload.settable for member in self._members(each, notes[each.name])
-            ],
+            "same_struct": self._same("struct", shape, plan) if members else "",
+            "members": members,
+            "notes": [f"{name}: {note}" for name, note in notes.items() if note],
             "initialiser": ", ".join(map(_initialiser, payload.settable)),
-            "fixed": payload.fixed,
-            "encode": Encoder(payload, self._layouts).statements() if plan.encoded else None,
-            "decode": self._decode(plan) if plan.decoded else None,
+            "encode": self._encode(plan, self._same("encode", shape, plan)) if plan.encoded else None,
+            "decode": self._decode(plan, self._same("decode", shape, plan)) if plan.decoded else None,
             "scales": [scale for each in payload.settable if (scale := self._scale(plan, each))],
             "early_id": False,
             "encode_parameters": struct_parameter(self._names, message, const=True),
@@ -71,14 +76,28 @@ class MessageWriter:
             "from_frame": None,
         }
 
-    def _decode(self, plan: MessagePlan) -> dict[str, Any]:
-        decoder = Decoder(plan.payload, self._layouts)
-        return {
-            "lines": decoder.statements(),
-            "empty_is_default": plan.payload.empty_is_default and plan.payload.least > 0,
-            "defaults": self._defaults(plan),
-            "reads": decoder.reads,
-        }
+    def _same(self, what: str, shape: object, plan: MessagePlan) -> str:
+        """The first message that has the same, "" where this one is the first."""
+        own = self._names.function(plan.message)
+        first = self._first.setdefault((what, shape), own)
+        return "" if first == own else first
+
+    def _encode(self, plan: MessagePlan, same: str) -> list[str]:
+        own = "message, " if plan.payload.settable else ""
+        if same:
+            return [f"return {same}_encode({own}payload, capacity);"]
+        size = f"{self._names.constant(plan.message)}_MAX_SIZE" if plan.payload.fixed else "size"
+        return [*Encoder(plan.payload, self._layouts).statements(), f"return (int){size};"]
+
+    def _decode(self, plan: MessagePlan, same: str) -> list[str]:
+        own, ok = "message, " if plan.payload.settable else "", f"return {self._names.upper}_OK;"
+        if same:
+            return [f"return {same}_decode({own}payload, size);"]
+        decoder, empty = Decoder(plan.payload, self._layouts), list[str]()
+        if plan.payload.empty_is_default and plan.payload.least > 0:
+            empty = ["if (size == 0U) {", *(f"    {line}" for line in [*self._defaults(plan), ok]), "}"]
+        lines = decoder.statements()
+        return [*([] if decoder.reads else ["(void)payload;"]), *empty, *lines, ok]
 
     def _defaults(self, plan: MessagePlan) -> list[str]:
         """Statements that set a message to its defaults; only a list of items is copied as a whole."""
@@ -90,11 +109,8 @@ class MessageWriter:
                         f"message->{each.name} = {scalar_literal(each.number, each.number.default)};"
                     )
                 case BytesStep() | ItemsStep() if each.fixed or each.default:
-                    kind, defaults = (
-                        self._names.function(plan.message),
-                        self._names.constant(plan.message),
-                    )
-                    return [f"const {kind}_t defaults = {defaults}_INIT;", "*message = defaults;"]
+                    kind = self._names.function(plan.message)
+                    return [f"const {kind}_t defaults = {kind.upper()}_INIT;", "*message = defaults;"]
                 case BytesStep() | ItemsStep():
                     lines.append(f"message->{each.name}_{each.quantity} = 0U;")
                 case _:
