@@ -295,6 +295,177 @@ static inline int mc1231a_nearest_uint16_(double steps, uint16_t least, uint16_t
 }
 #endif
 
+/* Type destination: in counts */
+typedef int32_t mc1231a_destination_t;
+
+/* Type velocity: velocity = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
+typedef uint32_t mc1231a_velocity_t;
+#define MC1231A_VELOCITY_FACTOR 1
+#define MC1231A_VELOCITY_BIAS 0
+#define MC1231A_VELOCITY_DIVISOR 65536L
+#if MC1231A_ENABLE_FLOAT
+static inline double mc1231a_velocity_physical(mc1231a_velocity_t raw)
+{
+    const double scaled = ((double)raw * (double)MC1231A_VELOCITY_FACTOR) + (double)MC1231A_VELOCITY_BIAS;
+    return scaled / (double)MC1231A_VELOCITY_DIVISOR;
+}
+
+static inline int mc1231a_velocity_raw(double physical, mc1231a_velocity_t *raw)
+{
+    const double scaled = (physical * (double)MC1231A_VELOCITY_DIVISOR) - (double)MC1231A_VELOCITY_BIAS;
+    const double steps = scaled / (double)MC1231A_VELOCITY_FACTOR;
+    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
+}
+#endif
+
+/* Type acceleration_limit: acceleration_limit = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
+typedef int32_t mc1231a_acceleration_limit_t;
+#define MC1231A_ACCELERATION_LIMIT_FACTOR 1
+#define MC1231A_ACCELERATION_LIMIT_BIAS 0
+#define MC1231A_ACCELERATION_LIMIT_DIVISOR 65536L
+#if MC1231A_ENABLE_FLOAT
+static inline double mc1231a_acceleration_limit_physical(mc1231a_acceleration_limit_t raw)
+{
+    const double scaled = ((double)raw * (double)MC1231A_ACCELERATION_LIMIT_FACTOR) +
+        (double)MC1231A_ACCELERATION_LIMIT_BIAS;
+    return scaled / (double)MC1231A_ACCELERATION_LIMIT_DIVISOR;
+}
+
+static inline int mc1231a_acceleration_limit_raw(double physical, mc1231a_acceleration_limit_t *raw)
+{
+    const double scaled = (physical * (double)MC1231A_ACCELERATION_LIMIT_DIVISOR) -
+        (double)MC1231A_ACCELERATION_LIMIT_BIAS;
+    const double steps = scaled / (double)MC1231A_ACCELERATION_LIMIT_FACTOR;
+    return mc1231a_nearest_int32_(steps, -1073741824L, 1073741823L, raw);
+}
+#endif
+
+/* Type peak_acceleration: peak_acceleration = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
+typedef uint16_t mc1231a_peak_acceleration_t;
+#define MC1231A_PEAK_ACCELERATION_FACTOR 1
+#define MC1231A_PEAK_ACCELERATION_BIAS 0
+#define MC1231A_PEAK_ACCELERATION_DIVISOR 65536L
+#if MC1231A_ENABLE_FLOAT
+static inline double mc1231a_peak_acceleration_physical(mc1231a_peak_acceleration_t raw)
+{
+    const double scaled = ((double)raw * (double)MC1231A_PEAK_ACCELERATION_FACTOR) +
+        (double)MC1231A_PEAK_ACCELERATION_BIAS;
+    return scaled / (double)MC1231A_PEAK_ACCELERATION_DIVISOR;
+}
+
+static inline int mc1231a_peak_acceleration_raw(double physical, mc1231a_peak_acceleration_t *raw)
+{
+    const double scaled = (physical * (double)MC1231A_PEAK_ACCELERATION_DIVISOR) -
+        (double)MC1231A_PEAK_ACCELERATION_BIAS;
+    const double steps = scaled / (double)MC1231A_PEAK_ACCELERATION_FACTOR;
+    return mc1231a_nearest_uint16_(steps, 0U, 65535U, raw);
+}
+#endif
+
+/* Type jerk: jerk = (raw * FACTOR + BIAS) / DIVISOR counts/sample^3 */
+typedef uint32_t mc1231a_jerk_t;
+#define MC1231A_JERK_FACTOR 1
+#define MC1231A_JERK_BIAS 0
+#define MC1231A_JERK_DIVISOR 4294967296LL
+#if MC1231A_ENABLE_FLOAT
+static inline double mc1231a_jerk_physical(mc1231a_jerk_t raw)
+{
+    const double scaled = ((double)raw * (double)MC1231A_JERK_FACTOR) + (double)MC1231A_JERK_BIAS;
+    return scaled / (double)MC1231A_JERK_DIVISOR;
+}
+
+static inline int mc1231a_jerk_raw(double physical, mc1231a_jerk_t *raw)
+{
+    const double scaled = (physical * (double)MC1231A_JERK_DIVISOR) - (double)MC1231A_JERK_BIAS;
+    const double steps = scaled / (double)MC1231A_JERK_FACTOR;
+    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
+}
+#endif
+
+/* Type gear_ratio: gear_ratio = (raw * FACTOR + BIAS) / DIVISOR */
+typedef int32_t mc1231a_gear_ratio_t;
+#define MC1231A_GEAR_RATIO_FACTOR 1
+#define MC1231A_GEAR_RATIO_BIAS 0
+#define MC1231A_GEAR_RATIO_DIVISOR 65536L
+#if MC1231A_ENABLE_FLOAT
+static inline double mc1231a_gear_ratio_physical(mc1231a_gear_ratio_t raw)
+{
+    const double scaled = ((double)raw * (double)MC1231A_GEAR_RATIO_FACTOR) + (double)MC1231A_GEAR_RATIO_BIAS;
+    return scaled / (double)MC1231A_GEAR_RATIO_DIVISOR;
+}
+
+static inline int mc1231a_gear_ratio_raw(double physical, mc1231a_gear_ratio_t *raw)
+{
+    const double scaled = (physical * (double)MC1231A_GEAR_RATIO_DIVISOR) - (double)MC1231A_GEAR_RATIO_BIAS;
+    const double steps = scaled / (double)MC1231A_GEAR_RATIO_FACTOR;
+    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
+}
+#endif
+
+/* Type position: in counts */
+typedef int32_t mc1231a_position_t;
+
+/* Type acceleration: acceleration = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
+typedef int32_t mc1231a_acceleration_t;
+#define MC1231A_ACCELERATION_FACTOR 1
+#define MC1231A_ACCELERATION_BIAS 0
+#define MC1231A_ACCELERATION_DIVISOR 65536L
+#if MC1231A_ENABLE_FLOAT
+static inline double mc1231a_acceleration_physical(mc1231a_acceleration_t raw)
+{
+    const double scaled = ((double)raw * (double)MC1231A_ACCELERATION_FACTOR) + (double)MC1231A_ACCELERATION_BIAS;
+    return scaled / (double)MC1231A_ACCELERATION_DIVISOR;
+}
+
+static inline int mc1231a_acceleration_raw(double physical, mc1231a_acceleration_t *raw)
+{
+    const double scaled = (physical * (double)MC1231A_ACCELERATION_DIVISOR) - (double)MC1231A_ACCELERATION_BIAS;
+    const double steps = scaled / (double)MC1231A_ACCELERATION_FACTOR;
+    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
+}
+#endif
+
+/* Type signed_velocity: signed_velocity = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
+typedef int32_t mc1231a_signed_velocity_t;
+#define MC1231A_SIGNED_VELOCITY_FACTOR 1
+#define MC1231A_SIGNED_VELOCITY_BIAS 0
+#define MC1231A_SIGNED_VELOCITY_DIVISOR 65536L
+#if MC1231A_ENABLE_FLOAT
+static inline double mc1231a_signed_velocity_physical(mc1231a_signed_velocity_t raw)
+{
+    const double scaled = ((double)raw * (double)MC1231A_SIGNED_VELOCITY_FACTOR) + (double)MC1231A_SIGNED_VELOCITY_BIAS;
+    return scaled / (double)MC1231A_SIGNED_VELOCITY_DIVISOR;
+}
+
+static inline int mc1231a_signed_velocity_raw(double physical, mc1231a_signed_velocity_t *raw)
+{
+    const double scaled = (physical * (double)MC1231A_SIGNED_VELOCITY_DIVISOR) - (double)MC1231A_SIGNED_VELOCITY_BIAS;
+    const double steps = scaled / (double)MC1231A_SIGNED_VELOCITY_FACTOR;
+    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
+}
+#endif
+
+/* Type gain */
+typedef uint16_t mc1231a_gain_t;
+
+/* Type motor_command */
+typedef int16_t mc1231a_motor_command_t;
+
+/* Type position_error: in counts */
+typedef int16_t mc1231a_position_error_t;
+
+/* Type cycles: in cycles */
+typedef uint32_t mc1231a_cycles_t;
+
+/* Type phase_counts: in counts */
+typedef uint16_t mc1231a_phase_counts_t;
+
+/* Type phase_angle: in counts */
+typedef uint16_t mc1231a_phase_angle_t;
+
+/* Type sample_times: in samples */
+typedef uint16_t mc1231a_sample_times_t;
+
 /* ---- Frame ---- */
 
 /* A frame that was received. */
@@ -750,7 +921,7 @@ static inline int mc1231a_set_1_request_to_frame(uint8_t *wire, size_t capacity)
 #define MC1231A_SET_1_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_set_1_response {
-    uint16_t status; /* Status of the axis; flags axis_status */
+    mc1231a_axis_status_t status; /* Status of the axis; flags axis_status */
 } mc1231a_set_1_response_t;
 
 #define MC1231A_SET_1_RESPONSE_INIT { 0U }
@@ -815,29 +986,19 @@ static inline int mc1231a_set_2_request_to_frame(uint8_t *wire, size_t capacity)
 #define MC1231A_SET_2_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_SET_2_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_set_2_response {
-    uint16_t status; /* Status of the axis; flags axis_status */
-} mc1231a_set_2_response_t;
-
-#define MC1231A_SET_2_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_set_2_response_t;
+#define MC1231A_SET_2_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_set_2_response_encode(
     const mc1231a_set_2_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_SET_2_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_2_response_decode(mc1231a_set_2_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_2_response_to_frame(
@@ -884,29 +1045,19 @@ static inline int mc1231a_set_i_request_to_frame(uint8_t *wire, size_t capacity)
 #define MC1231A_SET_I_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_SET_I_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_set_i_response {
-    uint16_t status; /* Status of the axis; flags axis_status */
-} mc1231a_set_i_response_t;
-
-#define MC1231A_SET_I_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_set_i_response_t;
+#define MC1231A_SET_I_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_set_i_response_encode(
     const mc1231a_set_i_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_SET_I_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_i_response_decode(mc1231a_set_i_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_i_response_to_frame(
@@ -1078,7 +1229,7 @@ static inline int mc1231a_set_prfl_gear_response_from_frame(uint16_t request_sum
 #define MC1231A_SET_POS_REQUEST_MAX_WIRE_SIZE 5U
 
 typedef struct mc1231a_set_pos_request {
-    int32_t value; /* Destination position; in counts; -1073741824..1073741823; not confirmed */
+    mc1231a_destination_t value; /* Destination position; in counts; -1073741824..1073741823; not confirmed */
 } mc1231a_set_pos_request_t;
 
 #define MC1231A_SET_POS_REQUEST_INIT { 0L }
@@ -1150,13 +1301,9 @@ static inline int mc1231a_set_pos_response_from_frame(uint16_t request_sum, cons
 #define MC1231A_SET_VEL_REQUEST_MAX_SIZE 4U
 #define MC1231A_SET_VEL_REQUEST_MAX_FRAME_SIZE 5U
 #define MC1231A_SET_VEL_REQUEST_MAX_WIRE_SIZE 5U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
-#define MC1231A_SET_VEL_REQUEST_VALUE_FACTOR 1
-#define MC1231A_SET_VEL_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_vel_request {
-    uint32_t value; /* Velocity limit of the move; in steps of 1/2^16 counts/sample */
+    mc1231a_velocity_t value; /* Velocity limit of the move; in steps of 1/2^16 counts/sample */
 } mc1231a_set_vel_request_t;
 
 #define MC1231A_SET_VEL_REQUEST_INIT { 0UL }
@@ -1194,23 +1341,6 @@ static inline int mc1231a_set_vel_request_to_frame(
     return (size < 0) ? size : (size + 1);
 }
 
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_set_vel_request_value_physical(uint32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_SET_VEL_REQUEST_VALUE_FACTOR) +
-        (double)MC1231A_SET_VEL_REQUEST_VALUE_BIAS;
-    return scaled / (double)MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_set_vel_request_value_raw(double physical, uint32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_SET_VEL_REQUEST_VALUE_DIVISOR) -
-        (double)MC1231A_SET_VEL_REQUEST_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_SET_VEL_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
-}
-#endif
-
 /* ---- set_vel.response, id 0x11 (section Host commands): Load velocity limit for the move. */
 #define MC1231A_SET_VEL_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_VEL_RESPONSE_MAX_SIZE 0U
@@ -1240,15 +1370,11 @@ static inline int mc1231a_set_vel_response_from_frame(uint16_t request_sum, cons
 #define MC1231A_SET_ACC_REQUEST_MAX_SIZE 4U
 #define MC1231A_SET_ACC_REQUEST_MAX_FRAME_SIZE 5U
 #define MC1231A_SET_ACC_REQUEST_MAX_WIRE_SIZE 5U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
-#define MC1231A_SET_ACC_REQUEST_VALUE_FACTOR 1
-#define MC1231A_SET_ACC_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_acc_request {
     /* Acceleration; unsigned in trapezoidal mode, signed in velocity mode; in steps of 1/2^16 counts/sample^2;
      * -1073741824..1073741823 */
-    int32_t value;
+    mc1231a_acceleration_limit_t value;
 } mc1231a_set_acc_request_t;
 
 #define MC1231A_SET_ACC_REQUEST_INIT { 0L }
@@ -1292,23 +1418,6 @@ static inline int mc1231a_set_acc_request_to_frame(
     return (size < 0) ? size : (size + 1);
 }
 
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_set_acc_request_value_physical(int32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_SET_ACC_REQUEST_VALUE_FACTOR) +
-        (double)MC1231A_SET_ACC_REQUEST_VALUE_BIAS;
-    return scaled / (double)MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_set_acc_request_value_raw(double physical, int32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_SET_ACC_REQUEST_VALUE_DIVISOR) -
-        (double)MC1231A_SET_ACC_REQUEST_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_SET_ACC_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, -1073741824L, 1073741823L, raw);
-}
-#endif
-
 /* ---- set_acc.response, id 0x12 (section Host commands): Load acceleration (trapezoidal and velocity
  * modes).
  */
@@ -1339,13 +1448,9 @@ static inline int mc1231a_set_acc_response_from_frame(uint16_t request_sum, cons
 #define MC1231A_SET_MAX_ACC_REQUEST_MAX_SIZE 2U
 #define MC1231A_SET_MAX_ACC_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_MAX_ACC_REQUEST_MAX_WIRE_SIZE 3U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
-#define MC1231A_SET_MAX_ACC_REQUEST_VALUE_FACTOR 1
-#define MC1231A_SET_MAX_ACC_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_max_acc_request {
-    uint16_t value; /* Peak acceleration (S-curve mode); in steps of 1/2^16 counts/sample^2 */
+    mc1231a_peak_acceleration_t value; /* Peak acceleration (S-curve mode); in steps of 1/2^16 counts/sample^2 */
 } mc1231a_set_max_acc_request_t;
 
 #define MC1231A_SET_MAX_ACC_REQUEST_INIT { 0U }
@@ -1383,23 +1488,6 @@ static inline int mc1231a_set_max_acc_request_to_frame(
     return (size < 0) ? size : (size + 1);
 }
 
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_set_max_acc_request_value_physical(uint16_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_FACTOR) +
-        (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_BIAS;
-    return scaled / (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_set_max_acc_request_value_raw(double physical, uint16_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_DIVISOR) -
-        (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_SET_MAX_ACC_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_uint16_(steps, 0U, 65535U, raw);
-}
-#endif
-
 /* ---- set_max_acc.response, id 0x15 (section Host commands): Load peak acceleration (S-curve mode). */
 #define MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_MAX_ACC_RESPONSE_MAX_SIZE 0U
@@ -1428,13 +1516,9 @@ static inline int mc1231a_set_max_acc_response_from_frame(uint16_t request_sum, 
 #define MC1231A_SET_JERK_REQUEST_MAX_SIZE 4U
 #define MC1231A_SET_JERK_REQUEST_MAX_FRAME_SIZE 5U
 #define MC1231A_SET_JERK_REQUEST_MAX_WIRE_SIZE 5U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^3 */
-#define MC1231A_SET_JERK_REQUEST_VALUE_FACTOR 1
-#define MC1231A_SET_JERK_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR 4294967296LL
 
 typedef struct mc1231a_set_jerk_request {
-    uint32_t value; /* Jerk (S-curve mode); in steps of 1/2^32 counts/sample^3 */
+    mc1231a_jerk_t value; /* Jerk (S-curve mode); in steps of 1/2^32 counts/sample^3 */
 } mc1231a_set_jerk_request_t;
 
 #define MC1231A_SET_JERK_REQUEST_INIT { 0UL }
@@ -1472,23 +1556,6 @@ static inline int mc1231a_set_jerk_request_to_frame(
     return (size < 0) ? size : (size + 1);
 }
 
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_set_jerk_request_value_physical(uint32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_SET_JERK_REQUEST_VALUE_FACTOR) +
-        (double)MC1231A_SET_JERK_REQUEST_VALUE_BIAS;
-    return scaled / (double)MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_set_jerk_request_value_raw(double physical, uint32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_SET_JERK_REQUEST_VALUE_DIVISOR) -
-        (double)MC1231A_SET_JERK_REQUEST_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_SET_JERK_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
-}
-#endif
-
 /* ---- set_jerk.response, id 0x13 (section Host commands): Load jerk (S-curve mode). */
 #define MC1231A_SET_JERK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_JERK_RESPONSE_MAX_SIZE 0U
@@ -1518,13 +1585,9 @@ static inline int mc1231a_set_jerk_response_from_frame(uint16_t request_sum, con
 #define MC1231A_SET_RATIO_REQUEST_MAX_SIZE 4U
 #define MC1231A_SET_RATIO_REQUEST_MAX_FRAME_SIZE 5U
 #define MC1231A_SET_RATIO_REQUEST_MAX_WIRE_SIZE 5U
-/* value = (raw * FACTOR + BIAS) / DIVISOR */
-#define MC1231A_SET_RATIO_REQUEST_VALUE_FACTOR 1
-#define MC1231A_SET_RATIO_REQUEST_VALUE_BIAS 0
-#define MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_set_ratio_request {
-    int32_t value; /* Electronic gear ratio; in steps of 1/2^16 */
+    mc1231a_gear_ratio_t value; /* Electronic gear ratio; in steps of 1/2^16 */
 } mc1231a_set_ratio_request_t;
 
 #define MC1231A_SET_RATIO_REQUEST_INIT { 0L }
@@ -1561,23 +1624,6 @@ static inline int mc1231a_set_ratio_request_to_frame(
     size = mc1231a_set_ratio_request_encode(message, &wire[1], capacity - 1U);
     return (size < 0) ? size : (size + 1);
 }
-
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_set_ratio_request_value_physical(int32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_SET_RATIO_REQUEST_VALUE_FACTOR) +
-        (double)MC1231A_SET_RATIO_REQUEST_VALUE_BIAS;
-    return scaled / (double)MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_set_ratio_request_value_raw(double physical, int32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_SET_RATIO_REQUEST_VALUE_DIVISOR) -
-        (double)MC1231A_SET_RATIO_REQUEST_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_SET_RATIO_REQUEST_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
-}
-#endif
 
 /* ---- set_ratio.response, id 0x14 (section Host commands): Load electronic gear ratio.
  * NOT CONFIRMED: its source is weak; check it at the device.
@@ -1746,7 +1792,7 @@ static inline int mc1231a_get_pos_request_to_frame(uint8_t *wire, size_t capacit
 #define MC1231A_GET_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_pos_response {
-    int32_t value; /* Buffered destination position; in counts */
+    mc1231a_position_t value; /* Buffered destination position; in counts */
 } mc1231a_get_pos_response_t;
 
 #define MC1231A_GET_POS_RESPONSE_INIT { 0L }
@@ -1814,35 +1860,21 @@ static inline int mc1231a_get_vel_request_to_frame(uint8_t *wire, size_t capacit
 #define MC1231A_GET_VEL_RESPONSE_MAX_SIZE 4U
 #define MC1231A_GET_VEL_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_VEL_RESPONSE_MAX_WIRE_SIZE 6U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
-#define MC1231A_GET_VEL_RESPONSE_VALUE_FACTOR 1
-#define MC1231A_GET_VEL_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR 65536L
 
-typedef struct mc1231a_get_vel_response {
-    uint32_t value; /* Buffered velocity; in steps of 1/2^16 counts/sample */
-} mc1231a_get_vel_response_t;
-
-#define MC1231A_GET_VEL_RESPONSE_INIT { 0UL }
+/* value: Buffered velocity; in steps of 1/2^16 counts/sample */
+typedef mc1231a_set_vel_request_t mc1231a_get_vel_response_t;
+#define MC1231A_GET_VEL_RESPONSE_INIT MC1231A_SET_VEL_REQUEST_INIT
 
 static inline int mc1231a_get_vel_response_encode(
     const mc1231a_get_vel_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, message->value);
-    return (int)MC1231A_GET_VEL_RESPONSE_MAX_SIZE;
+    return mc1231a_set_vel_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_vel_response_decode(
     mc1231a_get_vel_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_vel_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_vel_response_to_frame(
@@ -1861,23 +1893,6 @@ static inline int mc1231a_get_vel_response_from_frame(
     }
     return mc1231a_get_vel_response_decode(message, wire, size - 2U);
 }
-
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_get_vel_response_value_physical(uint32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_GET_VEL_RESPONSE_VALUE_FACTOR) +
-        (double)MC1231A_GET_VEL_RESPONSE_VALUE_BIAS;
-    return scaled / (double)MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_get_vel_response_value_raw(double physical, uint32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_GET_VEL_RESPONSE_VALUE_DIVISOR) -
-        (double)MC1231A_GET_VEL_RESPONSE_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_GET_VEL_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
-}
-#endif
 
 /* ---- get_acc.request, id 0x4C (section Host commands): Read back buffered acceleration.
  * NOT CONFIRMED: its source is weak; check it at the device.
@@ -1905,14 +1920,10 @@ static inline int mc1231a_get_acc_request_to_frame(uint8_t *wire, size_t capacit
 #define MC1231A_GET_ACC_RESPONSE_MAX_SIZE 4U
 #define MC1231A_GET_ACC_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_ACC_RESPONSE_MAX_WIRE_SIZE 6U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
-#define MC1231A_GET_ACC_RESPONSE_VALUE_FACTOR 1
-#define MC1231A_GET_ACC_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_get_acc_response {
     /* Acceleration; unsigned in trapezoidal mode, signed in velocity mode; in steps of 1/2^16 counts/sample^2 */
-    int32_t value;
+    mc1231a_acceleration_t value;
 } mc1231a_get_acc_response_t;
 
 #define MC1231A_GET_ACC_RESPONSE_INIT { 0L }
@@ -1954,23 +1965,6 @@ static inline int mc1231a_get_acc_response_from_frame(
     return mc1231a_get_acc_response_decode(message, wire, size - 2U);
 }
 
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_get_acc_response_value_physical(int32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_GET_ACC_RESPONSE_VALUE_FACTOR) +
-        (double)MC1231A_GET_ACC_RESPONSE_VALUE_BIAS;
-    return scaled / (double)MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_get_acc_response_value_raw(double physical, int32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_GET_ACC_RESPONSE_VALUE_DIVISOR) -
-        (double)MC1231A_GET_ACC_RESPONSE_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_GET_ACC_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
-}
-#endif
-
 /* ---- get_max_acc.request, id 0x4F (section Host commands): Read back buffered S-curve acceleration. */
 #define MC1231A_GET_MAX_ACC_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_MAX_ACC_REQUEST_MAX_SIZE 0U
@@ -1994,35 +1988,21 @@ static inline int mc1231a_get_max_acc_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_MAX_ACC_RESPONSE_MAX_SIZE 2U
 #define MC1231A_GET_MAX_ACC_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MAX_ACC_RESPONSE_MAX_WIRE_SIZE 4U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^2 */
-#define MC1231A_GET_MAX_ACC_RESPONSE_VALUE_FACTOR 1
-#define MC1231A_GET_MAX_ACC_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR 65536L
 
-typedef struct mc1231a_get_max_acc_response {
-    uint16_t value; /* Buffered S-curve acceleration; in steps of 1/2^16 counts/sample^2 */
-} mc1231a_get_max_acc_response_t;
-
-#define MC1231A_GET_MAX_ACC_RESPONSE_INIT { 0U }
+/* value: Buffered S-curve acceleration; in steps of 1/2^16 counts/sample^2 */
+typedef mc1231a_set_max_acc_request_t mc1231a_get_max_acc_response_t;
+#define MC1231A_GET_MAX_ACC_RESPONSE_INIT MC1231A_SET_MAX_ACC_REQUEST_INIT
 
 static inline int mc1231a_get_max_acc_response_encode(
     const mc1231a_get_max_acc_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_MAX_ACC_RESPONSE_MAX_SIZE;
+    return mc1231a_set_max_acc_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_max_acc_response_decode(
     mc1231a_get_max_acc_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_max_acc_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_max_acc_response_to_frame(
@@ -2041,23 +2021,6 @@ static inline int mc1231a_get_max_acc_response_from_frame(
     }
     return mc1231a_get_max_acc_response_decode(message, wire, size - 2U);
 }
-
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_get_max_acc_response_value_physical(uint16_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_FACTOR) +
-        (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_BIAS;
-    return scaled / (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_get_max_acc_response_value_raw(double physical, uint16_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_DIVISOR) -
-        (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_GET_MAX_ACC_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_uint16_(steps, 0U, 65535U, raw);
-}
-#endif
 
 /* ---- get_jerk.request, id 0x58 (section Host commands): Read back buffered jerk. */
 #define MC1231A_GET_JERK_REQUEST_MIN_SIZE 0U
@@ -2082,35 +2045,21 @@ static inline int mc1231a_get_jerk_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_JERK_RESPONSE_MAX_SIZE 4U
 #define MC1231A_GET_JERK_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_JERK_RESPONSE_MAX_WIRE_SIZE 6U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample^3 */
-#define MC1231A_GET_JERK_RESPONSE_VALUE_FACTOR 1
-#define MC1231A_GET_JERK_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR 4294967296LL
 
-typedef struct mc1231a_get_jerk_response {
-    uint32_t value; /* Buffered jerk; in steps of 1/2^32 counts/sample^3 */
-} mc1231a_get_jerk_response_t;
-
-#define MC1231A_GET_JERK_RESPONSE_INIT { 0UL }
+/* value: Buffered jerk; in steps of 1/2^32 counts/sample^3 */
+typedef mc1231a_set_jerk_request_t mc1231a_get_jerk_response_t;
+#define MC1231A_GET_JERK_RESPONSE_INIT MC1231A_SET_JERK_REQUEST_INIT
 
 static inline int mc1231a_get_jerk_response_encode(
     const mc1231a_get_jerk_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, message->value);
-    return (int)MC1231A_GET_JERK_RESPONSE_MAX_SIZE;
+    return mc1231a_set_jerk_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_jerk_response_decode(
     mc1231a_get_jerk_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_jerk_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_jerk_response_to_frame(
@@ -2129,23 +2078,6 @@ static inline int mc1231a_get_jerk_response_from_frame(
     }
     return mc1231a_get_jerk_response_decode(message, wire, size - 2U);
 }
-
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_get_jerk_response_value_physical(uint32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_GET_JERK_RESPONSE_VALUE_FACTOR) +
-        (double)MC1231A_GET_JERK_RESPONSE_VALUE_BIAS;
-    return scaled / (double)MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_get_jerk_response_value_raw(double physical, uint32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_GET_JERK_RESPONSE_VALUE_DIVISOR) -
-        (double)MC1231A_GET_JERK_RESPONSE_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_GET_JERK_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_uint32_(steps, 0UL, 4294967295UL, raw);
-}
-#endif
 
 /* ---- get_ratio.request, id 0x59 (section Host commands): Read back buffered gear ratio. */
 #define MC1231A_GET_RATIO_REQUEST_MIN_SIZE 0U
@@ -2170,35 +2102,21 @@ static inline int mc1231a_get_ratio_request_to_frame(uint8_t *wire, size_t capac
 #define MC1231A_GET_RATIO_RESPONSE_MAX_SIZE 4U
 #define MC1231A_GET_RATIO_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_RATIO_RESPONSE_MAX_WIRE_SIZE 6U
-/* value = (raw * FACTOR + BIAS) / DIVISOR */
-#define MC1231A_GET_RATIO_RESPONSE_VALUE_FACTOR 1
-#define MC1231A_GET_RATIO_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR 65536L
 
-typedef struct mc1231a_get_ratio_response {
-    int32_t value; /* Buffered gear ratio; in steps of 1/2^16 */
-} mc1231a_get_ratio_response_t;
-
-#define MC1231A_GET_RATIO_RESPONSE_INIT { 0L }
+/* value: Buffered gear ratio; in steps of 1/2^16 */
+typedef mc1231a_set_ratio_request_t mc1231a_get_ratio_response_t;
+#define MC1231A_GET_RATIO_RESPONSE_INIT MC1231A_SET_RATIO_REQUEST_INIT
 
 static inline int mc1231a_get_ratio_response_encode(
     const mc1231a_get_ratio_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_RATIO_RESPONSE_MAX_SIZE;
+    return mc1231a_set_ratio_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_ratio_response_decode(
     mc1231a_get_ratio_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_ratio_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_ratio_response_to_frame(
@@ -2217,23 +2135,6 @@ static inline int mc1231a_get_ratio_response_from_frame(
     }
     return mc1231a_get_ratio_response_decode(message, wire, size - 2U);
 }
-
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_get_ratio_response_value_physical(int32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_GET_RATIO_RESPONSE_VALUE_FACTOR) +
-        (double)MC1231A_GET_RATIO_RESPONSE_VALUE_BIAS;
-    return scaled / (double)MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_get_ratio_response_value_raw(double physical, int32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_GET_RATIO_RESPONSE_VALUE_DIVISOR) -
-        (double)MC1231A_GET_RATIO_RESPONSE_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_GET_RATIO_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
-}
-#endif
 
 /* ---- get_trgt_pos.request, id 0x1D (section Host commands): Read instantaneous profile target position. */
 #define MC1231A_GET_TRGT_POS_REQUEST_MIN_SIZE 0U
@@ -2259,30 +2160,20 @@ static inline int mc1231a_get_trgt_pos_request_to_frame(uint8_t *wire, size_t ca
 #define MC1231A_GET_TRGT_POS_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_TRGT_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_trgt_pos_response {
-    int32_t value; /* Profile target position; in counts */
-} mc1231a_get_trgt_pos_response_t;
-
-#define MC1231A_GET_TRGT_POS_RESPONSE_INIT { 0L }
+/* value: Profile target position; in counts */
+typedef mc1231a_get_pos_response_t mc1231a_get_trgt_pos_response_t;
+#define MC1231A_GET_TRGT_POS_RESPONSE_INIT MC1231A_GET_POS_RESPONSE_INIT
 
 static inline int mc1231a_get_trgt_pos_response_encode(
     const mc1231a_get_trgt_pos_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_TRGT_POS_RESPONSE_MAX_SIZE;
+    return mc1231a_get_pos_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_trgt_pos_response_decode(
     mc1231a_get_trgt_pos_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_pos_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_trgt_pos_response_to_frame(
@@ -2328,13 +2219,9 @@ static inline int mc1231a_get_trgt_vel_request_to_frame(uint8_t *wire, size_t ca
 #define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_SIZE 4U
 #define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_TRGT_VEL_RESPONSE_MAX_WIRE_SIZE 6U
-/* value = (raw * FACTOR + BIAS) / DIVISOR counts/sample */
-#define MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_FACTOR 1
-#define MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_BIAS 0
-#define MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR 65536L
 
 typedef struct mc1231a_get_trgt_vel_response {
-    int32_t value; /* Profile target velocity; in steps of 1/2^16 counts/sample */
+    mc1231a_signed_velocity_t value; /* Profile target velocity; in steps of 1/2^16 counts/sample */
 } mc1231a_get_trgt_vel_response_t;
 
 #define MC1231A_GET_TRGT_VEL_RESPONSE_INIT { 0L }
@@ -2376,23 +2263,6 @@ static inline int mc1231a_get_trgt_vel_response_from_frame(
     return mc1231a_get_trgt_vel_response_decode(message, wire, size - 2U);
 }
 
-#if MC1231A_ENABLE_FLOAT
-static inline double mc1231a_get_trgt_vel_response_value_physical(int32_t raw)
-{
-    const double scaled = ((double)raw * (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_FACTOR) +
-        (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_BIAS;
-    return scaled / (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR;
-}
-
-static inline int mc1231a_get_trgt_vel_response_value_raw(double physical, int32_t *raw)
-{
-    const double scaled = (physical * (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_DIVISOR) -
-        (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_BIAS;
-    const double steps = scaled / (double)MC1231A_GET_TRGT_VEL_RESPONSE_VALUE_FACTOR;
-    return mc1231a_nearest_int32_(steps, INT32_MIN, 2147483647L, raw);
-}
-#endif
-
 /* ---- set_kp.request, id 0x25 (section Host commands): Load proportional gain.
  * Payload, 2 bytes:
  *      0  u16 be  value
@@ -2403,7 +2273,7 @@ static inline int mc1231a_get_trgt_vel_response_value_raw(double physical, int32
 #define MC1231A_SET_KP_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_kp_request {
-    uint16_t value; /* Proportional gain; 0..32767 */
+    mc1231a_gain_t value; /* Proportional gain; 0..32767 */
 } mc1231a_set_kp_request_t;
 
 #define MC1231A_SET_KP_REQUEST_INIT { 0U }
@@ -2475,35 +2345,19 @@ static inline int mc1231a_set_kp_response_from_frame(uint16_t request_sum, const
 #define MC1231A_SET_KD_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_KD_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_kd_request {
-    uint16_t value; /* Derivative gain; 0..32767 */
-} mc1231a_set_kd_request_t;
-
-#define MC1231A_SET_KD_REQUEST_INIT { 0U }
+/* value: Derivative gain; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_kd_request_t;
+#define MC1231A_SET_KD_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_kd_request_encode(
     const mc1231a_set_kd_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_KD_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_kd_request_decode(mc1231a_set_kd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_kd_request_to_frame(
@@ -2548,35 +2402,19 @@ static inline int mc1231a_set_kd_response_from_frame(uint16_t request_sum, const
 #define MC1231A_SET_KI_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_KI_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_ki_request {
-    uint16_t value; /* Integral gain; 0..32767 */
-} mc1231a_set_ki_request_t;
-
-#define MC1231A_SET_KI_REQUEST_INIT { 0U }
+/* value: Integral gain; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_ki_request_t;
+#define MC1231A_SET_KI_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_ki_request_encode(
     const mc1231a_set_ki_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_KI_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_ki_request_decode(mc1231a_set_ki_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_ki_request_to_frame(
@@ -2622,36 +2460,20 @@ static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const
 #define MC1231A_SET_KVFF_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_KVFF_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_kvff_request {
-    uint16_t value; /* Velocity feed-forward gain; 0..32767 */
-} mc1231a_set_kvff_request_t;
-
-#define MC1231A_SET_KVFF_REQUEST_INIT { 0U }
+/* value: Velocity feed-forward gain; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_kvff_request_t;
+#define MC1231A_SET_KVFF_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_kvff_request_encode(
     const mc1231a_set_kvff_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_KVFF_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_kvff_request_decode(
     mc1231a_set_kvff_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_kvff_request_to_frame(
@@ -2698,36 +2520,20 @@ static inline int mc1231a_set_kvff_response_from_frame(uint16_t request_sum, con
 #define MC1231A_SET_I_LM_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_I_LM_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_i_lm_request {
-    uint16_t value; /* Integration limit; 0..32767 */
-} mc1231a_set_i_lm_request_t;
-
-#define MC1231A_SET_I_LM_REQUEST_INIT { 0U }
+/* value: Integration limit; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_i_lm_request_t;
+#define MC1231A_SET_I_LM_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_i_lm_request_encode(
     const mc1231a_set_i_lm_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_I_LM_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_i_lm_request_decode(
     mc1231a_set_i_lm_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_i_lm_request_to_frame(
@@ -2773,36 +2579,20 @@ static inline int mc1231a_set_i_lm_response_from_frame(uint16_t request_sum, con
 #define MC1231A_SET_MTR_LMT_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_MTR_LMT_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_mtr_lmt_request {
-    uint16_t value; /* Ceiling of the filter output; 0..32767 */
-} mc1231a_set_mtr_lmt_request_t;
-
-#define MC1231A_SET_MTR_LMT_REQUEST_INIT { 0U }
+/* value: Ceiling of the filter output; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_mtr_lmt_request_t;
+#define MC1231A_SET_MTR_LMT_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_mtr_lmt_request_encode(
     const mc1231a_set_mtr_lmt_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_MTR_LMT_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_mtr_lmt_request_decode(
     mc1231a_set_mtr_lmt_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_mtr_lmt_request_to_frame(
@@ -2851,7 +2641,7 @@ static inline int mc1231a_set_mtr_lmt_response_from_frame(uint16_t request_sum, 
 #define MC1231A_SET_MTR_BIAS_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_mtr_bias_request {
-    int16_t value; /* DC offset added to the filter output; -32767..32767 */
+    mc1231a_motor_command_t value; /* DC offset added to the filter output; -32767..32767 */
 } mc1231a_set_mtr_bias_request_t;
 
 #define MC1231A_SET_MTR_BIAS_REQUEST_INIT { 0 }
@@ -2928,36 +2718,20 @@ static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum,
 #define MC1231A_SET_POS_ERR_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_POS_ERR_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_pos_err_request {
-    uint16_t value; /* Position-error limit that raises motion error; 0..32767 */
-} mc1231a_set_pos_err_request_t;
-
-#define MC1231A_SET_POS_ERR_REQUEST_INIT { 0U }
+/* value: Position-error limit that raises motion error; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_set_pos_err_request_t;
+#define MC1231A_SET_POS_ERR_REQUEST_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_set_pos_err_request_encode(
     const mc1231a_set_pos_err_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_POS_ERR_REQUEST_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_pos_err_request_decode(
     mc1231a_set_pos_err_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_pos_err_request_to_frame(
@@ -3093,30 +2867,20 @@ static inline int mc1231a_get_kd_request_to_frame(uint8_t *wire, size_t capacity
 #define MC1231A_GET_KD_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_KD_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_kd_response {
-    uint16_t value; /* Buffered derivative gain */
-} mc1231a_get_kd_response_t;
-
-#define MC1231A_GET_KD_RESPONSE_INIT { 0U }
+/* value: Buffered derivative gain */
+typedef mc1231a_get_kp_response_t mc1231a_get_kd_response_t;
+#define MC1231A_GET_KD_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_kd_response_encode(
     const mc1231a_get_kd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_KD_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_kd_response_decode(
     mc1231a_get_kd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_kd_response_to_frame(
@@ -3160,30 +2924,20 @@ static inline int mc1231a_get_ki_request_to_frame(uint8_t *wire, size_t capacity
 #define MC1231A_GET_KI_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_KI_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_ki_response {
-    uint16_t value; /* Buffered integral gain */
-} mc1231a_get_ki_response_t;
-
-#define MC1231A_GET_KI_RESPONSE_INIT { 0U }
+/* value: Buffered integral gain */
+typedef mc1231a_get_kp_response_t mc1231a_get_ki_response_t;
+#define MC1231A_GET_KI_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_ki_response_encode(
     const mc1231a_get_ki_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_KI_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_ki_response_decode(
     mc1231a_get_ki_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_ki_response_to_frame(
@@ -3227,30 +2981,20 @@ static inline int mc1231a_get_kvff_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_KVFF_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_KVFF_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_kvff_response {
-    uint16_t value; /* Buffered velocity feed-forward gain */
-} mc1231a_get_kvff_response_t;
-
-#define MC1231A_GET_KVFF_RESPONSE_INIT { 0U }
+/* value: Buffered velocity feed-forward gain */
+typedef mc1231a_get_kp_response_t mc1231a_get_kvff_response_t;
+#define MC1231A_GET_KVFF_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_kvff_response_encode(
     const mc1231a_get_kvff_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_KVFF_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_kvff_response_decode(
     mc1231a_get_kvff_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_kvff_response_to_frame(
@@ -3294,30 +3038,20 @@ static inline int mc1231a_get_i_lm_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_I_LM_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_I_LM_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_i_lm_response {
-    uint16_t value; /* Buffered integration limit */
-} mc1231a_get_i_lm_response_t;
-
-#define MC1231A_GET_I_LM_RESPONSE_INIT { 0U }
+/* value: Buffered integration limit */
+typedef mc1231a_get_kp_response_t mc1231a_get_i_lm_response_t;
+#define MC1231A_GET_I_LM_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_i_lm_response_encode(
     const mc1231a_get_i_lm_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_I_LM_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_i_lm_response_decode(
     mc1231a_get_i_lm_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_i_lm_response_to_frame(
@@ -3361,36 +3095,20 @@ static inline int mc1231a_get_mtr_lmt_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_MTR_LMT_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MTR_LMT_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mtr_lmt_response {
-    uint16_t value; /* Filter output ceiling; 0..32767 */
-} mc1231a_get_mtr_lmt_response_t;
-
-#define MC1231A_GET_MTR_LMT_RESPONSE_INIT { 0U }
+/* value: Filter output ceiling; 0..32767 */
+typedef mc1231a_set_kp_request_t mc1231a_get_mtr_lmt_response_t;
+#define MC1231A_GET_MTR_LMT_RESPONSE_INIT MC1231A_SET_KP_REQUEST_INIT
 
 static inline int mc1231a_get_mtr_lmt_response_encode(
     const mc1231a_get_mtr_lmt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_MTR_LMT_RESPONSE_MAX_SIZE;
+    return mc1231a_set_kp_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mtr_lmt_response_decode(
     mc1231a_get_mtr_lmt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    if (message->value > 32767U) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_kp_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mtr_lmt_response_to_frame(
@@ -3434,36 +3152,20 @@ static inline int mc1231a_get_mtr_bias_request_to_frame(uint8_t *wire, size_t ca
 #define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MTR_BIAS_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mtr_bias_response {
-    int16_t value; /* Filter DC offset; -32767..32767 */
-} mc1231a_get_mtr_bias_response_t;
-
-#define MC1231A_GET_MTR_BIAS_RESPONSE_INIT { 0 }
+/* value: Filter DC offset; -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_get_mtr_bias_response_t;
+#define MC1231A_GET_MTR_BIAS_RESPONSE_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_get_mtr_bias_response_encode(
     const mc1231a_get_mtr_bias_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_GET_MTR_BIAS_RESPONSE_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mtr_bias_response_decode(
     mc1231a_get_mtr_bias_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mtr_bias_response_to_frame(
@@ -3510,30 +3212,20 @@ static inline int mc1231a_get_pos_err_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_POS_ERR_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_POS_ERR_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_pos_err_response {
-    uint16_t value; /* Position-error limit */
-} mc1231a_get_pos_err_response_t;
-
-#define MC1231A_GET_POS_ERR_RESPONSE_INIT { 0U }
+/* value: Position-error limit */
+typedef mc1231a_get_kp_response_t mc1231a_get_pos_err_response_t;
+#define MC1231A_GET_POS_ERR_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_pos_err_response_encode(
     const mc1231a_get_pos_err_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_POS_ERR_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_pos_err_response_decode(
     mc1231a_get_pos_err_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_pos_err_response_to_frame(
@@ -3651,7 +3343,7 @@ static inline int mc1231a_get_actl_pos_err_request_to_frame(uint8_t *wire, size_
 #define MC1231A_GET_ACTL_POS_ERR_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_actl_pos_err_response {
-    int16_t value; /* Position error; in counts */
+    mc1231a_position_error_t value; /* Position error; in counts */
 } mc1231a_get_actl_pos_err_response_t;
 
 #define MC1231A_GET_ACTL_POS_ERR_RESPONSE_INIT { 0 }
@@ -4204,7 +3896,7 @@ static inline int mc1231a_update_response_from_frame(uint16_t request_sum, const
 #define MC1231A_MULTI_UPDATE_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_multi_update_request {
-    uint16_t axes; /* Axes to update; bit 0 is axis 1; flags axes; not confirmed */
+    mc1231a_axes_t axes; /* Axes to update; bit 0 is axis 1; flags axes; not confirmed */
 } mc1231a_multi_update_request_t;
 
 #define MC1231A_MULTI_UPDATE_REQUEST_INIT { 0U }
@@ -4363,30 +4055,20 @@ static inline int mc1231a_get_brk_pnt_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_BRK_PNT_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_BRK_PNT_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_brk_pnt_response {
-    int32_t value; /* Cycles for a time breakpoint, else counts */
-} mc1231a_get_brk_pnt_response_t;
-
-#define MC1231A_GET_BRK_PNT_RESPONSE_INIT { 0L }
+/* value: Cycles for a time breakpoint, else counts */
+typedef mc1231a_set_brk_pnt_request_t mc1231a_get_brk_pnt_response_t;
+#define MC1231A_GET_BRK_PNT_RESPONSE_INIT MC1231A_SET_BRK_PNT_REQUEST_INIT
 
 static inline int mc1231a_get_brk_pnt_response_encode(
     const mc1231a_get_brk_pnt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_BRK_PNT_RESPONSE_MAX_SIZE;
+    return mc1231a_set_brk_pnt_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_brk_pnt_response_decode(
     mc1231a_get_brk_pnt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_brk_pnt_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_brk_pnt_response_to_frame(
@@ -4417,7 +4099,7 @@ static inline int mc1231a_get_brk_pnt_response_from_frame(
 #define MC1231A_SET_INTRPT_MASK_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_intrpt_mask_request {
-    uint16_t mask; /* Events that may interrupt: 1 lets one through; flags event_mask; not confirmed */
+    mc1231a_event_mask_t mask; /* Events that may interrupt: 1 lets one through; flags event_mask; not confirmed */
 } mc1231a_set_intrpt_mask_request_t;
 
 #define MC1231A_SET_INTRPT_MASK_REQUEST_INIT { 0U }
@@ -4501,30 +4183,20 @@ static inline int mc1231a_get_intrpt_request_to_frame(uint8_t *wire, size_t capa
 #define MC1231A_GET_INTRPT_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_INTRPT_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_intrpt_response {
-    uint16_t status; /* Status of the axis; flags axis_status */
-} mc1231a_get_intrpt_response_t;
-
-#define MC1231A_GET_INTRPT_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_get_intrpt_response_t;
+#define MC1231A_GET_INTRPT_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_get_intrpt_response_encode(
     const mc1231a_get_intrpt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_GET_INTRPT_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_intrpt_response_decode(
     mc1231a_get_intrpt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_intrpt_response_to_frame(
@@ -4554,30 +4226,20 @@ static inline int mc1231a_get_intrpt_response_from_frame(
 #define MC1231A_RST_INTRPT_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_RST_INTRPT_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_rst_intrpt_request {
-    uint16_t mask; /* Events to keep: 0 clears one; flags event_mask */
-} mc1231a_rst_intrpt_request_t;
-
-#define MC1231A_RST_INTRPT_REQUEST_INIT { 0U }
+/* mask: Events to keep: 0 clears one; flags event_mask */
+typedef mc1231a_set_intrpt_mask_request_t mc1231a_rst_intrpt_request_t;
+#define MC1231A_RST_INTRPT_REQUEST_INIT MC1231A_SET_INTRPT_MASK_REQUEST_INIT
 
 static inline int mc1231a_rst_intrpt_request_encode(
     const mc1231a_rst_intrpt_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->mask);
-    return (int)MC1231A_RST_INTRPT_REQUEST_MAX_SIZE;
+    return mc1231a_set_intrpt_mask_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_rst_intrpt_request_decode(
     mc1231a_rst_intrpt_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->mask = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_intrpt_mask_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_rst_intrpt_request_to_frame(
@@ -4639,30 +4301,20 @@ static inline int mc1231a_get_intrpt_mask_request_to_frame(uint8_t *wire, size_t
 #define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_intrpt_mask_response {
-    uint16_t mask; /* Events that may interrupt: 1 lets one through; flags event_mask */
-} mc1231a_get_intrpt_mask_response_t;
-
-#define MC1231A_GET_INTRPT_MASK_RESPONSE_INIT { 0U }
+/* mask: Events that may interrupt: 1 lets one through; flags event_mask */
+typedef mc1231a_set_intrpt_mask_request_t mc1231a_get_intrpt_mask_response_t;
+#define MC1231A_GET_INTRPT_MASK_RESPONSE_INIT MC1231A_SET_INTRPT_MASK_REQUEST_INIT
 
 static inline int mc1231a_get_intrpt_mask_response_encode(
     const mc1231a_get_intrpt_mask_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->mask);
-    return (int)MC1231A_GET_INTRPT_MASK_RESPONSE_MAX_SIZE;
+    return mc1231a_set_intrpt_mask_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_intrpt_mask_response_decode(
     mc1231a_get_intrpt_mask_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->mask = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_intrpt_mask_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_intrpt_mask_response_to_frame(
@@ -4727,30 +4379,20 @@ static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, c
 #define MC1231A_RST_STATUS_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_RST_STATUS_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_rst_status_request {
-    uint16_t mask; /* Events to keep: 0 clears one; flags event_mask */
-} mc1231a_rst_status_request_t;
-
-#define MC1231A_RST_STATUS_REQUEST_INIT { 0U }
+/* mask: Events to keep: 0 clears one; flags event_mask */
+typedef mc1231a_set_intrpt_mask_request_t mc1231a_rst_status_request_t;
+#define MC1231A_RST_STATUS_REQUEST_INIT MC1231A_SET_INTRPT_MASK_REQUEST_INIT
 
 static inline int mc1231a_rst_status_request_encode(
     const mc1231a_rst_status_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->mask);
-    return (int)MC1231A_RST_STATUS_REQUEST_MAX_SIZE;
+    return mc1231a_set_intrpt_mask_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_rst_status_request_decode(
     mc1231a_rst_status_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->mask = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_intrpt_mask_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_rst_status_request_to_frame(
@@ -4812,30 +4454,20 @@ static inline int mc1231a_get_status_request_to_frame(uint8_t *wire, size_t capa
 #define MC1231A_GET_STATUS_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_STATUS_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_status_response {
-    uint16_t status; /* Status of the axis; flags axis_status */
-} mc1231a_get_status_response_t;
-
-#define MC1231A_GET_STATUS_RESPONSE_INIT { 0U }
+/* status: Status of the axis; flags axis_status */
+typedef mc1231a_set_1_response_t mc1231a_get_status_response_t;
+#define MC1231A_GET_STATUS_RESPONSE_INIT MC1231A_SET_1_RESPONSE_INIT
 
 static inline int mc1231a_get_status_response_encode(
     const mc1231a_get_status_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->status);
-    return (int)MC1231A_GET_STATUS_RESPONSE_MAX_SIZE;
+    return mc1231a_set_1_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_status_response_decode(
     mc1231a_get_status_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->status = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_1_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_status_response_to_frame(
@@ -4882,30 +4514,20 @@ static inline int mc1231a_get_mode_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_MODE_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MODE_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mode_response {
-    uint16_t value; /* Mode bits; their layout was not found */
-} mc1231a_get_mode_response_t;
-
-#define MC1231A_GET_MODE_RESPONSE_INIT { 0U }
+/* value: Mode bits; their layout was not found */
+typedef mc1231a_get_kp_response_t mc1231a_get_mode_response_t;
+#define MC1231A_GET_MODE_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_mode_response_encode(
     const mc1231a_get_mode_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_MODE_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mode_response_decode(
     mc1231a_get_mode_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mode_response_to_frame(
@@ -5023,30 +4645,20 @@ static inline int mc1231a_get_capt_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_CAPT_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_CAPT_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_capt_response {
-    int32_t value; /* Captured position; in counts */
-} mc1231a_get_capt_response_t;
-
-#define MC1231A_GET_CAPT_RESPONSE_INIT { 0L }
+/* value: Captured position; in counts */
+typedef mc1231a_get_pos_response_t mc1231a_get_capt_response_t;
+#define MC1231A_GET_CAPT_RESPONSE_INIT MC1231A_GET_POS_RESPONSE_INIT
 
 static inline int mc1231a_get_capt_response_encode(
     const mc1231a_get_capt_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_CAPT_RESPONSE_MAX_SIZE;
+    return mc1231a_get_pos_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_capt_response_decode(
     mc1231a_get_capt_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_pos_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_capt_response_to_frame(
@@ -5221,36 +4833,20 @@ static inline int mc1231a_mtr_off_response_from_frame(uint16_t request_sum, cons
 #define MC1231A_SET_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_mtr_cmd_request {
-    int16_t value; /* Manual motor command (open loop only); -32767..32767 */
-} mc1231a_set_mtr_cmd_request_t;
-
-#define MC1231A_SET_MTR_CMD_REQUEST_INIT { 0 }
+/* value: Manual motor command (open loop only); -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_set_mtr_cmd_request_t;
+#define MC1231A_SET_MTR_CMD_REQUEST_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_set_mtr_cmd_request_encode(
     const mc1231a_set_mtr_cmd_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_SET_MTR_CMD_REQUEST_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_mtr_cmd_request_decode(
     mc1231a_set_mtr_cmd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_mtr_cmd_request_to_frame(
@@ -5310,36 +4906,20 @@ static inline int mc1231a_get_mtr_cmd_request_to_frame(uint8_t *wire, size_t cap
 #define MC1231A_GET_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_mtr_cmd_response {
-    int16_t value; /* Motor command now being output; -32767..32767 */
-} mc1231a_get_mtr_cmd_response_t;
-
-#define MC1231A_GET_MTR_CMD_RESPONSE_INIT { 0 }
+/* value: Motor command now being output; -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_get_mtr_cmd_response_t;
+#define MC1231A_GET_MTR_CMD_RESPONSE_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_get_mtr_cmd_response_encode(
     const mc1231a_get_mtr_cmd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_GET_MTR_CMD_RESPONSE_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_mtr_cmd_response_decode(
     mc1231a_get_mtr_cmd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_mtr_cmd_response_to_frame(
@@ -5370,36 +4950,20 @@ static inline int mc1231a_get_mtr_cmd_response_from_frame(
 #define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_buf_mtr_cmd_request {
-    int16_t value; /* The buffered motor command; -32767..32767 */
-} mc1231a_set_buf_mtr_cmd_request_t;
-
-#define MC1231A_SET_BUF_MTR_CMD_REQUEST_INIT { 0 }
+/* value: The buffered motor command; -32767..32767 */
+typedef mc1231a_set_mtr_bias_request_t mc1231a_set_buf_mtr_cmd_request_t;
+#define MC1231A_SET_BUF_MTR_CMD_REQUEST_INIT MC1231A_SET_MTR_BIAS_REQUEST_INIT
 
 static inline int mc1231a_set_buf_mtr_cmd_request_encode(
     const mc1231a_set_buf_mtr_cmd_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_SET_BUF_MTR_CMD_REQUEST_MAX_SIZE;
+    return mc1231a_set_mtr_bias_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_buf_mtr_cmd_request_decode(
     mc1231a_set_buf_mtr_cmd_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    if (message->value < -32767) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_mtr_bias_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_buf_mtr_cmd_request_to_frame(
@@ -5462,30 +5026,20 @@ static inline int mc1231a_get_buf_mtr_cmd_request_to_frame(uint8_t *wire, size_t
 #define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_buf_mtr_cmd_response {
-    int16_t value; /* Buffered motor command */
-} mc1231a_get_buf_mtr_cmd_response_t;
-
-#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_INIT { 0 }
+/* value: Buffered motor command */
+typedef mc1231a_get_intgr_response_t mc1231a_get_buf_mtr_cmd_response_t;
+#define MC1231A_GET_BUF_MTR_CMD_RESPONSE_INIT MC1231A_GET_INTGR_RESPONSE_INIT
 
 static inline int mc1231a_get_buf_mtr_cmd_response_encode(
     const mc1231a_get_buf_mtr_cmd_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, (uint16_t)message->value);
-    return (int)MC1231A_GET_BUF_MTR_CMD_RESPONSE_MAX_SIZE;
+    return mc1231a_get_intgr_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_buf_mtr_cmd_response_decode(
     mc1231a_get_buf_mtr_cmd_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int16_t)mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_intgr_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_buf_mtr_cmd_response_to_frame(
@@ -5530,7 +5084,7 @@ static inline int mc1231a_get_output_mode_request_to_frame(uint8_t *wire, size_t
 #define MC1231A_GET_OUTPUT_MODE_RESPONSE_MAX_WIRE_SIZE 4U
 
 typedef struct mc1231a_get_output_mode_response {
-    uint16_t mode; /* Motor output in use; enum output_mode */
+    mc1231a_output_mode_t mode; /* Motor output in use; enum output_mode */
 } mc1231a_get_output_mode_response_t;
 
 #define MC1231A_GET_OUTPUT_MODE_RESPONSE_INIT { 0U }
@@ -5652,36 +5206,20 @@ static inline int mc1231a_axis_off_response_from_frame(uint16_t request_sum, con
 #define MC1231A_SET_ACTL_POS_REQUEST_MAX_FRAME_SIZE 5U
 #define MC1231A_SET_ACTL_POS_REQUEST_MAX_WIRE_SIZE 5U
 
-typedef struct mc1231a_set_actl_pos_request {
-    int32_t value; /* The actual position; in counts; -1073741824..1073741823 */
-} mc1231a_set_actl_pos_request_t;
-
-#define MC1231A_SET_ACTL_POS_REQUEST_INIT { 0L }
+/* value: The actual position; in counts; -1073741824..1073741823 */
+typedef mc1231a_set_pos_request_t mc1231a_set_actl_pos_request_t;
+#define MC1231A_SET_ACTL_POS_REQUEST_INIT MC1231A_SET_POS_REQUEST_INIT
 
 static inline int mc1231a_set_actl_pos_request_encode(
     const mc1231a_set_actl_pos_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
-        return MC1231A_ERROR_RANGE;
-    }
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_SET_ACTL_POS_REQUEST_MAX_SIZE;
+    return mc1231a_set_pos_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_actl_pos_request_decode(
     mc1231a_set_actl_pos_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    if ((message->value < -1073741824L) || (message->value > 1073741823L)) {
-        return MC1231A_ERROR_RANGE;
-    }
-    return MC1231A_OK;
+    return mc1231a_set_pos_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_actl_pos_request_to_frame(
@@ -5743,30 +5281,20 @@ static inline int mc1231a_get_actl_pos_request_to_frame(uint8_t *wire, size_t ca
 #define MC1231A_GET_ACTL_POS_RESPONSE_MAX_FRAME_SIZE 6U
 #define MC1231A_GET_ACTL_POS_RESPONSE_MAX_WIRE_SIZE 6U
 
-typedef struct mc1231a_get_actl_pos_response {
-    int32_t value; /* Actual position; in counts */
-} mc1231a_get_actl_pos_response_t;
-
-#define MC1231A_GET_ACTL_POS_RESPONSE_INIT { 0L }
+/* value: Actual position; in counts */
+typedef mc1231a_get_pos_response_t mc1231a_get_actl_pos_response_t;
+#define MC1231A_GET_ACTL_POS_RESPONSE_INIT MC1231A_GET_POS_RESPONSE_INIT
 
 static inline int mc1231a_get_actl_pos_response_encode(
     const mc1231a_get_actl_pos_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u32_be_(payload, (uint32_t)message->value);
-    return (int)MC1231A_GET_ACTL_POS_RESPONSE_MAX_SIZE;
+    return mc1231a_get_pos_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_actl_pos_response_decode(
     mc1231a_get_actl_pos_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = (int32_t)mc1231a_get_u32_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_pos_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_actl_pos_response_to_frame(
@@ -5798,7 +5326,7 @@ static inline int mc1231a_get_actl_pos_response_from_frame(
 
 typedef struct mc1231a_set_lmt_sense_request {
     /* Active level of each limit input, laid out as in get_lmt_swtch, as inferred; flags limit_switches */
-    uint16_t value;
+    mc1231a_limit_switches_t value;
 } mc1231a_set_lmt_sense_request_t;
 
 #define MC1231A_SET_LMT_SENSE_REQUEST_INIT { 0U }
@@ -5882,30 +5410,20 @@ static inline int mc1231a_get_lmt_swtch_request_to_frame(uint8_t *wire, size_t c
 #define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_lmt_swtch_response {
-    uint16_t value; /* Limit inputs; 1 is set; flags limit_switches */
-} mc1231a_get_lmt_swtch_response_t;
-
-#define MC1231A_GET_LMT_SWTCH_RESPONSE_INIT { 0U }
+/* value: Limit inputs; 1 is set; flags limit_switches */
+typedef mc1231a_set_lmt_sense_request_t mc1231a_get_lmt_swtch_response_t;
+#define MC1231A_GET_LMT_SWTCH_RESPONSE_INIT MC1231A_SET_LMT_SENSE_REQUEST_INIT
 
 static inline int mc1231a_get_lmt_swtch_response_encode(
     const mc1231a_get_lmt_swtch_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_LMT_SWTCH_RESPONSE_MAX_SIZE;
+    return mc1231a_set_lmt_sense_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_lmt_swtch_response_decode(
     mc1231a_get_lmt_swtch_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_lmt_sense_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_lmt_swtch_response_to_frame(
@@ -6030,30 +5548,20 @@ static inline int mc1231a_get_home_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_HOME_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_HOME_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_home_response {
-    uint16_t value; /* One bit for each axis, as inferred */
-} mc1231a_get_home_response_t;
-
-#define MC1231A_GET_HOME_RESPONSE_INIT { 0U }
+/* value: One bit for each axis, as inferred */
+typedef mc1231a_get_kp_response_t mc1231a_get_home_response_t;
+#define MC1231A_GET_HOME_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_home_response_encode(
     const mc1231a_get_home_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_HOME_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_home_response_decode(
     mc1231a_get_home_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_home_response_to_frame(
@@ -6083,30 +5591,20 @@ static inline int mc1231a_get_home_response_from_frame(
 #define MC1231A_SET_SMPL_TIME_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_SMPL_TIME_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_smpl_time_request {
-    uint16_t value; /* Servo loop time; its unit was not found */
-} mc1231a_set_smpl_time_request_t;
-
-#define MC1231A_SET_SMPL_TIME_REQUEST_INIT { 0U }
+/* value: Servo loop time; its unit was not found */
+typedef mc1231a_get_kp_response_t mc1231a_set_smpl_time_request_t;
+#define MC1231A_SET_SMPL_TIME_REQUEST_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_set_smpl_time_request_encode(
     const mc1231a_set_smpl_time_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_SMPL_TIME_REQUEST_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_smpl_time_request_decode(
     mc1231a_set_smpl_time_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_smpl_time_request_to_frame(
@@ -6171,30 +5669,20 @@ static inline int mc1231a_get_smpl_time_request_to_frame(uint8_t *wire, size_t c
 #define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_SMPL_TIME_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_smpl_time_response {
-    uint16_t value; /* Servo loop time; its unit was not found */
-} mc1231a_get_smpl_time_response_t;
-
-#define MC1231A_GET_SMPL_TIME_RESPONSE_INIT { 0U }
+/* value: Servo loop time; its unit was not found */
+typedef mc1231a_get_kp_response_t mc1231a_get_smpl_time_response_t;
+#define MC1231A_GET_SMPL_TIME_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_smpl_time_response_encode(
     const mc1231a_get_smpl_time_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_SMPL_TIME_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_smpl_time_response_decode(
     mc1231a_get_smpl_time_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_smpl_time_response_to_frame(
@@ -6276,30 +5764,20 @@ static inline int mc1231a_get_vrsn_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_VRSN_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_VRSN_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_vrsn_response {
-    uint16_t value; /* Packed version; its layout was not found */
-} mc1231a_get_vrsn_response_t;
-
-#define MC1231A_GET_VRSN_RESPONSE_INIT { 0U }
+/* value: Packed version; its layout was not found */
+typedef mc1231a_get_kp_response_t mc1231a_get_vrsn_response_t;
+#define MC1231A_GET_VRSN_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_vrsn_response_encode(
     const mc1231a_get_vrsn_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_VRSN_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_vrsn_response_decode(
     mc1231a_get_vrsn_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_vrsn_response_to_frame(
@@ -6347,7 +5825,7 @@ static inline int mc1231a_get_time_request_to_frame(uint8_t *wire, size_t capaci
 #define MC1231A_GET_TIME_RESPONSE_MAX_WIRE_SIZE 6U
 
 typedef struct mc1231a_get_time_response {
-    uint32_t value; /* Cycle counter since reset; in cycles */
+    mc1231a_cycles_t value; /* Cycle counter since reset; in cycles */
 } mc1231a_get_time_response_t;
 
 #define MC1231A_GET_TIME_RESPONSE_INIT { 0UL }
@@ -6400,7 +5878,7 @@ static inline int mc1231a_get_time_response_from_frame(
 #define MC1231A_SET_PHASE_CNTS_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_phase_cnts_request {
-    uint16_t value; /* Encoder counts of an electrical cycle; in counts; 129..65535 */
+    mc1231a_phase_counts_t value; /* Encoder counts of an electrical cycle; in counts; 129..65535 */
 } mc1231a_set_phase_cnts_request_t;
 
 #define MC1231A_SET_PHASE_CNTS_REQUEST_INIT { 129U }
@@ -6478,7 +5956,7 @@ static inline int mc1231a_set_phase_cnts_response_from_frame(uint16_t request_su
 #define MC1231A_SET_PHASE_OFFSET_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_phase_offset_request {
-    uint16_t value; /* Phase offset from the index pulse; in counts */
+    mc1231a_phase_angle_t value; /* Phase offset from the index pulse; in counts */
 } mc1231a_set_phase_offset_request_t;
 
 #define MC1231A_SET_PHASE_OFFSET_REQUEST_INIT { 0U }
@@ -6551,7 +6029,7 @@ static inline int mc1231a_set_phase_offset_response_from_frame(uint16_t request_
 #define MC1231A_SET_PHASE_TIME_REQUEST_MAX_WIRE_SIZE 3U
 
 typedef struct mc1231a_set_phase_time_request {
-    uint16_t value; /* Duration of algorithmic phase initialisation; in samples */
+    mc1231a_sample_times_t value; /* Duration of algorithmic phase initialisation; in samples */
 } mc1231a_set_phase_time_request_t;
 
 #define MC1231A_SET_PHASE_TIME_REQUEST_INIT { 0U }
@@ -6622,30 +6100,20 @@ static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_su
 #define MC1231A_SET_PHASE_REQUEST_MAX_FRAME_SIZE 3U
 #define MC1231A_SET_PHASE_REQUEST_MAX_WIRE_SIZE 3U
 
-typedef struct mc1231a_set_phase_request {
-    uint16_t value; /* Phase angle; encoder counts assumed; in counts */
-} mc1231a_set_phase_request_t;
-
-#define MC1231A_SET_PHASE_REQUEST_INIT { 0U }
+/* value: Phase angle; encoder counts assumed; in counts */
+typedef mc1231a_set_phase_offset_request_t mc1231a_set_phase_request_t;
+#define MC1231A_SET_PHASE_REQUEST_INIT MC1231A_SET_PHASE_OFFSET_REQUEST_INIT
 
 static inline int mc1231a_set_phase_request_encode(
     const mc1231a_set_phase_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_SET_PHASE_REQUEST_MAX_SIZE;
+    return mc1231a_set_phase_offset_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_set_phase_request_decode(
     mc1231a_set_phase_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_phase_offset_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_set_phase_request_to_frame(
@@ -6748,30 +6216,20 @@ static inline int mc1231a_get_phase_info_request_to_frame(uint8_t *wire, size_t 
 #define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_PHASE_INFO_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_phase_info_response {
-    uint16_t value; /* Commutation flags; their layout was not found; not confirmed */
-} mc1231a_get_phase_info_response_t;
-
-#define MC1231A_GET_PHASE_INFO_RESPONSE_INIT { 0U }
+/* value: Commutation flags; their layout was not found; not confirmed */
+typedef mc1231a_get_kp_response_t mc1231a_get_phase_info_response_t;
+#define MC1231A_GET_PHASE_INFO_RESPONSE_INIT MC1231A_GET_KP_RESPONSE_INIT
 
 static inline int mc1231a_get_phase_info_response_encode(
     const mc1231a_get_phase_info_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_PHASE_INFO_RESPONSE_MAX_SIZE;
+    return mc1231a_get_kp_response_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_phase_info_response_decode(
     mc1231a_get_phase_info_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_get_kp_response_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_phase_info_response_to_frame(
@@ -6882,30 +6340,20 @@ static inline int mc1231a_get_phase_time_request_to_frame(uint8_t *wire, size_t 
 #define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_PHASE_TIME_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_phase_time_response {
-    uint16_t value; /* Initialisation duration; in samples */
-} mc1231a_get_phase_time_response_t;
-
-#define MC1231A_GET_PHASE_TIME_RESPONSE_INIT { 0U }
+/* value: Initialisation duration; in samples */
+typedef mc1231a_set_phase_time_request_t mc1231a_get_phase_time_response_t;
+#define MC1231A_GET_PHASE_TIME_RESPONSE_INIT MC1231A_SET_PHASE_TIME_REQUEST_INIT
 
 static inline int mc1231a_get_phase_time_response_encode(
     const mc1231a_get_phase_time_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_PHASE_TIME_RESPONSE_MAX_SIZE;
+    return mc1231a_set_phase_time_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_phase_time_response_decode(
     mc1231a_get_phase_time_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_phase_time_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_phase_time_response_to_frame(
@@ -6952,30 +6400,20 @@ static inline int mc1231a_get_phase_offset_request_to_frame(uint8_t *wire, size_
 #define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_FRAME_SIZE 4U
 #define MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_WIRE_SIZE 4U
 
-typedef struct mc1231a_get_phase_offset_response {
-    uint16_t value; /* Phase offset; in counts */
-} mc1231a_get_phase_offset_response_t;
-
-#define MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT { 0U }
+/* value: Phase offset; in counts */
+typedef mc1231a_set_phase_offset_request_t mc1231a_get_phase_offset_response_t;
+#define MC1231A_GET_PHASE_OFFSET_RESPONSE_INIT MC1231A_SET_PHASE_OFFSET_REQUEST_INIT
 
 static inline int mc1231a_get_phase_offset_response_encode(
     const mc1231a_get_phase_offset_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 2U) {
-        return MC1231A_ERROR_CAPACITY;
-    }
-    mc1231a_put_u16_be_(payload, message->value);
-    return (int)MC1231A_GET_PHASE_OFFSET_RESPONSE_MAX_SIZE;
+    return mc1231a_set_phase_offset_request_encode(message, payload, capacity);
 }
 
 static inline int mc1231a_get_phase_offset_response_decode(
     mc1231a_get_phase_offset_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 2U) {
-        return MC1231A_ERROR_LENGTH;
-    }
-    message->value = mc1231a_get_u16_be_(payload);
-    return MC1231A_OK;
+    return mc1231a_set_phase_offset_request_decode(message, payload, size);
 }
 
 static inline int mc1231a_get_phase_offset_response_to_frame(

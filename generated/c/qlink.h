@@ -239,6 +239,32 @@ static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most
 }
 #endif
 
+/* Type tenths: tenths = (raw * FACTOR + BIAS) / DIVISOR s */
+typedef uint8_t qlink_tenths_t;
+#define QLINK_TENTHS_FACTOR 1
+#define QLINK_TENTHS_BIAS 0
+#define QLINK_TENTHS_DIVISOR 10
+#if QLINK_ENABLE_FLOAT
+static inline double qlink_tenths_physical(qlink_tenths_t raw)
+{
+    const double scaled = ((double)raw * (double)QLINK_TENTHS_FACTOR) + (double)QLINK_TENTHS_BIAS;
+    return scaled / (double)QLINK_TENTHS_DIVISOR;
+}
+
+static inline int qlink_tenths_raw(double physical, qlink_tenths_t *raw)
+{
+    const double scaled = (physical * (double)QLINK_TENTHS_DIVISOR) - (double)QLINK_TENTHS_BIAS;
+    const double steps = scaled / (double)QLINK_TENTHS_FACTOR;
+    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
+}
+#endif
+
+/* Type position: in encoder counts */
+typedef int32_t qlink_position_t;
+
+/* Type io24 */
+typedef uint32_t qlink_io24_t;
+
 /* ---- Check value: crc-16/ibm-3740 ---- */
 
 /* Any 16-bit algorithm of the CRC catalogue: (polynomial, start value, reflected, final XOR).
@@ -668,20 +694,12 @@ static inline int qlink_frame_decode(qlink_frame_t *frame, uint8_t *buffer, cons
 #define QLINK_NODE_SETUP_REQUEST_MAX_SIZE 4U
 #define QLINK_NODE_SETUP_REQUEST_MAX_FRAME_SIZE 11U
 #define QLINK_NODE_SETUP_REQUEST_MAX_WIRE_SIZE 17U
-/* t1_delay = (raw * FACTOR + BIAS) / DIVISOR s */
-#define QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR 1
-#define QLINK_NODE_SETUP_REQUEST_T1_DELAY_BIAS 0
-#define QLINK_NODE_SETUP_REQUEST_T1_DELAY_DIVISOR 10
-/* t2_delay = (raw * FACTOR + BIAS) / DIVISOR s */
-#define QLINK_NODE_SETUP_REQUEST_T2_DELAY_FACTOR 1
-#define QLINK_NODE_SETUP_REQUEST_T2_DELAY_BIAS 0
-#define QLINK_NODE_SETUP_REQUEST_T2_DELAY_DIVISOR 10
 
 typedef struct qlink_node_setup_request {
     uint8_t node_number; /* Number of the node from now on; 1..16 */
-    uint8_t t1_delay; /* Time from input 1 going high to output 1 going high; in steps of 1/10 s */
-    uint8_t t2_delay; /* Time from input 1 going low to output 1 going low; in steps of 1/10 s */
-    uint8_t position_type; /* How the node asks its motor for the position; enum position_type */
+    qlink_tenths_t t1_delay; /* Time from input 1 going high to output 1 going high; in steps of 1/10 s */
+    qlink_tenths_t t2_delay; /* Time from input 1 going low to output 1 going low; in steps of 1/10 s */
+    qlink_position_type_t position_type; /* How the node asks its motor for the position; enum position_type */
 } qlink_node_setup_request_t;
 
 #define QLINK_NODE_SETUP_REQUEST_INIT { 1U, 10U, 10U, 0U }
@@ -730,37 +748,6 @@ static inline int qlink_node_setup_request_to_frame(
     return qlink_seal_0_to_16_(QLINK_NODE_SETUP_REQUEST_ID, node, wire, capacity, size);
 }
 
-#if QLINK_ENABLE_FLOAT
-static inline double qlink_node_setup_request_t1_delay_physical(uint8_t raw)
-{
-    const double scaled = ((double)raw * (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR) +
-        (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_BIAS;
-    return scaled / (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_DIVISOR;
-}
-
-static inline int qlink_node_setup_request_t1_delay_raw(double physical, uint8_t *raw)
-{
-    const double scaled = (physical * (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_DIVISOR) -
-        (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_BIAS;
-    const double steps = scaled / (double)QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
-}
-static inline double qlink_node_setup_request_t2_delay_physical(uint8_t raw)
-{
-    const double scaled = ((double)raw * (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_FACTOR) +
-        (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_BIAS;
-    return scaled / (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_DIVISOR;
-}
-
-static inline int qlink_node_setup_request_t2_delay_raw(double physical, uint8_t *raw)
-{
-    const double scaled = (physical * (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_DIVISOR) -
-        (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_BIAS;
-    const double steps = scaled / (double)QLINK_NODE_SETUP_REQUEST_T2_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
-}
-#endif
-
 /* ---- node_setup.response, id 0x01 (section 7.1): Give a node its number, its output delays and its way of
  * asking the motor for a position.
  */
@@ -805,22 +792,14 @@ static inline int qlink_node_info_request_to_frame(uint8_t node, uint8_t *wire, 
 #define QLINK_NODE_INFO_RESPONSE_MAX_SIZE 11U
 #define QLINK_NODE_INFO_RESPONSE_MAX_FRAME_SIZE 18U
 #define QLINK_NODE_INFO_RESPONSE_MAX_WIRE_SIZE 31U
-/* t1_delay = (raw * FACTOR + BIAS) / DIVISOR s */
-#define QLINK_NODE_INFO_RESPONSE_T1_DELAY_FACTOR 1
-#define QLINK_NODE_INFO_RESPONSE_T1_DELAY_BIAS 0
-#define QLINK_NODE_INFO_RESPONSE_T1_DELAY_DIVISOR 10
-/* t2_delay = (raw * FACTOR + BIAS) / DIVISOR s */
-#define QLINK_NODE_INFO_RESPONSE_T2_DELAY_FACTOR 1
-#define QLINK_NODE_INFO_RESPONSE_T2_DELAY_BIAS 0
-#define QLINK_NODE_INFO_RESPONSE_T2_DELAY_DIVISOR 10
 
 typedef struct qlink_node_info_response {
     uint8_t version_major; /* Major number of the firmware version */
     uint8_t version_minor; /* Minor number of the firmware version */
     uint16_t product_id; /* Product of the node */
-    uint8_t t1_delay; /* Time from input 1 going high to output 1 going high; in steps of 1/10 s */
-    uint8_t t2_delay; /* Time from input 1 going low to output 1 going low; in steps of 1/10 s */
-    uint8_t position_type; /* How the node asks its motor for the position; enum position_type */
+    qlink_tenths_t t1_delay; /* Time from input 1 going high to output 1 going high; in steps of 1/10 s */
+    qlink_tenths_t t2_delay; /* Time from input 1 going low to output 1 going low; in steps of 1/10 s */
+    qlink_position_type_t position_type; /* How the node asks its motor for the position; enum position_type */
     uint32_t serial_number; /* Serial number of the node */
 } qlink_node_info_response_t;
 
@@ -869,37 +848,6 @@ static inline int qlink_node_info_response_to_frame(
     }
     return qlink_seal_1_to_16_(QLINK_NODE_INFO_RESPONSE_ID, node, wire, capacity, size);
 }
-
-#if QLINK_ENABLE_FLOAT
-static inline double qlink_node_info_response_t1_delay_physical(uint8_t raw)
-{
-    const double scaled = ((double)raw * (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_FACTOR) +
-        (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_BIAS;
-    return scaled / (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_DIVISOR;
-}
-
-static inline int qlink_node_info_response_t1_delay_raw(double physical, uint8_t *raw)
-{
-    const double scaled = (physical * (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_DIVISOR) -
-        (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_BIAS;
-    const double steps = scaled / (double)QLINK_NODE_INFO_RESPONSE_T1_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
-}
-static inline double qlink_node_info_response_t2_delay_physical(uint8_t raw)
-{
-    const double scaled = ((double)raw * (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_FACTOR) +
-        (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_BIAS;
-    return scaled / (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_DIVISOR;
-}
-
-static inline int qlink_node_info_response_t2_delay_raw(double physical, uint8_t *raw)
-{
-    const double scaled = (physical * (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_DIVISOR) -
-        (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_BIAS;
-    const double steps = scaled / (double)QLINK_NODE_INFO_RESPONSE_T2_DELAY_FACTOR;
-    return qlink_nearest_uint8_(steps, 0U, 255U, raw);
-}
-#endif
 
 /* ---- node_start.request, id 0x03 (section 7.3): Start one node, or all of them at the same time. */
 #define QLINK_NODE_START_REQUEST_ID 0x03
@@ -997,17 +945,17 @@ typedef struct qlink_node_program_load_request {
 static inline int qlink_node_program_load_request_encode(
     const qlink_node_program_load_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t program_data_size = message->program_data_size;
-    const size_t size = 1U + (size_t)program_data_size;
+    const uint8_t program_data_count = message->program_data_size;
+    const size_t size = 1U + (size_t)program_data_count;
 
-    if (program_data_size > 25U) {
+    if (program_data_count > 25U) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->counter;
-    for (uint8_t index = 0U; index < program_data_size; ++index) {
+    for (uint8_t index = 0U; index < program_data_count; ++index) {
         payload[1U + index] = message->program_data[index];
     }
     return (int)size;
@@ -1016,8 +964,6 @@ static inline int qlink_node_program_load_request_encode(
 static inline int qlink_node_program_load_request_decode(
     qlink_node_program_load_request_t *message, const uint8_t *payload, size_t size)
 {
-    size_t program_data_count;
-
     if (size == 0U) {
         message->counter = 0U;
         message->program_data_size = 0U;
@@ -1026,8 +972,8 @@ static inline int qlink_node_program_load_request_decode(
     if (size > 26U) {
         return QLINK_ERROR_LENGTH;
     }
+    const size_t program_data_count = size - 1U;
     message->counter = payload[0];
-    program_data_count = size - 1U;
     message->program_data_size = (uint8_t)program_data_count;
     qlink_copy_(message->program_data, &payload[1], program_data_count);
     return QLINK_OK;
@@ -1057,30 +1003,20 @@ static inline int qlink_node_program_load_request_to_frame(
 #define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_FRAME_SIZE 8U
 #define QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_WIRE_SIZE 11U
 
-typedef struct qlink_node_program_load_response {
-    uint8_t counter; /* Counter of the request that is acknowledged */
-} qlink_node_program_load_response_t;
-
-#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT { 0U }
+/* counter: Counter of the request that is acknowledged */
+typedef qlink_node_sync_request_t qlink_node_program_load_response_t;
+#define QLINK_NODE_PROGRAM_LOAD_RESPONSE_INIT QLINK_NODE_SYNC_REQUEST_INIT
 
 static inline int qlink_node_program_load_response_encode(
     const qlink_node_program_load_response_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 1U) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    payload[0] = message->counter;
-    return (int)QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE;
+    return qlink_node_sync_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_node_program_load_response_decode(
     qlink_node_program_load_response_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 1U) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->counter = payload[0];
-    return QLINK_OK;
+    return qlink_node_sync_request_decode(message, payload, size);
 }
 
 static inline int qlink_node_program_load_response_to_frame(
@@ -1157,17 +1093,17 @@ typedef struct qlink_motor_response_poll_response {
 static inline int qlink_motor_response_poll_response_encode(
     const qlink_motor_response_poll_response_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t motor_data_size = message->motor_data_size;
-    const size_t size = 1U + (size_t)motor_data_size;
+    const uint8_t motor_data_count = message->motor_data_size;
+    const size_t size = 1U + (size_t)motor_data_count;
 
-    if (motor_data_size > 25U) {
+    if (motor_data_count > 25U) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->last_completion;
-    for (uint8_t index = 0U; index < motor_data_size; ++index) {
+    for (uint8_t index = 0U; index < motor_data_count; ++index) {
         payload[1U + index] = message->motor_data[index];
     }
     return (int)size;
@@ -1176,13 +1112,11 @@ static inline int qlink_motor_response_poll_response_encode(
 static inline int qlink_motor_response_poll_response_decode(
     qlink_motor_response_poll_response_t *message, const uint8_t *payload, size_t size)
 {
-    size_t motor_data_count;
-
     if ((size < 1U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
+    const size_t motor_data_count = size - 1U;
     message->last_completion = payload[0];
-    motor_data_count = size - 1U;
     message->motor_data_size = (uint8_t)motor_data_count;
     qlink_copy_(message->motor_data, &payload[1], motor_data_count);
     return QLINK_OK;
@@ -1222,16 +1156,16 @@ typedef struct qlink_motor_request_request {
 static inline int qlink_motor_request_request_encode(
     const qlink_motor_request_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t motor_data_size = message->motor_data_size;
-    const size_t size = (size_t)motor_data_size;
+    const uint8_t motor_data_count = message->motor_data_size;
+    const size_t size = (size_t)motor_data_count;
 
-    if ((motor_data_size < 1U) || (motor_data_size > 26U)) {
+    if ((motor_data_count < 1U) || (motor_data_count > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
-    for (uint8_t index = 0U; index < motor_data_size; ++index) {
+    for (uint8_t index = 0U; index < motor_data_count; ++index) {
         payload[index] = message->motor_data[index];
     }
     return (int)size;
@@ -1240,12 +1174,10 @@ static inline int qlink_motor_request_request_encode(
 static inline int qlink_motor_request_request_decode(
     qlink_motor_request_request_t *message, const uint8_t *payload, size_t size)
 {
-    size_t motor_data_count;
-
     if ((size < 1U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
-    motor_data_count = size;
+    const size_t motor_data_count = size;
     message->motor_data_size = (uint8_t)motor_data_count;
     qlink_copy_(message->motor_data, payload, motor_data_count);
     return QLINK_OK;
@@ -1320,17 +1252,15 @@ static inline int qlink_motion_request_encode(const qlink_motion_request_t *mess
 
 static inline int qlink_motion_request_decode(qlink_motion_request_t *message, const uint8_t *payload, size_t size)
 {
-    size_t segments_count;
-
     if ((size < 2U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
-    message->counter = payload[0];
-    message->outputs = payload[1];
     if (((size - 2U) % 2U) != 0U) {
         return QLINK_ERROR_LENGTH;
     }
-    segments_count = (size - 2U) / 2U;
+    const size_t segments_count = (size - 2U) / 2U;
+    message->counter = payload[0];
+    message->outputs = payload[1];
     message->segments_count = (uint8_t)segments_count;
     for (size_t index = 0U; index < segments_count; ++index) {
         message->segments[index] = qlink_get_u16_be_(&payload[2U + (2U * index)]);
@@ -1368,8 +1298,8 @@ static inline int qlink_motion_request_to_frame(
 typedef struct qlink_motion_response {
     uint8_t counter; /* Counter of the request that is answered */
     uint8_t inputs; /* Bit 0 is input 1 */
-    int32_t position; /* Motor position; in encoder counts */
-    uint16_t motor_status; /* State of the motor; flags motor_status */
+    qlink_position_t position; /* Motor position; in encoder counts */
+    qlink_motor_status_t motor_status; /* State of the motor; flags motor_status */
     uint8_t fifo_space; /* Words that still fit into the FIFO; in words */
 } qlink_motion_response_t;
 
@@ -1437,7 +1367,7 @@ static inline int qlink_motor_position_request_to_frame(uint8_t node, uint8_t *w
 #define QLINK_MOTOR_POSITION_RESPONSE_MAX_WIRE_SIZE 17U
 
 typedef struct qlink_motor_position_response {
-    int32_t position; /* Motor position; in encoder counts */
+    qlink_position_t position; /* Motor position; in encoder counts */
 } qlink_motor_position_response_t;
 
 #define QLINK_MOTOR_POSITION_RESPONSE_INIT { 0L }
@@ -1510,30 +1440,20 @@ static inline int qlink_clear_fifo_response_to_frame(uint8_t node, uint8_t *wire
 #define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_FRAME_SIZE 11U
 #define QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_WIRE_SIZE 17U
 
-typedef struct qlink_preset_motor_position_request {
-    int32_t position; /* Position that the motor has from now on; in encoder counts */
-} qlink_preset_motor_position_request_t;
-
-#define QLINK_PRESET_MOTOR_POSITION_REQUEST_INIT { 0L }
+/* position: Position that the motor has from now on; in encoder counts */
+typedef qlink_motor_position_response_t qlink_preset_motor_position_request_t;
+#define QLINK_PRESET_MOTOR_POSITION_REQUEST_INIT QLINK_MOTOR_POSITION_RESPONSE_INIT
 
 static inline int qlink_preset_motor_position_request_encode(
     const qlink_preset_motor_position_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (capacity < 4U) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    qlink_put_u32_be_(payload, (uint32_t)message->position);
-    return (int)QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE;
+    return qlink_motor_position_response_encode(message, payload, capacity);
 }
 
 static inline int qlink_preset_motor_position_request_decode(
     qlink_preset_motor_position_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 4U) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->position = (int32_t)qlink_get_u32_be_(payload);
-    return QLINK_OK;
+    return qlink_motor_position_response_decode(message, payload, size);
 }
 
 static inline int qlink_preset_motor_position_request_to_frame(
@@ -1638,16 +1558,16 @@ typedef struct qlink_read_response {
 
 static inline int qlink_read_response_encode(const qlink_read_response_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t data_size = message->data_size;
-    const size_t size = (size_t)data_size;
+    const uint8_t data_count = message->data_size;
+    const size_t size = (size_t)data_count;
 
-    if ((data_size < 1U) || (data_size > 26U)) {
+    if ((data_count < 1U) || (data_count > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
-    for (uint8_t index = 0U; index < data_size; ++index) {
+    for (uint8_t index = 0U; index < data_count; ++index) {
         payload[index] = message->data[index];
     }
     return (int)size;
@@ -1655,12 +1575,10 @@ static inline int qlink_read_response_encode(const qlink_read_response_t *messag
 
 static inline int qlink_read_response_decode(qlink_read_response_t *message, const uint8_t *payload, size_t size)
 {
-    size_t data_count;
-
     if ((size < 1U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
-    data_count = size;
+    const size_t data_count = size;
     message->data_size = (uint8_t)data_count;
     qlink_copy_(message->data, payload, data_count);
     return QLINK_OK;
@@ -1699,17 +1617,17 @@ typedef struct qlink_write_request {
 
 static inline int qlink_write_request_encode(const qlink_write_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t data_size = message->data_size;
-    const size_t size = 1U + (size_t)data_size;
+    const uint8_t data_count = message->data_size;
+    const size_t size = 1U + (size_t)data_count;
 
-    if ((data_size < 1U) || (data_size > 25U)) {
+    if ((data_count < 1U) || (data_count > 25U)) {
         return QLINK_ERROR_LENGTH;
     }
     if (capacity < size) {
         return QLINK_ERROR_CAPACITY;
     }
     payload[0] = message->offset;
-    for (uint8_t index = 0U; index < data_size; ++index) {
+    for (uint8_t index = 0U; index < data_count; ++index) {
         payload[1U + index] = message->data[index];
     }
     return (int)size;
@@ -1717,13 +1635,11 @@ static inline int qlink_write_request_encode(const qlink_write_request_t *messag
 
 static inline int qlink_write_request_decode(qlink_write_request_t *message, const uint8_t *payload, size_t size)
 {
-    size_t data_count;
-
     if ((size < 2U) || (size > 26U)) {
         return QLINK_ERROR_LENGTH;
     }
+    const size_t data_count = size - 1U;
     message->offset = payload[0];
-    data_count = size - 1U;
     message->data_size = (uint8_t)data_count;
     qlink_copy_(message->data, &payload[1], data_count);
     return QLINK_OK;
@@ -1764,7 +1680,7 @@ static inline int qlink_write_response_to_frame(uint8_t node, uint8_t *wire, siz
 #define QLINK_WRITE_READ_REQUEST_MAX_WIRE_SIZE 15U
 
 typedef struct qlink_write_read_request {
-    uint32_t outputs; /* Bit 0 is output 1 */
+    qlink_io24_t outputs; /* Bit 0 is output 1 */
 } qlink_write_read_request_t;
 
 #define QLINK_WRITE_READ_REQUEST_INIT { 0UL }
@@ -1815,7 +1731,7 @@ static inline int qlink_write_read_request_to_frame(
 #define QLINK_WRITE_READ_RESPONSE_MAX_WIRE_SIZE 15U
 
 typedef struct qlink_write_read_response {
-    uint32_t inputs; /* Bit 0 is input 1 */
+    qlink_io24_t inputs; /* Bit 0 is input 1 */
 } qlink_write_read_response_t;
 
 #define QLINK_WRITE_READ_RESPONSE_INIT { 0UL }
@@ -1866,7 +1782,7 @@ static inline int qlink_write_read_response_to_frame(
 #define QLINK_SET_OUTPUTS_REQUEST_MAX_WIRE_SIZE 15U
 
 typedef struct qlink_set_outputs_request {
-    uint32_t mask; /* Bit 0 is output 1 */
+    qlink_io24_t mask; /* Bit 0 is output 1 */
 } qlink_set_outputs_request_t;
 
 #define QLINK_SET_OUTPUTS_REQUEST_INIT { 0UL }
@@ -1928,33 +1844,20 @@ static inline int qlink_set_outputs_response_to_frame(uint8_t node, uint8_t *wir
 #define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_FRAME_SIZE 10U
 #define QLINK_CLEAR_OUTPUTS_REQUEST_MAX_WIRE_SIZE 15U
 
-typedef struct qlink_clear_outputs_request {
-    uint32_t mask; /* Bit 0 is output 1 */
-} qlink_clear_outputs_request_t;
-
-#define QLINK_CLEAR_OUTPUTS_REQUEST_INIT { 0UL }
+/* mask: Bit 0 is output 1 */
+typedef qlink_set_outputs_request_t qlink_clear_outputs_request_t;
+#define QLINK_CLEAR_OUTPUTS_REQUEST_INIT QLINK_SET_OUTPUTS_REQUEST_INIT
 
 static inline int qlink_clear_outputs_request_encode(
     const qlink_clear_outputs_request_t *message, uint8_t *payload, size_t capacity)
 {
-    if (message->mask > 16777215UL) {
-        return QLINK_ERROR_RANGE;
-    }
-    if (capacity < 3U) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    qlink_put_u24_le_(payload, message->mask);
-    return (int)QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE;
+    return qlink_set_outputs_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_clear_outputs_request_decode(
     qlink_clear_outputs_request_t *message, const uint8_t *payload, size_t size)
 {
-    if (size != 3U) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->mask = qlink_get_u24_le_(payload);
-    return QLINK_OK;
+    return qlink_set_outputs_request_decode(message, payload, size);
 }
 
 static inline int qlink_clear_outputs_request_to_frame(
@@ -1992,46 +1895,21 @@ static inline int qlink_clear_outputs_response_to_frame(uint8_t node, uint8_t *w
 #define QLINK_LOOP_BACK_REQUEST_MAX_FRAME_SIZE 33U
 #define QLINK_LOOP_BACK_REQUEST_MAX_WIRE_SIZE 61U
 
-typedef struct qlink_loop_back_request {
-    uint8_t offset; /* Returned as it is */
-    uint8_t data_size; /* bytes in data */
-    uint8_t data[25]; /* Returned as it is */
-} qlink_loop_back_request_t;
-
-#define QLINK_LOOP_BACK_REQUEST_INIT { 0U, 1U, {0} }
+/* offset: Returned as it is */
+/* data: Returned as it is */
+typedef qlink_write_request_t qlink_loop_back_request_t;
+#define QLINK_LOOP_BACK_REQUEST_INIT QLINK_WRITE_REQUEST_INIT
 
 static inline int qlink_loop_back_request_encode(
     const qlink_loop_back_request_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t data_size = message->data_size;
-    const size_t size = 1U + (size_t)data_size;
-
-    if ((data_size < 1U) || (data_size > 25U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    if (capacity < size) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    payload[0] = message->offset;
-    for (uint8_t index = 0U; index < data_size; ++index) {
-        payload[1U + index] = message->data[index];
-    }
-    return (int)size;
+    return qlink_write_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_loop_back_request_decode(
     qlink_loop_back_request_t *message, const uint8_t *payload, size_t size)
 {
-    size_t data_count;
-
-    if ((size < 2U) || (size > 26U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->offset = payload[0];
-    data_count = size - 1U;
-    message->data_size = (uint8_t)data_count;
-    qlink_copy_(message->data, &payload[1], data_count);
-    return QLINK_OK;
+    return qlink_write_request_decode(message, payload, size);
 }
 
 static inline int qlink_loop_back_request_to_frame(
@@ -2057,46 +1935,21 @@ static inline int qlink_loop_back_request_to_frame(
 #define QLINK_LOOP_BACK_RESPONSE_MAX_FRAME_SIZE 33U
 #define QLINK_LOOP_BACK_RESPONSE_MAX_WIRE_SIZE 61U
 
-typedef struct qlink_loop_back_response {
-    uint8_t offset; /* Offset of the request */
-    uint8_t data_size; /* bytes in data */
-    uint8_t data[25]; /* Data of the request */
-} qlink_loop_back_response_t;
-
-#define QLINK_LOOP_BACK_RESPONSE_INIT { 0U, 1U, {0} }
+/* offset: Offset of the request */
+/* data: Data of the request */
+typedef qlink_write_request_t qlink_loop_back_response_t;
+#define QLINK_LOOP_BACK_RESPONSE_INIT QLINK_WRITE_REQUEST_INIT
 
 static inline int qlink_loop_back_response_encode(
     const qlink_loop_back_response_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint8_t data_size = message->data_size;
-    const size_t size = 1U + (size_t)data_size;
-
-    if ((data_size < 1U) || (data_size > 25U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    if (capacity < size) {
-        return QLINK_ERROR_CAPACITY;
-    }
-    payload[0] = message->offset;
-    for (uint8_t index = 0U; index < data_size; ++index) {
-        payload[1U + index] = message->data[index];
-    }
-    return (int)size;
+    return qlink_write_request_encode(message, payload, capacity);
 }
 
 static inline int qlink_loop_back_response_decode(
     qlink_loop_back_response_t *message, const uint8_t *payload, size_t size)
 {
-    size_t data_count;
-
-    if ((size < 2U) || (size > 26U)) {
-        return QLINK_ERROR_LENGTH;
-    }
-    message->offset = payload[0];
-    data_count = size - 1U;
-    message->data_size = (uint8_t)data_count;
-    qlink_copy_(message->data, &payload[1], data_count);
-    return QLINK_OK;
+    return qlink_write_request_decode(message, payload, size);
 }
 
 static inline int qlink_loop_back_response_to_frame(

@@ -651,19 +651,19 @@ typedef struct trio_character_transfer {
 static inline int trio_character_transfer_encode(
     const trio_character_transfer_t *message, uint8_t *payload, size_t capacity)
 {
-    const uint16_t characters_size = message->characters_size;
-    const size_t size = (size_t)characters_size;
+    const uint16_t characters_count = message->characters_size;
+    const size_t size = (size_t)characters_count;
 
-    if ((characters_size < 1U) || (characters_size > 256U)) {
+    if ((characters_count < 1U) || (characters_count > 256U)) {
         return TRIO_ERROR_LENGTH;
     }
-    if (!trio_is_text_(message->characters, characters_size)) {
+    if (!trio_is_text_(message->characters, characters_count)) {
         return TRIO_ERROR_RANGE;
     }
     if (capacity < size) {
         return TRIO_ERROR_CAPACITY;
     }
-    for (uint16_t index = 0U; index < characters_size; ++index) {
+    for (uint16_t index = 0U; index < characters_count; ++index) {
         payload[index] = message->characters[index];
     }
     return (int)size;
@@ -672,12 +672,10 @@ static inline int trio_character_transfer_encode(
 static inline int trio_character_transfer_decode(
     trio_character_transfer_t *message, const uint8_t *payload, size_t size)
 {
-    size_t characters_count;
-
     if ((size < 1U) || (size > 256U)) {
         return TRIO_ERROR_LENGTH;
     }
-    characters_count = size;
+    const size_t characters_count = size;
     message->characters_size = (uint16_t)characters_count;
     trio_copy_(message->characters, payload, characters_count);
     if (!trio_is_text_(message->characters, characters_count)) {
@@ -708,10 +706,27 @@ static inline int trio_character_transfer_to_frame(
 #define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE 12U
 #define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_FRAME_SIZE 16U
 #define TRIO_DIRECT_VARIABLE_TRANSFER_MAX_WIRE_SIZE 16U
+
 /* value = (raw * FACTOR + BIAS) / DIVISOR */
 #define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR 1
 #define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS 0
 #define TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR 4294967296LL
+#if TRIO_ENABLE_FLOAT
+static inline double trio_direct_variable_transfer_value_physical(int64_t raw)
+{
+    const double scaled = ((double)raw * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR) +
+        (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
+    return scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR;
+}
+
+static inline int trio_direct_variable_transfer_value_raw(double physical, int64_t *raw)
+{
+    const double scaled = (physical * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR) -
+        (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
+    const double steps = scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR;
+    return trio_nearest_int64_(steps, INT64_MIN, 9223372036854775807LL, raw);
+}
+#endif
 
 typedef struct trio_direct_variable_transfer {
     uint16_t number; /* Number of the variable */
@@ -763,23 +778,6 @@ static inline int trio_direct_variable_transfer_to_frame(
     }
     return trio_seal_1_to_15_(TRIO_DIRECT_VARIABLE_TRANSFER_ID, address, wire, capacity, size, true);
 }
-
-#if TRIO_ENABLE_FLOAT
-static inline double trio_direct_variable_transfer_value_physical(int64_t raw)
-{
-    const double scaled = ((double)raw * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR) +
-        (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
-    return scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR;
-}
-
-static inline int trio_direct_variable_transfer_value_raw(double physical, int64_t *raw)
-{
-    const double scaled = (physical * (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_DIVISOR) -
-        (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_BIAS;
-    const double steps = scaled / (double)TRIO_DIRECT_VARIABLE_TRANSFER_VALUE_FACTOR;
-    return trio_nearest_int64_(steps, INT64_MIN, 9223372036854775807LL, raw);
-}
-#endif
 
 /* ---- keypad_offset, id 0x03 (section Message types): Put a keypad into network mode and tell it where to
  * send its key presses.
@@ -846,7 +844,7 @@ static inline int trio_keypad_offset_to_frame(
 #define TRIO_KEYPAD_MODE_MESSAGE_MAX_WIRE_SIZE 3U
 
 typedef struct trio_keypad_mode_message {
-    uint8_t mode; /* Key down alone or key down and up; enum keypad_mode */
+    trio_keypad_mode_t mode; /* Key down alone or key down and up; enum keypad_mode */
 } trio_keypad_mode_message_t;
 
 #define TRIO_KEYPAD_MODE_MESSAGE_INIT { 0U }

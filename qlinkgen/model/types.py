@@ -264,6 +264,8 @@ class Blob:
 
     #: Bytes of one item.
     item_size: int = field(default=1, init=False)
+    #: What the number of its items is called.
+    quantity: str = field(default="size", init=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,6 +277,8 @@ class Array:
     default: tuple[int, ...] = ()
     #: The caller has to choose: none is written, and empty is not legal.
     required: bool = False
+    #: What the number of its items is called.
+    quantity: str = field(default="count", init=False)
 
     @property
     def item_size(self) -> int:

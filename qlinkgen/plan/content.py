@@ -28,7 +28,7 @@ from qlinkgen.plan.payload import (
     RunStep,
     Step,
     ValueStep,
-    conditions,
+    limits,
 )
 
 Raw = int | bytes | list[int]
@@ -129,8 +129,7 @@ def _member_bits(member: MemberValue | MemberConstant | MemberReserved, values: 
 
 
 def _checked(name: str, number: Scalar, value: object) -> int:
-    fits = isinstance(value, int) and number.natural_minimum <= value <= number.natural_maximum
-    if not isinstance(value, int) or not fits or broken(conditions(number), value):
+    if not isinstance(value, int) or broken(limits(number), value):
         raise Unsendable(name, value)
     return value
 

@@ -68,4 +68,5 @@ class OneOf:
         return any(each.holds(number) for each in self.ranges)
 
 
-Condition = Within | Clear | OneOf
+Limit = Within | Clear
+Condition = Limit | OneOf

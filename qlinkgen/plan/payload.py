@@ -7,14 +7,14 @@ consistent has values, so a decoder reports `length` before `range`, whatever th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Array, BitField, Bits, Blob, Enum, Flags, Length, Scalar
-from qlinkgen.plan.expr import Clear, Condition, Size, Within
+from qlinkgen.plan.expr import Clear, Limit, Size, Within
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class ValueStep:
     number: Scalar
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> tuple[Limit, ...]:
         """What must hold of the integer on the wire, beyond what its bits can hold."""
         return conditions(self.number)
 
@@ -103,7 +103,7 @@ class MemberValue:
     number: Scalar
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> tuple[Limit, ...]:
         """What must hold of the number, beyond what its bits can hold."""
         return conditions(self.number)
 
@@ -161,6 +161,8 @@ class BytesStep:
 
     #: Bytes of one item.
     item_size = 1
+    #: What the number of items is called.
+    quantity = "size"
 
     @property
     def fixed(self) -> bool:
@@ -180,6 +182,9 @@ class ItemsStep:
     default: tuple[int, ...]
     required: bool
 
+    #: What the number of items is called.
+    quantity = "count"
+
     @property
     def item_size(self) -> int:
         """Bytes of one item."""
@@ -191,7 +196,7 @@ class ItemsStep:
         return self.length.fixed
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> tuple[Limit, ...]:
         """What must hold of each item, beyond what its bits can hold."""
         return conditions(self.number)
 
@@ -261,6 +266,17 @@ class PayloadPlan:
             step for step in self.steps if isinstance(step, BytesStep | ItemsStep) and not step.fixed
         )
 
+    def least_of(self, known: Collection[str]) -> Size:
+        """Fewest bytes where only some runs have a known number of items; `size` where all have."""
+        fixed = sum(run.length.minimum * run.item_size for run in self.runs if run.name not in known)
+        return Size(self.size.fixed + fixed, tuple(term for term in self.size.terms if term.run in known))
+
+    def sendable(self, run: RunStep) -> Within:
+        """How many items may be sent: no more than each count of them can tell."""
+        counts = [step for step in self.steps if isinstance(step, CountStep) and step.run == run.name]
+        most = min([run.length.maximum, *(each.integer.maximum // each.scale for each in counts)])
+        return Within(run.length.minimum, most)
+
     def run(self, name: str) -> RunStep:
         """A run by its name, of fixed or variable size."""
         return next(
@@ -295,9 +311,14 @@ def least_size(step: Step) -> int:
             assert_never(step)
 
 
-def conditions(number: Scalar) -> tuple[Condition, ...]:
+def conditions(number: Scalar) -> tuple[Limit, ...]:
     """What must hold of a number on the wire, beyond what its bits can hold."""
-    found: list[Condition] = [] if number.full_range else [Within(number.minimum, number.maximum)]
+    return limits(number)[1:] if number.full_range else limits(number)
+
+
+def limits(number: Scalar) -> tuple[Limit, ...]:
+    """What must hold of any integer that is to be sent as a number."""
+    found: list[Limit] = [Within(number.minimum, number.maximum)]
     meaning = number.meaning
     match meaning:
         case Flags() if meaning.reserved_zero and (mask := number.integer.mask & ~meaning.mask):

@@ -29,6 +29,8 @@ _NAME = re.compile(NAME_PATTERN.removesuffix("$") + r"\Z")
 _BUILTIN = frozenset(dir(builtins))
 #: Macros that the C header defines for each message.
 _MESSAGE_MACROS = ("init", "id", "min_size", "max_size", "max_frame_size", "max_wire_size")
+#: The same for each scaled type.
+_TYPE_MACROS = ("factor", "bias", "divisor")
 _GLOBAL_MACROS = ("ok", "max_payload_size", "max_wire_size", "enable_float")
 
 
@@ -165,7 +167,7 @@ def _attributes(message: Message, address: str | None) -> Iterator[tuple[str, st
         called = f"'{value.name}' in {value.field.name}" if inside else f"'{value.name}'"
         yield value.name, called, place
         if isinstance(value.type, Array | Blob) and not value.field.fixed:
-            suffix = "count" if isinstance(value.type, Array) else "size"
+            suffix = value.type.quantity
             yield f"{value.name}_{suffix}", f"the {suffix} of '{value.name}'", place
 
 
@@ -196,12 +198,17 @@ def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
             for member in spec.values:
                 result = f"{prefix}_{upper(name)}_{upper(member)}"
                 yield result, f"'{member}' of {name}", (group, name, "values", member)
+    for stem, owner, macros, path in _macro_owners(file):
+        for macro in macros:
+            yield f"{prefix}_{upper(stem)}_{upper(macro)}", f"a constant of {owner}", path
+
+
+def _macro_owners(file: SchemaFile) -> Iterator[tuple[str, str, Sequence[str], Path]]:
+    """What constants of the C header belong to, and the last parts of their names."""
+    for name in file.types:
+        yield name, f"the type '{name}'", _TYPE_MACROS, ("types", name)
     for name in file.commands:
         for direction in ("request", "response"):
-            for macro in _MESSAGE_MACROS:
-                result = f"{prefix}_{upper(name)}_{upper(direction)}_{upper(macro)}"
-                yield result, f"a constant of {name}.{direction}", ("commands", name)
+            yield f"{name}_{direction}", f"{name}.{direction}", _MESSAGE_MACROS, ("commands", name)
     for name in file.messages:
-        for macro in _MESSAGE_MACROS:
-            result = f"{prefix}_{upper(_class_base(file, name))}_{upper(macro)}"
-            yield result, f"a constant of the message '{name}'", ("messages", name)
+        yield _class_base(file, name), f"the message '{name}'", _MESSAGE_MACROS, ("messages", name)

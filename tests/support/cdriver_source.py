@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qlinkgen.backends.c.encode import count_member
+from qlinkgen.backends.c.interface import count_member
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message, Value

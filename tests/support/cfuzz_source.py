@@ -165,8 +165,8 @@ class Harness:
         kind, ok = value.type, f"{self.c.upper}_OK"
         if not isinstance(kind, Scalar) or kind.scaling is None:
             return []
-        function, member = f"{self.c.function(message)}_{value.name}", f"message.{value.name}"
-        constant = f"{self.c.constant(message)}_{value.name.upper()}"
+        function, member = self.c.conversions(message, value.name, kind), f"message.{value.name}"
+        constant = function.upper()
         least, most = scalar_literal(kind, kind.minimum), scalar_literal(kind, kind.maximum)
         # A double holds every whole number of so many bits, and not every longer one.
         exact = kind.bits < 53

@@ -4,7 +4,7 @@
 #include <string.h>
 
 /* Milliseconds in a step of T1; T2 has the same steps. */
-#define STEP_MS (1000u * QLINK_NODE_SETUP_REQUEST_T1_DELAY_FACTOR / QLINK_NODE_SETUP_REQUEST_T1_DELAY_DIVISOR)
+#define STEP_MS (1000u * QLINK_TENTHS_FACTOR / QLINK_TENTHS_DIVISOR)
 
 static node_t *node_of(qlink_slave_t *slave)
 {

@@ -1,26 +1,45 @@
-"""Conditions under which a value is refused."""
+"""Conditions under which a value is refused, and how it gets from a struct to its bits and back."""
 
 from __future__ import annotations
 
-from qlinkgen.backends.c.names import literal, scalar_literal, storage, unsigned, unsigned_type
-from qlinkgen.model.types import Flags, Scalar
+from collections.abc import Iterable
+from typing import assert_never
+
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.names import literal, scalar_type, storage, unsigned, unsigned_type
+from qlinkgen.model.types import Scalar
+from qlinkgen.plan.expr import Clear, Limit, Within
+from qlinkgen.plan.payload import conditions, limits
 
 
-def refused_before_sending(scalar: Scalar, value: str) -> list[str]:
+def refused_before_sending(number: Scalar, value: str) -> list[str]:
     """Conditions on a struct member; its C type may hold more than the wire."""
-    if scalar.meaning == "bool":
+    if number.meaning == "bool":
         return []
-    width = storage(scalar.bits)
-    least = -(1 << (width - 1)) if scalar.signed else 0
-    most = (1 << (width - scalar.signed)) - 1
-    return _bounds(scalar, value, least, most) + _reserved_bits(scalar, value)
+    width = storage(number.bits)
+    held = Within(-(1 << (width - 1)) if number.signed else 0, (1 << (width - number.signed)) - 1)
+    return broken(limits(number), value, held, number.bits, signed=number.signed)
 
 
-def refused_when_received(scalar: Scalar, value: str) -> list[str]:
+def refused_when_received(number: Scalar, value: str) -> list[str]:
     """Conditions on a value that was read from its bits."""
-    return _bounds(scalar, value, scalar.natural_minimum, scalar.natural_maximum) + _reserved_bits(
-        scalar, value
-    )
+    held = Within(number.natural_minimum, number.natural_maximum)
+    return broken(conditions(number), value, held, number.bits, signed=number.signed)
+
+
+def broken(rules: Iterable[Limit], value: str, held: Within, bits: int, *, signed: bool = False) -> list[str]:
+    """Conditions of which one holds where a rule is broken; the value has so many bits and is in ``held``."""
+    terms: list[str] = []
+    for rule in rules:
+        match rule:
+            case Within():
+                terms += [f"{value} < {literal(rule.low, bits, signed=signed)}"] * (rule.low > held.low)
+                terms += [f"{value} > {literal(rule.high, bits, signed=signed)}"] * (rule.high < held.high)
+            case Clear():
+                terms.append(f"({value} & {unsigned(rule.mask, bits, hexadecimal=True)}) != 0U")
+            case _:
+                assert_never(rule)
+    return terms
 
 
 def condition(terms: list[str]) -> str:
@@ -28,56 +47,23 @@ def condition(terms: list[str]) -> str:
     return terms[0] if len(terms) == 1 else " || ".join(f"({term})" for term in terms)
 
 
-def _bounds(scalar: Scalar, value: str, least: int, most: int) -> list[str]:
-    terms = []
-    if scalar.minimum > least:
-        terms.append(f"{value} < {literal(scalar.minimum, scalar.bits, signed=scalar.signed)}")
-    if scalar.maximum < most:
-        terms.append(f"{value} > {literal(scalar.maximum, scalar.bits, signed=scalar.signed)}")
-    return terms
+def refusal(terms: list[str], error: str) -> list[str]:
+    """The statement that returns an error where a term holds; none where there are no terms."""
+    return [f"if ({condition(terms)}) {{", f"    return {error};", "}"] if terms else []
 
 
-def _reserved_bits(scalar: Scalar, value: str) -> list[str]:
-    flags = scalar.meaning
-    if not isinstance(flags, Flags) or not flags.reserved_zero:
-        return []
-    reserved = ((1 << scalar.bits) - 1) & ~flags.mask
-    return [f"({value} & {unsigned(reserved, scalar.bits, hexadecimal=True)}) != 0U"] if reserved else []
-
-
-def as_unsigned(scalar: Scalar, value: str) -> str:
+def as_unsigned(number: Scalar, value: str) -> str:
     """The expression of a struct member for writing it: its bits in an unsigned type."""
-    if scalar.meaning == "bool":
-        return f"({unsigned_type(scalar.bits)})({value} ? 1U : 0U)"
-    if scalar.signed or scalar.size == 1:
-        return f"({unsigned_type(scalar.bits)}){value}" if scalar.signed else value
-    return value
+    if number.meaning == "bool":
+        return f"({unsigned_type(number.bits)})({value} ? 1U : 0U)"
+    return f"({unsigned_type(number.bits)}){value}" if number.signed else value
 
 
-def from_unsigned(scalar: Scalar, raw: str, prefix: str) -> str:
+def from_unsigned(number: Scalar, raw: str, layouts: Layouts) -> str:
     """The expression that turns bits which were read into the struct member."""
-    if scalar.meaning == "bool":
+    if number.meaning == "bool":
         return f"{raw} != 0U"
-    if not scalar.signed:
+    if not number.signed:
         return raw
-    kind = f"int{storage(scalar.bits)}_t"
-    if scalar.bits == storage(scalar.bits):
-        return f"({kind}){raw}"
-    sign = unsigned(1 << (scalar.bits - 1), scalar.bits, hexadecimal=True)
-    return f"({kind}){prefix}_extend_{storage(scalar.bits)}_({raw}, {sign})"
-
-
-def constant_bits(scalar: Scalar) -> str:
-    """What a constant, reserved or default value is on the wire."""
-    return unsigned(scalar.default & ((1 << scalar.bits) - 1), scalar.bits, hexadecimal=True)
-
-
-__all__ = [
-    "as_unsigned",
-    "condition",
-    "constant_bits",
-    "from_unsigned",
-    "refused_before_sending",
-    "refused_when_received",
-    "scalar_literal",
-]
+    whole = raw if number.bits == storage(number.bits) else layouts.extend(raw, number.bits)
+    return f"({scalar_type(number)}){whole}"

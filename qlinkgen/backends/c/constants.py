@@ -43,15 +43,14 @@ def _all(protocol: Protocol) -> list[Enum | Flags]:
 
 
 def _view(each: Enum | Flags, names: Names) -> dict[str, Any]:
-    is_enum = isinstance(each, Enum)
-    signed = is_enum and any(member.value < 0 for member in each.members)
+    is_enum, signed = isinstance(each, Enum), _is_signed(each)
     kind = "Enum" if is_enum else "Flags"
     section = f" (section {each.section})" if each.section else ""
     doc = f": {each.doc}" if each.doc else ""
     return {
         "name": each.name,
         "is_enum": is_enum,
-        "type": integer_type(each.bits, signed=signed),
+        "type": constant_type(each),
         "title": c_text.comment_line(f"{kind} {each.name}{section}{doc}"),
         "members": [
             {
@@ -63,6 +62,15 @@ def _view(each: Enum | Flags, names: Names) -> dict[str, Any]:
             for member in each.members
         ],
     }
+
+
+def constant_type(each: Enum | Flags) -> str:
+    """The C type of the values of an enum or flags."""
+    return integer_type(each.bits, signed=_is_signed(each))
+
+
+def _is_signed(each: Enum | Flags) -> bool:
+    return isinstance(each, Enum) and any(member.value < 0 for member in each.members)
 
 
 def _number(member: Constant, each: Enum | Flags, *, signed: bool) -> str:

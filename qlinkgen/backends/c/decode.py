@@ -1,243 +1,168 @@
-"""The statements that read a message's payload: nothing is read that is not there, all is checked."""
+"""The statements that read a payload: its sizes first, then every step in wire order, each checked."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import assert_never
 
 from qlinkgen.backends.c import checks
-from qlinkgen.backends.c.encode import Cursor, count_member, loop
-from qlinkgen.backends.c.layout import Layouts, pointer
+from qlinkgen.backends.c.encode import item_offset, loop
+from qlinkgen.backends.c.extents import Learner, index_of, local, size_text
+from qlinkgen.backends.c.layout import pointer
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
-from qlinkgen.model.message import Field, Message
-from qlinkgen.model.types import Array, Bits, Blob, Scalar
+from qlinkgen.model.integer import Integer
+from qlinkgen.model.types import Scalar
+from qlinkgen.plan.expr import Within
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    Compare,
+    ConstantStep,
+    CountStep,
+    Infer,
+    ItemsStep,
+    Learn,
+    Member,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    Place,
+    ReservedStep,
+    RunStep,
+    Sizing,
+    Step,
+    ValueStep,
+)
 
 
 @dataclass
-class Decoder:
-    """Collects the statements for one message.
+class Decoder(Learner):
+    """Collects the statements for one message; afterwards `known` are all runs of variable size.
 
-    In a message with several fields of variable size, ``rest`` is how many bytes there are beyond the fewest:
-    each takes its share, and none may be left. One such field alone has all that ``size`` leaves. Either way
-    every fixed byte is known to be there before it is read.
+    No count is read before it is sure that its bytes are there.
     """
 
-    message: Message
-    prefix: str
-    layouts: Layouts
-    lines: list[str] = field(default_factory=list)
     #: Some byte of the payload is looked at.
     reads: bool = False
-    _cursor: Cursor = field(default_factory=Cursor)
-    _counted: set[str] = field(default_factory=set)
 
     def statements(self) -> list[str]:
-        """Lines of the function's body, behind the declarations."""
+        """Lines of the function's body, without the last one."""
         self._check_size()
-        for each in self.message.fields:
-            self._read(each)
-        if len(self.message.variable) > 1:
-            self._refuse(["rest != 0U"], "LENGTH")
+        for each in self.payload.sizing:
+            self._size(each)
+        for step in self.payload.steps:
+            self._read(step)
         return self.lines
 
-    @property
-    def uses_place(self) -> bool:
-        """A field stands behind one of variable size."""
-        return self._cursor.moved
-
-    @property
-    def uses_rest(self) -> bool:
-        """The bytes beyond the fewest are counted."""
-        return len(self.message.variable) > 1
-
-    @property
-    def counters(self) -> list[str]:
-        """Fields whose number of items is held in a local variable, in wire order."""
-        return [each.name for each in self.message.variable]
-
-    def _refuse(self, terms: list[str], status: str, indent: str = "") -> None:
-        if terms:
-            upper = self.prefix.upper()
-            lines = [f"if ({checks.condition(terms)}) {{", f"    return {upper}_ERROR_{status};", "}"]
-            self.lines += [indent + line for line in lines]
+    # Sizes
 
     def _check_size(self) -> None:
-        message = self.message
-        if not message.variable:
-            self._refuse([f"size != {message.max_size}U"], "LENGTH")
+        plan = self.payload
+        if plan.fixed:
+            self.refuse([f"size != {plan.most}U"], "LENGTH")
             return
-        known = 1 if message.empty_is_default else 0  # no bytes at all have been dealt with before
-        terms = [f"size < {message.min_size}U"] if message.min_size > known else []
-        self._refuse([*terms, f"size > {message.max_size}U"], "LENGTH")
-        if self.uses_rest:
-            self.lines.append(f"rest = {_less('size', message.min_size)};")
+        known = 1 if plan.empty_is_default else 0  # no bytes at all have been dealt with before
+        terms = [f"size < {plan.least}U"] if plan.least > known else []
+        self.refuse([*terms, f"size > {plan.most}U"], "LENGTH")
 
-    def _read(self, each: Field) -> None:
-        kind = each.type
-        if isinstance(kind, Scalar):
-            self._read_scalar(each, kind)
-        elif isinstance(kind, Bits):
-            self._read_bits(kind)
-        else:
-            self._read_run(each, kind)
+    def _size(self, each: Sizing) -> None:
+        match each:
+            case Learn():
+                self.learn(each.count)
+                whole = len(self.known) == len(self.payload.runs)
+                self.refuse([f"size {'!=' if whole else '<'} {grouped(self.least)}"], "LENGTH")
+            case Compare():
+                count = each.count
+                items = f"({count.scale}U * {local(count.run)})" if count.scale > 1 else local(count.run)
+                number, own = self.number(count), Within(0, count.integer.maximum)
+                negative = checks.broken([own], number, Within(0, count.integer.mask), count.integer.bits)
+                self.refuse([f"{number} != {items}", *negative], "LENGTH")
+            case Infer():
+                self._infer(each.run, size_text(each.others, local))
+            case _:
+                assert_never(each)
 
-    # Integers
-
-    def _get(self, scalar: Scalar) -> str:
-        if misfit := self.layouts.misfit(scalar, "payload", self._cursor.index()):
-            self._refuse([misfit], "RANGE")
-        self.reads = True
-        value = self.layouts.get(scalar, "payload", self._cursor.index())
-        self._cursor.offset += scalar.size
-        return value
-
-    def _read_scalar(self, each: Field, scalar: Scalar) -> None:
-        if scalar.reserved:
-            self._cursor.offset += scalar.size
-        elif scalar.counts:
-            self._read_count(scalar)
-        elif scalar.constant:
-            self._refuse([f"{self._get(scalar)} != {checks.constant_bits(scalar)}"], "RANGE")
-        elif scalar.meaning == "bool":
-            value = self._get(scalar)
-            self._refuse([f"{value} > 1U"], "RANGE")
-            self.lines.append(f"message->{each.name} = {value} != 0U;")
-        else:
-            self._assign(f"message->{each.name}", scalar, self._get(scalar))
-
-    def _assign(self, target: str, scalar: Scalar, raw: str, indent: str = "") -> None:
-        self.lines.append(f"{indent}{target} = {checks.from_unsigned(scalar, raw, self.prefix)};")
-        self._refuse(checks.refused_when_received(scalar, target), "RANGE", indent)
-
-    def _read_count(self, scalar: Scalar) -> None:
-        counted = next(each for each in self.message.fields if each.name == scalar.counts)
-        assert isinstance(counted.type, Array | Blob)
-        value, name, length = self._get(scalar), counted.name, counted.type.length
-        scale = counted.type.item_size if scalar.counts_unit == "bytes" else 1
-        if length.fixed:
-            self._refuse([f"{value} != {unsigned(length.maximum * scale, scalar.bits)}"], "LENGTH")
-        elif name in self._counted:
-            expected = f"({scale}U * {name}_count)" if scale > 1 else f"{name}_count"
-            self._refuse([f"{value} != {expected}"], "LENGTH")
-        else:
-            self._bound_count(name, value, scalar, counted.type, scale)
-
-    def _bound_count(self, name: str, value: str, scalar: Scalar, kind: Array | Blob, scale: int) -> None:
-        self._counted.add(name)
-        if scale > 1:
-            self._refuse([f"({value} % {scale}U) != 0U"], "LENGTH")
-        count, most = f"{value} / {scale}U" if scale > 1 else value, kind.length.maximum
-        terms = [f"{name}_count < {kind.length.minimum}U"] if kind.length.minimum else []
-        if scalar.bits > 16:  # more than a size_t may hold
-            self._refuse([f"{value} > {unsigned(most * scale, scalar.bits)}"], "LENGTH")
-            count = f"(size_t)({count})"
-        elif most * scale < scalar.natural_maximum:
-            terms.append(f"{name}_count > {most}U")
-        self.lines.append(f"{name}_count = {count};")
-        self._refuse(terms, "LENGTH")
-
-    def _read_bits(self, kind: Bits) -> None:
-        raw_type, bits = unsigned_type(kind.container.bits), kind.container.bits
-        outer, self.lines = self.lines, []
-        value = self._get(kind.container)
-        outer += self.lines
-        self.lines = [f"const {raw_type} bits = {value};"]
-        for member in kind.members:
-            raw = _taken(member.shift, member.type, bits)
-            if member.type.settable:
-                self._assign(f"message->{member.name}", member.type, raw)
-            elif member.type.constant:
-                expected = unsigned(
-                    member.type.default & ((1 << member.type.bits) - 1), bits, hexadecimal=True
-                )
-                self._refuse([f"{raw} != {expected}"], "RANGE")
-        self.lines = [*outer, "{", *(f"    {line}" for line in self.lines), "}"]
-
-    # Fields of several items
-
-    def _read_run(self, each: Field, kind: Array | Blob) -> None:
-        if kind.length.fixed:
-            count = f"{kind.length.maximum}U"
-        else:
-            self._take_share(each, kind)
-            count = f"{each.name}_count"
-            member = count_type(kind.length.maximum)
-            self.lines.append(f"message->{count_member(each)} = ({member}){count};")
-        self.reads = True
-        if isinstance(kind, Blob):
-            self._read_blob(each, kind, count)
-        else:
-            self._read_items(each, kind, count)
-        if kind.length.fixed:
-            self._cursor.offset += kind.length.maximum * kind.item_size
-        elif self._reads_behind(each):
-            step = kind.item_size
-            self.lines.append(self._cursor.pass_over(f"({step}U * {count})" if step > 1 else count))
-
-    def _reads_behind(self, each: Field) -> bool:
-        """A later field is looked at: reserved bytes are not."""
-        fields = self.message.fields
-        later = fields[fields.index(each) + 1 :]
-        return any(not (isinstance(other.type, Scalar) and other.type.reserved) for other in later)
-
-    def _read_blob(self, each: Field, kind: Blob, count: str) -> None:
-        place = pointer("payload", self._cursor.index())
-        self.lines.append(f"{self.prefix}_copy_(message->{each.name}, {place}, {count});")
-        if kind.text:
-            self._refuse([f"!{self.prefix}_is_text_(message->{each.name}, {count})"], "RANGE")
-
-    def _read_items(self, each: Field, kind: Array, count: str) -> None:
-        outer, self.lines = self.lines, []
-        index = self._cursor.index("index" if kind.item_size == 1 else f"({kind.item_size}U * index)")
-        if misfit := self.layouts.misfit(kind.item, "payload", index):
-            self._refuse([misfit], "RANGE")
-        raw = self.layouts.get(kind.item, "payload", index)
-        self._assign(f"message->{each.name}[index]", kind.item, raw)
-        self.lines = outer + loop(count, self.lines)
-
-    def _take_share(self, each: Field, kind: Array | Blob) -> None:
-        """Find how many items there are, and take their bytes from the rest."""
-        least, step = kind.length.minimum * kind.item_size, kind.item_size
-        counted, alone = each.name in self._counted, len(self.message.variable) == 1
-        share = f"({step}U * {each.name}_count)" if step > 1 else f"{each.name}_count"
-        if alone:
-            left = _less("size", self.message.min_size - least)
-            if counted:
-                self._refuse([f"{share} != {grouped(left)}"], "LENGTH")
-            else:  # bounded by the size of the message
-                self._count_items(each, left, step)
-            return
-        if not counted:
-            self._measure(each, kind)
-        share = _less(share, least)
-        self._refuse([f"{grouped(share)} > rest"], "LENGTH")
-        self.lines.append(f"rest -= {share};")
-
-    def _count_items(self, each: Field, left: str, step: int) -> None:
-        if step > 1:
+    def _infer(self, run: RunStep, others: str) -> None:
+        left, length = "size" if others == "0U" else f"size - {grouped(others)}", run.length
+        if run.item_size > 1:
             left = grouped(left)
-            self._refuse([f"({left} % {step}U) != 0U"], "LENGTH")
-            left = f"{left} / {step}U"
-        self.lines.append(f"{each.name}_count = {left};")
+            self.refuse([f"({left} % {run.item_size}U) != 0U"], "LENGTH")
+            left = f"{left} / {run.item_size}U"
+        self.lines.append(f"const size_t {local(run.name)} = {left};")
+        if self.known:  # else its bounds are those of the size
+            self.refuse([f"{local(run.name)} > {length.maximum}U"], "LENGTH")
+        self.known.append(run.name)
 
-    def _measure(self, each: Field, kind: Array | Blob) -> None:
-        """The last field of variable size takes what the counted ones before it leave."""
-        left = "rest"
-        if kind.item_size > 1:
-            self._refuse([f"(rest % {kind.item_size}U) != 0U"], "LENGTH")
-            left = f"(rest / {kind.item_size}U)"
-        least = kind.length.minimum
-        self.lines.append(
-            f"{each.name}_count = {left} + {least}U;" if least else f"{each.name}_count = {left};"
-        )
-        self._refuse([f"{each.name}_count > {kind.length.maximum}U"], "LENGTH")
+    # Values
 
+    def _read(self, step: Step) -> None:
+        target = f"message->{step.name}"
+        match step:
+            case ValueStep():
+                self._assign(target, step.number, self._get(step.place, step.integer))
+            case ConstantStep():
+                pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
+                self.refuse([f"{self._get(step.place, step.integer)} != {pattern}"], "RANGE")
+            case ReservedStep():
+                pass
+            case CountStep():
+                self._get(step.place, step.integer)
+            case BitsStep():
+                raw = self._get(step.place, step.integer)
+                outer, self.lines = self.lines, [f"const {unsigned_type(step.integer.bits)} bits = {raw};"]
+                for member in step.members:
+                    self._member(member, step.integer.bits)
+                self.lines = [*outer, "{", *(f"    {line}" for line in self.lines), "}"]
+            case BytesStep():
+                count, place = self._number_of(step), pointer("payload", index_of(step.place, local))
+                prefix = self.layouts.prefix
+                self.lines.append(f"{prefix}_copy_({target}, {place}, {count});")
+                if step.text:
+                    self.refuse([f"!{prefix}_is_text_({target}, {count})"], "RANGE")
+            case ItemsStep():
+                count = self._number_of(step)
+                outer, self.lines = self.lines, []
+                self._assign(
+                    f"{target}[index]", step.number, self._get(step.place, step.item, item_offset(step))
+                )
+                self.lines = outer + loop(count, self.lines)
+            case _:
+                assert_never(step)
 
-def _less(value: str, number: int) -> str:
-    return f"{value} - {number}U" if number else value
+    def _get(self, place: Place, integer: Integer, further: str = "") -> str:
+        """The bits of an integer, once it is checked that they are those of one."""
+        index = index_of(place, local, further)
+        self.reads = True
+        if misfit := self.layouts.misfit(integer, "payload", index):
+            self.refuse([misfit], "RANGE")
+        return self.layouts.get(integer, "payload", index)
 
+    def _assign(self, target: str, number: Scalar, raw: str) -> None:
+        if number.meaning == "bool":  # the bits are checked: a bool has no wrong value
+            self.refuse(checks.refused_when_received(number, raw), "RANGE")
+        self.lines.append(f"{target} = {checks.from_unsigned(number, raw, self.layouts)};")
+        if number.meaning != "bool":
+            self.refuse(checks.refused_when_received(number, target), "RANGE")
 
-def _taken(shift: int, scalar: Scalar, bits: int) -> str:
-    mask = unsigned((1 << scalar.bits) - 1, bits, hexadecimal=True)
-    moved = f"(bits >> {shift})" if shift else "bits"
-    taken = f"({moved} & {mask})"
-    return taken if scalar.meaning == "bool" else f"({unsigned_type(scalar.bits)}){taken}"
+    def _member(self, member: Member, bits: int) -> None:
+        mask = unsigned((1 << member.bits) - 1, bits, hexadecimal=True)
+        raw = f"({f'(bits >> {member.shift})' if member.shift else 'bits'} & {mask})"
+        match member:
+            case MemberValue():
+                kind = "" if member.number.meaning == "bool" else f"({unsigned_type(member.bits)})"
+                self._assign(f"message->{member.name}", member.number, f"{kind}{raw}")
+            case MemberConstant():
+                self.refuse([f"{raw} != {unsigned(member.value, bits, hexadecimal=True)}"], "RANGE")
+            case MemberReserved():
+                pass
+            case _:
+                assert_never(member)
+
+    def _number_of(self, run: RunStep) -> str:
+        """How many items there are; where that varies, the message is told."""
+        self.reads = True
+        if run.fixed:
+            return f"{run.length.maximum}U"
+        kind, number = count_type(run.length.maximum), local(run.name)
+        self.lines.append(f"message->{run.name}_{run.quantity} = ({kind}){number};")
+        return number

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from qlinkgen.backends.c.dispatch import member_name, told_name
 from qlinkgen.backends.c.names import Names
-from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake
-from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Scalar
+from qlinkgen.plan.payload import MemberValue, ValueStep
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 if TYPE_CHECKING:
     from qlinkgen.backends.c.frames import FrameSection
@@ -34,38 +33,38 @@ def option_lines(upper: str, check: dict[str, Any] | None) -> list[str]:
     return [f"{name:<{width}}  {what}" for name, what in options]
 
 
-def example_lines(
-    protocol: Protocol, names: Names, section: FrameSection, kept: tuple[Message, ...], role: str
-) -> list[str]:
+def example_lines(plan: Plan, names: Names, section: FrameSection) -> list[str]:
     """A slave where the header has one, else a master or a listener."""
-    if protocol.directions == ("message",):
-        return _listener(names, section, kept[0], "listener")
-    present = {message.name for message in kept}
-    commands = [c for c in protocol.commands if c.response and {c.request.name, c.response.name} <= present]
-    if role != "master" and commands:
-        return _slave(names, section, max(commands, key=_weight))
-    responses = [m for m in kept if m.direction != "request" and m.values]
+    if plan.protocol.directions == ("message",):
+        return _listener(names, section, plan.messages[0], "listener")
+    pairs = [
+        (command, plan.by_name[command.request.name], plan.by_name[command.response.name])
+        for command in plan.commands
+        if command.response and command.response.name in plan.by_name
+    ]
+    if plan.role != "master" and pairs:
+        return _slave(names, section, *max(pairs, key=lambda pair: _weight(*pair[1:])))
+    responses = [m for m in plan.messages if m.direction != "request" and m.payload.settable]
     if section.slave_only or not responses:
         return [f'#include "{names.prefix}.h"']
-    return _listener(names, section, max(responses, key=lambda m: len(m.values)), "master")
+    return _listener(names, section, max(responses, key=lambda m: len(m.payload.settable)), "master")
 
 
-def _weight(command: Command) -> tuple[bool, int]:
-    response = command.response
-    assert response is not None
-    both = bool(command.request.values) and bool(response.values)
-    return both, len(command.request.values) + len(response.values)
+def _weight(request: MessagePlan, response: MessagePlan) -> tuple[bool, int]:
+    asked, told = len(request.payload.settable), len(response.payload.settable)
+    return bool(asked and told), asked + told
 
 
-def _slave(names: Names, section: FrameSection, command: Command) -> list[str]:
-    p, name, request, response = names.prefix, snake(command.name), command.request, command.response
-    assert response is not None
+def _slave(
+    names: Names, section: FrameSection, command: Command, request: MessagePlan, response: MessagePlan
+) -> list[str]:
+    p, name = names.prefix, snake(command.name)
     parameters = [f"{p}_slave_t *own"]
-    parameters += [f"const {names.function(request)}_t *request"] if request.values else []
-    parameters += [f"{names.function(response)}_t *response"] if response.values else []
+    parameters += [f"const {names.function(request.message)}_t *request"] if request.payload.settable else []
+    parameters += [f"{names.function(response.message)}_t *response"] if response.payload.settable else []
     echo, address = _echo(request, response), section.view["address"]
-    used = any("request->" in line for line in echo)
-    unused = [f"    (void){each};" for each in ["own", *(["request"] if request.values and not used else [])]]
+    ignored = request.payload.settable and not any("request->" in line for line in echo)
+    unused = [f"    (void){each};" for each in ["own", *(["request"] if ignored else [])]]
     return [
         *_start(p),
         f"static {p}_slave_t slave;",
@@ -98,11 +97,11 @@ def _slave(names: Names, section: FrameSection, command: Command) -> list[str]:
     ]
 
 
-def _listener(names: Names, section: FrameSection, message: Message, role: str) -> list[str]:
+def _listener(names: Names, section: FrameSection, message: MessagePlan, role: str) -> list[str]:
     p, address = names.prefix, section.view["address"]
-    entry = told_name(names, message)
+    entry = told_name(names, message.message)
     whose = [f"{section.view['address_type']} {address}"] if address else []
-    taken = [f"const {names.function(message)}_t *message"] if message.values else []
+    taken = [f"const {names.function(message.message)}_t *message"] if message.payload.settable else []
     parameters = [f"{p}_{role}_t *own", *whose, *taken]
     unused = [
         f"    (void){each};"
@@ -135,14 +134,18 @@ def _direction(names: Names, section: FrameSection, direction: str) -> str:
     return f", {names.upper}_{direction}" if section.view["needs_direction"] else ""
 
 
-def _echo(request: Message, response: Message) -> list[str]:
+def _echo(request: MessagePlan, response: MessagePlan) -> list[str]:
     """What both have is returned; that shows how fields are reached."""
-    asked = {value.name: value.type for value in request.values if isinstance(value.type, Scalar)}
-    same = [v.name for v in response.values if isinstance(v.type, Scalar) and v.name in asked]
-    if same:
+    asked, told = _numbers(request), _numbers(response)
+    if same := [name for name in told if name in asked]:
         return [f"    response->{name} = request->{name};" for name in same]
-    first = next((value.name for value in response.values if isinstance(value.type, Scalar)), None)
-    return [f"    response->{first} = 1;"] if first else ["    (void)response;"] if response.values else []
+    if told:
+        return [f"    response->{told[0]} = 1;"]
+    return ["    (void)response;"] if response.payload.settable else []
+
+
+def _numbers(message: MessagePlan) -> list[str]:
+    return [each.name for each in message.payload.settable if isinstance(each, ValueStep | MemberValue)]
 
 
 def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: str) -> list[str]:

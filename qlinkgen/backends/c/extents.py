@@ -1,91 +1,122 @@
-"""Frames without a length: how the size of a payload follows from its own bytes."""
+"""Numbers of items and bytes, and how the size of a payload follows from its own bytes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from qlinkgen.backends.c.checks import condition
-from qlinkgen.backends.c.names import Names, grouped, unsigned
-from qlinkgen.model.message import Field, Message
-from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.backends.c.checks import broken, refusal
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.names import Names, grouped
+from qlinkgen.model.message import Message
+from qlinkgen.plan.expr import Size, Within
+from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place, payload_plan
+from qlinkgen.plan.tree import MessagePlan
 
-#: The expression for an integer at an index of an array.
-Get = Callable[[Scalar, str, str], str]
+
+def size_text(size: Size, count: Callable[[str], str]) -> str:
+    """A number of bytes; ``count`` spells how many items a run has, as a size_t."""
+    terms = [f"{size.fixed}U"] if size.fixed or not size.terms else []
+    for term in size.terms:
+        number = count(term.run)
+        terms.append(f"({term.factor}U * {number})" if term.factor > 1 else number)
+    return " + ".join(terms)
 
 
-def extents(names: Names, messages: tuple[Message, ...], get: Get) -> list[dict[str, Any]]:
-    """The statements for each message."""
+def size_terms(message: Message, struct: str) -> str:
+    """The size of a payload; ``struct`` is what its counts are members of."""
+    plan = payload_plan(message)
+    members = {run.name: f"(size_t){struct}{run.name}_{run.quantity}" for run in plan.runs}
+    return size_text(plan.size, members.__getitem__)
+
+
+def local(run: str) -> str:
+    """The variable that holds how many items a run has."""
+    return f"{run}_count"
+
+
+def local_size(run: str) -> str:
+    """The same where the variable has a type of its own."""
+    return f"(size_t){run}_count"
+
+
+def index_of(place: Place, count: Callable[[str], str], further: str = "") -> str:
+    """The place of a step as an index, from the front or, where that varies, from the end."""
+    if place.front.terms and place.back is not None:
+        at = f"size - {place.back}U"
+    else:
+        at = size_text(place.front, count)
+    if not further:
+        return at if place.front.terms else str(place.front.fixed)
+    return further if at == "0U" else f"{at} + {further}"
+
+
+@dataclass
+class Learner:
+    """Collects the statements that learn how many items runs have from the counts in a payload."""
+
+    payload: PayloadPlan
+    layouts: Layouts
+    lines: list[str] = field(default_factory=list)
+    #: Runs whose number of items is a local variable.
+    known: list[str] = field(default_factory=list)
+
+    def refuse(self, terms: list[str], status: str) -> None:
+        """Return an error where a term holds."""
+        self.lines += refusal(terms, f"{self.layouts.prefix.upper()}_ERROR_{status}")
+
+    def number(self, count: CountStep) -> str:
+        """What a count says."""
+        return self.layouts.peek(count.integer, "payload", index_of(count.place, local))
+
+    def learn(self, count: CountStep) -> None:
+        """The number of items of the run that is counted, if it is one that it may have."""
+        integer, number, wide = count.integer, self.number(count), count.integer.bits > 16
+        held, most = Within(0, integer.mask), min(count.bounds.high, integer.maximum)
+        bounds = Within(count.bounds.low, most)
+        if wide:  # more than a size_t may hold
+            self.refuse(broken([bounds], number, held, integer.bits), "LENGTH")
+        if count.scale > 1:
+            self.refuse([f"({number} % {count.scale}U) != 0U"], "LENGTH")
+            number, held = f"{number} / {count.scale}U", Within(0, integer.mask // count.scale)
+            bounds = Within(bounds.low // count.scale, bounds.high // count.scale)
+        self.lines.append(
+            f"const size_t {local(count.run)} = {f'(size_t){grouped(number)}' if wide else number};"
+        )
+        if not wide:
+            self.refuse(broken([bounds], local(count.run), held, 16), "LENGTH")
+        self.known.append(count.run)
+
+    @property
+    def least(self) -> str:
+        """Fewest bytes of the payload, as far as counts are known."""
+        return size_text(self.payload.least_of(self.known), local)
+
+
+def extents(names: Names, messages: Iterable[MessagePlan], layouts: Layouts) -> list[dict[str, Any]]:
+    """The statements that find the size of each message."""
     return [
-        {"constant": names.constant(message), "lines": _Extent(message, names.upper, get).statements()}
+        {
+            "constant": names.constant(message.message),
+            "lines": _extent(Learner(message.payload, layouts)),
+        }
         for message in messages
     ]
 
 
-@dataclass
-class _Extent:
-    """Collects the statements for one message.
-
-    ``passed`` names the variables of the fields of variable size before the current place: how many bytes
-    each has beyond its fewest.
-    """
-
-    message: Message
-    upper: str
-    get: Get
-    lines: list[str] = field(default_factory=list)
-    passed: list[str] = field(default_factory=list)
-
-    def statements(self) -> list[str]:
-        """Lines of the case, which return in the end."""
-        fields = {each.name: each for each in self.message.fields}
-        offset = 0
-        for each in self.message.fields:
-            if isinstance(each.type, Scalar) and (counted := fields.get(each.type.counts)):
-                self._count(each.name, each.type, counted, offset)
-            if not each.fixed:
-                self.passed.append(f"{each.name}_more")
-            offset += each.min_size
-        first = f"*size = {self.message.min_size}U;"
-        if not self.passed:
-            return [first, f"return {self.upper}_OK;"]
-        enough = f"return (available < *size) ? {self.upper}_ERROR_TRUNCATED : {self.upper}_OK;"
-        return ["{", *(f"    {line}" for line in [first, *self.lines, enough]), "}"]
-
-    def _count(self, name: str, scalar: Scalar, counted: Field, offset: int) -> None:
-        kind = counted.type
-        assert isinstance(kind, Array | Blob)
-        if kind.length.counted_by != name:  # another count tells the end; decoding compares the two
-            return
-        self._refuse(f"available < {grouped(self._place(offset + scalar.size))}", "TRUNCATED")
-        value = self.get(scalar, "payload", self._place(offset) or "0")
-        self._bound(scalar, kind, value)
-        more = f"{counted.name}_more"
-        self.lines += [f"const size_t {more} = {self._more(scalar, kind, value)};", f"*size += {more};"]
-
-    def _place(self, offset: int) -> str:
-        """An index after the fields that were passed, "" for the first byte."""
-        return " + ".join([*self.passed, *([f"{offset}U"] if offset else [])])
-
-    def _bound(self, scalar: Scalar, kind: Array | Blob, value: str) -> None:
-        scale = kind.item_size if scalar.counts_unit == "bytes" else 1
-        least, most = kind.length.minimum * scale, kind.length.maximum * scale
-        terms = [f"{value} < {least}U"] if least else []
-        if most < scalar.natural_maximum:
-            terms.append(f"{value} > {unsigned(most, max(scalar.bits, 16))}")
-        if scale > 1:
-            terms.append(f"({value} % {scale}U) != 0U")
-        if terms:
-            self._refuse(condition(terms), "LENGTH")
-
-    @staticmethod
-    def _more(scalar: Scalar, kind: Array | Blob, value: str) -> str:
-        """Bytes of the field beyond the fewest."""
-        step = 1 if scalar.counts_unit == "bytes" else kind.item_size
-        least = kind.length.minimum * kind.item_size
-        times = f"({step}U * (size_t){value})" if step > 1 else f"(size_t){value}"
-        return f"{times} - {least}U" if least else times
-
-    def _refuse(self, terms: str, status: str) -> None:
-        self.lines += [f"if ({terms}) {{", f"    return {self.upper}_ERROR_{status};", "}"]
+def _extent(learner: Learner) -> list[str]:
+    """Lines of the case, which return in the end."""
+    upper = learner.layouts.prefix.upper()
+    ok, truncated = f"{upper}_OK", f"{upper}_ERROR_TRUNCATED"
+    learner.lines.append(f"*size = {learner.payload.least}U;")
+    for each in learner.payload.sizing:
+        if isinstance(each, Learn):
+            end = size_text(each.count.place.front + each.count.integer.size, local)
+            learner.refuse([f"available < {grouped(end)}"], "TRUNCATED")
+            learner.learn(each.count)
+            learner.lines.append(f"*size = {learner.least};")
+    if not learner.known:
+        return [*learner.lines, f"return {ok};"]
+    enough = f"return (available < *size) ? {truncated} : {ok};"
+    return ["{", *(f"    {line}" for line in [*learner.lines, enough]), "}"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from qlinkgen.backends.c.encode import size_terms
+from qlinkgen.backends.c.extents import size_terms
 from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
 from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message

@@ -15,15 +15,17 @@ from qlinkgen.backends.c.example import example_lines, option_lines
 from qlinkgen.backends.c.extents import extents
 from qlinkgen.backends.c.frames import FrameSection, frame_section
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.messages import MessageWriter, extended_widths, nearest_helpers
+from qlinkgen.backends.c.messages import MessageWriter, nearest_helpers
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.tidy import tidy
+from qlinkgen.backends.c.types import Types
 from qlinkgen.model import sizes
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.naming import snake
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Blob
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.payload import BytesStep
 
 
 class Header:
@@ -32,10 +34,13 @@ class Header:
     def __init__(self, protocol: Protocol, options: Options, templates: jinja2.Environment) -> None:
         """What is kept is decided once, here."""
         self._protocol = protocol
+        self._plan = plan_of(protocol, options)
         self._options = options
         self._templates = templates
         self._names = Names(protocol)
         self._layouts = Layouts(protocol.name)
+        self._types = Types(self._plan, self._names)
+        self._writer = MessageWriter(self._names, self._layouts, self._types)
         self._kept = tuple(message for message in protocol.messages if self._wanted(message))
         self._present = {message.name for message in self._kept}
         self._section = frame_section(protocol, self._layouts)
@@ -126,8 +131,11 @@ class Header:
             unused = [*unheard, *([view["address"]] if view["address"] and not limited else [])]
             texts.append(self._place("admit", f=view, admits=admits, unused=unused))
         if view["needs_extent"]:
-            get = self._layouts.get
-            sizes_known = [{"direction": d, "messages": extents(names, m, get)} for d, m in received]
+            plans = self._plan.by_name
+            sizes_known = [
+                {"direction": d, "messages": extents(names, [plans[m.name] for m in heard], self._layouts)}
+                for d, heard in received
+            ]
             texts.append(self._place("extent", f=view, extents=sizes_known, unused=unheard))
         return texts
 
@@ -140,8 +148,7 @@ class Header:
         return f"#define {self._names.constant(message)}_ID 0x{message.id:02X}\n"
 
     def _message(self, message: Message) -> str:
-        writer = MessageWriter(self._protocol, self._names, self._layouts)
-        view = writer.render(message, encoded=self._encoded(message), decoded=self._decoded(message))
+        view = self._writer.render(self._plan.by_name[message.name])
         view["early_id"] = self._section.needs_ids
         if self._encoded(message):
             view["to_frame"] = self._section.to_frame(self._names, self._address, message)
@@ -189,24 +196,29 @@ class Header:
         return [{**entry, **self._section.slave_entry(entry, self._names.upper)} for entry in entries]
 
     def _head(self) -> dict[str, Any]:
-        protocol = self._protocol
+        protocol, runs = self._protocol, self._byte_runs()
         return {
             "banner": [piece for line in banner(protocol) for piece in c_text.comment(line, WIDTH)],
             "about": c_text.comment(protocol.doc, WIDTH),
             "options": option_lines(self._names.upper, self._section.check),
-            "example": example_lines(protocol, self._names, self._section, self._kept, self._options.role),
+            "example": example_lines(self._plan, self._names, self._section),
             "max_wire_size": max(
                 sizes.protocol_max_wire_size(protocol), self._section.view.get("max_wire", 0)
             ),
             "limits": limits(protocol, self._kept),
             "enums": enum_views(protocol, self._names),
             "helpers": self._layouts.helpers(),
-            "has_text": any(isinstance(f.type, Blob) and f.type.text for m in self._kept for f in m.fields),
-            "has_bytes": any(isinstance(f.type, Blob) for m in self._kept for f in m.fields),
+            "has_text": any(run.text for run in runs),
+            "has_bytes": bool(runs),
             "has_table": bool(self._section.check and self._section.check["is_crc"]),
-            "extended": extended_widths(self._kept),
-            "nearest": nearest_helpers(self._kept),
+            "extended": sorted(self._layouts.extended),
+            "nearest": nearest_helpers(self._types, self._plan.messages),
+            "types": list(self._types.named.values()),
         }
+
+    def _byte_runs(self) -> list[BytesStep]:
+        steps = (step for message in self._plan.messages for step in message.payload.steps)
+        return [step for step in steps if isinstance(step, BytesStep)]
 
 
 __all__ = ["FrameSection", "Header"]

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qlinkgen.backends.c.dispatch import slave_entries, told_name
-from qlinkgen.backends.c.encode import count_member
 from qlinkgen.backends.c.frames import frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
+from qlinkgen.backends.c.types import Types
 from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.plan import plan_of
 
-__all__ = ["Interface", "interface"]
+__all__ = ["Interface", "count_member", "interface"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Interface:
     """
 
     names: Names
+    types: Types
     id: str
     id_bits: int
     address: str
@@ -75,6 +77,11 @@ class Interface:
         """The struct member that says how much of a field of variable size there is."""
         return count_member(field)
 
+    def conversions(self, message: Message, value: str, number: Scalar) -> str:
+        """What the names of the functions begin with that convert a scaled value."""
+        kind = self.types.conversions(message, value, number)
+        return kind.stem if kind else ""
+
     def slave_member(self, message: Message) -> str:
         """The member of the slave's struct that handles a request."""
         (entry,) = slave_entries(self.names, (message,))
@@ -93,12 +100,20 @@ class Interface:
         return _bits(count_type(most)) // 8
 
 
+def count_member(field: Field) -> str:
+    """The struct member that says how much of a field of variable size there is."""
+    assert isinstance(field.type, Array | Blob)
+    return f"{field.name}_{field.type.quantity}"
+
+
 def interface(protocol: Protocol) -> Interface:
     """Describe the header of a protocol."""
+    names = Names(protocol)
     frame, section = protocol.frame, frame_section(protocol, Layouts(protocol.name))
     view = section.view
     return Interface(
-        names=Names(protocol),
+        names=names,
+        types=Types(plan_of(protocol), names),
         id=view["id"],
         id_bits=_bits(view["id_type"]),
         address=view["address"] or "",

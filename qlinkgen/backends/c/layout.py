@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from qlinkgen.backends.c.names import unsigned, unsigned_type
-from qlinkgen.model.types import Chunk, Scalar
+from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
+from qlinkgen.model.integer import Chunk, Integer
+from qlinkgen.model.types import Scalar
 
 Chunks = tuple[Chunk, ...]
+#: What lies in bytes: an integer; parts of a frame have it as a integer.
+Whole = Integer | Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,46 +29,64 @@ class Layouts:
     _names: dict[tuple[int, Chunks], str] = field(default_factory=dict)
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
+    #: Widths of the C types of signed integers that the wire has fewer bits for.
+    extended: set[int] = field(default_factory=set)
 
-    def put(self, scalar: Scalar, place: str, index: str, value: str) -> str:
+    def put(self, integer: Whole, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
-        if scalar.size == 1:
-            if scalar.signed and scalar.bits < 8:  # no sign in bits that the wire does not have
-                value = f"(uint8_t)({value} & {unsigned(scalar.chunks[0].mask, 8, hexadecimal=True)})"
+        if integer.size == 1:
+            if integer.signed and integer.bits < 8:  # no sign in bits that the wire does not have
+                value = f"(uint8_t)({value} & {unsigned(integer.chunks[0].mask, 8, hexadecimal=True)})"
             return f"{place}[{index}] = {value};"
-        return f"{self._call('put', scalar)}({pointer(place, index)}, {value});"
+        return f"{self._call('put', integer)}({pointer(place, index)}, {value});"
 
-    def get(self, scalar: Scalar, place: str, index: str) -> str:
-        """An expression for the unsigned value that is there."""
-        if scalar.size == 1:
+    def get(self, integer: Whole, place: str, index: str) -> str:
+        """An expression for the unsigned value that is there, once it is known that nothing is a misfit."""
+        if integer.size == 1:
             return f"{place}[{index}]"
-        return f"{self._call('get', scalar)}({pointer(place, index)})"
+        return f"{self._call('get', integer)}({pointer(place, index)})"
 
-    def misfit(self, scalar: Scalar, place: str, index: str) -> str | None:
+    def peek(self, integer: Whole, place: str, index: str) -> str:
+        """An expression for the unsigned value that is there, whatever the bits of no chunk are."""
+        value, mask = self.get(integer, place, index), integer.chunks[0].mask
+        if integer.size > 1 or mask == 0xFF:
+            return value
+        return f"({value} & {unsigned(mask, 8, hexadecimal=True)})"
+
+    def misfit(self, integer: Whole, place: str, index: str) -> str | None:
         """A condition that holds where bits of no chunk are set, None where there are no such bits."""
-        if all(chunk.bits == 8 for chunk in scalar.chunks):
+        if all(chunk.bits == 8 for chunk in integer.chunks):
             return None
-        if scalar.size == 1:
-            return f"({place}[{index}] & {unsigned(scalar.chunks[0].mask ^ 0xFF, 8, hexadecimal=True)}) != 0U"
-        self._partial.add((scalar.bits, scalar.chunks))
-        return f"{self._call('misfit', scalar)}({pointer(place, index)})"
+        if integer.size == 1:
+            return (
+                f"({place}[{index}] & {unsigned(integer.chunks[0].mask ^ 0xFF, 8, hexadecimal=True)}) != 0U"
+            )
+        self._partial.add((integer.bits, integer.chunks))
+        return f"{self._call('misfit', integer)}({pointer(place, index)})"
+
+    def extend(self, raw: str, bits: int) -> str:
+        """An expression with the sign of so many bits in all upper bits."""
+        width = storage(bits)
+        self.extended.add(width)
+        sign = unsigned(1 << (bits - 1), bits, hexadecimal=True)
+        return f"{self.prefix}_extend_{width}_({raw}, {sign})"
 
     def helpers(self) -> list[Helper]:
         """The functions of every layout in use."""
         return [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
 
-    def _call(self, verb: str, scalar: Scalar) -> str:
-        key = (scalar.bits, scalar.chunks)
+    def _call(self, verb: str, integer: Whole) -> str:
+        key = (integer.bits, integer.chunks)
         self._used.add((verb, *key))
         if key not in self._names:
-            self._names[key] = self._name(scalar)
+            self._names[key] = self._name(integer)
         return f"{self.prefix}_{verb}_{self._names[key]}_"
 
-    def _name(self, scalar: Scalar) -> str:
-        if scalar.byteorder:
-            return f"u{scalar.bits}_{'be' if scalar.byteorder == 'big' else 'le'}"
-        known = sum(1 for name in self._names.values() if name.startswith(f"u{scalar.bits}_groups"))
-        return f"u{scalar.bits}_groups{known or ''}"
+    def _name(self, integer: Whole) -> str:
+        if integer.byteorder:
+            return f"u{integer.bits}_{'be' if integer.byteorder == 'big' else 'le'}"
+        known = sum(1 for name in self._names.values() if name.startswith(f"u{integer.bits}_groups"))
+        return f"u{integer.bits}_groups{known or ''}"
 
     def _helper(self, bits: int, chunks: Chunks, name: str) -> Helper:
         lines: list[str] = []

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 
-from qlinkgen.backends import c_text
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.describe import field_rows, member_note, message_head
-from qlinkgen.backends.c.encode import Encoder, count_member, size_terms
+from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.framing import struct_parameter
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.names import (
-    Names,
-    bracketed,
-    count_type,
-    integer_type,
-    scalar_literal,
-    scalar_type,
-    storage,
-    unsigned,
-)
-from qlinkgen.model import sizes
-from qlinkgen.model.message import Field, Message, Value
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Bits, Blob, Scalar
+from qlinkgen.backends.c.names import Names, count_type, scalar_literal, unsigned
+from qlinkgen.backends.c.types import Types
+from qlinkgen.plan.payload import BytesStep, ItemsStep, MemberValue, RunStep, ValueStep
+from qlinkgen.plan.tree import MessagePlan
+
+Settable = ValueStep | MemberValue | RunStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +27,25 @@ class Member:
 
 
 class MessageWriter:
-    """Lowers messages to what the template places."""
+    """Lowers messages to what the template places.
 
-    def __init__(self, protocol: Protocol, names: Names, layouts: Layouts) -> None:
-        """Names and layouts are shared by the whole header."""
-        self._protocol = protocol
+    Messages with the same payload have one struct and one body of each function, those of the first of them.
+    """
+
+    def __init__(self, names: Names, layouts: Layouts, types: Types) -> None:
+        """All of it is shared by the whole header."""
         self._names = names
         self._layouts = layouts
+        self._types = types
+        self._first: dict[object, str] = {}
 
-    def render(self, message: Message, *, encoded: bool, decoded: bool) -> dict[str, Any]:
+    def render(self, plan: MessagePlan) -> dict[str, Any]:
         """The message for the template; only the directions that are kept have statements."""
-        frame, head = self._protocol.frame, message_head(self._names.command_of(message), message)
+        message, payload = plan.message, plan.payload
+        head = message_head(self._names.command_of(message), message)
+        notes = {value.name: member_note(value) for value in message.values}
+        members = [member for each in payload.settable for member in self._members(each, notes[each.name])]
+        shape = payload, tuple(member.declaration for member in members)
         return {
             "name": message.name,
             "stem": self._names.stem(message),
@@ -55,162 +54,126 @@ class MessageWriter:
             "head": head,
             "rows": field_rows(message),
             "id_text": f"0x{message.id:02X}",
-            "min_size": message.min_size,
-            "max_size": message.max_size,
-            "max_frame_size": sizes.max_frame_size(frame, message),
-            "max_wire_size": sizes.max_wire_size(frame, message),
-            "has_struct": bool(message.values),
-            "has_bytes": bool(message.fields),
-            "members": [member for value in message.values for member in _members(value)],
-            "initialiser": ", ".join(_initialiser(value) for value in message.values),
-            "size_terms": size_terms(message) if message.variable else "",
-            "encode": self._encode(message) if encoded else None,
-            "decode": self._decode(message) if decoded else None,
-            "scales": [scale for value in message.values if (scale := self._scale(message, value))],
+            "min_size": payload.least,
+            "max_size": payload.most,
+            "max_frame_size": plan.frame_size,
+            "max_wire_size": plan.wire_size,
+            "has_struct": bool(payload.settable),
+            "has_bytes": bool(payload.steps),
+            "same_struct": self._same("struct", shape, plan) if members else "",
+            "members": members,
+            "notes": [f"{name}: {note}" for name, note in notes.items() if note],
+            "initialiser": ", ".join(map(_initialiser, payload.settable)),
+            "encode": self._encode(plan, self._same("encode", shape, plan)) if plan.encoded else None,
+            "decode": self._decode(plan, self._same("decode", shape, plan)) if plan.decoded else None,
+            "scales": [scale for each in payload.settable if (scale := self._scale(plan, each))],
             "early_id": False,
             "encode_parameters": struct_parameter(self._names, message, const=True),
             "decode_parameters": struct_parameter(self._names, message, const=False),
-            "encoded_size": "(int)size"
-            if message.variable
-            else f"(int){self._names.constant(message)}_MAX_SIZE",
-            "size_text": _size_text(message),
-            "comment_ends_at_head": not message.fields and len(head) == 1,
+            "size_text": _size_text(payload.least, payload.most),
+            "comment_ends_at_head": not payload.steps and len(head) == 1,
             "to_frame": None,
             "from_frame": None,
         }
 
-    def _encode(self, message: Message) -> dict[str, Any]:
-        encoder = Encoder(message, self._names.prefix, self._layouts)
-        statements = encoder.statements()
-        return {
-            "lines": statements,
-            "counts": encoder.counts,
-            "place": encoder.uses_place,
-            "variable": bool(message.variable),
-        }
+    def _same(self, what: str, shape: object, plan: MessagePlan) -> str:
+        """The first message that has the same, "" where this one is the first."""
+        own = self._names.function(plan.message)
+        first = self._first.setdefault((what, shape), own)
+        return "" if first == own else first
 
-    def _decode(self, message: Message) -> dict[str, Any]:
-        decoder = Decoder(message, self._names.prefix, self._layouts)
-        statements = decoder.statements()
-        return {
-            "lines": statements,
-            "place": decoder.uses_place,
-            "counters": decoder.counters,
-            "rest": decoder.uses_rest,
-            "empty_is_default": message.empty_is_default and message.min_size > 0,
-            "defaults": self._defaults(message),
-            "reads": decoder.reads,
-        }
+    def _encode(self, plan: MessagePlan, same: str) -> list[str]:
+        own = "message, " if plan.payload.settable else ""
+        if same:
+            return [f"return {same}_encode({own}payload, capacity);"]
+        size = f"{self._names.constant(plan.message)}_MAX_SIZE" if plan.payload.fixed else "size"
+        return [*Encoder(plan.payload, self._layouts).statements(), f"return (int){size};"]
 
-    def _defaults(self, message: Message) -> list[str]:
+    def _decode(self, plan: MessagePlan, same: str) -> list[str]:
+        own, ok = "message, " if plan.payload.settable else "", f"return {self._names.upper}_OK;"
+        if same:
+            return [f"return {same}_decode({own}payload, size);"]
+        decoder, empty = Decoder(plan.payload, self._layouts), list[str]()
+        if plan.payload.empty_is_default and plan.payload.least > 0:
+            empty = ["if (size == 0U) {", *(f"    {line}" for line in [*self._defaults(plan), ok]), "}"]
+        lines = decoder.statements()
+        return [*([] if decoder.reads else ["(void)payload;"]), *empty, *lines, ok]
+
+    def _defaults(self, plan: MessagePlan) -> list[str]:
         """Statements that set a message to its defaults; only a list of items is copied as a whole."""
         lines = []
-        for value in message.values:
-            kind = value.type
-            if isinstance(kind, Scalar):
-                lines.append(f"message->{value.name} = {scalar_literal(kind, kind.default)};")
-            elif kind.length.fixed or kind.default:
-                kind_of_all, defaults = self._names.function(message), self._names.constant(message)
-                return [f"const {kind_of_all}_t defaults = {defaults}_INIT;", "*message = defaults;"]
-            else:
-                lines.append(f"message->{count_member(value.field)} = 0U;")
+        for each in plan.payload.settable:
+            match each:
+                case ValueStep() | MemberValue():
+                    lines.append(
+                        f"message->{each.name} = {scalar_literal(each.number, each.number.default)};"
+                    )
+                case BytesStep() | ItemsStep() if each.fixed or each.default:
+                    kind = self._names.function(plan.message)
+                    return [f"const {kind}_t defaults = {kind.upper()}_INIT;", "*message = defaults;"]
+                case BytesStep() | ItemsStep():
+                    lines.append(f"message->{each.name}_{each.quantity} = 0U;")
+                case _:
+                    assert_never(each)
         return lines
 
-    def _scale(self, message: Message, value: Value) -> dict[str, Any] | None:
-        scalar = value.type
-        if not isinstance(scalar, Scalar) or scalar.scaling is None:
+    def _scale(self, plan: MessagePlan, each: Settable) -> object:
+        """Conversions that no named type has."""
+        if isinstance(each, BytesStep | ItemsStep):
             return None
-        return {
-            "constant": f"{self._names.constant(message)}_{value.name.upper()}",
-            "function": f"{self._names.function(message)}_{value.name}",
-            "type": scalar_type(scalar),
-            "helper": scalar_type(scalar).removesuffix("_t"),
-            "text": c_text.comment_line(f"{value.name} = (raw * FACTOR + BIAS) / DIVISOR {scalar.unit}"),
-            "factor": _whole(scalar.scaling.factor),
-            "bias": _whole(scalar.scaling.bias),
-            "divisor": _whole(scalar.scaling.divisor),
-            "minimum": scalar_literal(scalar, scalar.minimum),
-            "maximum": scalar_literal(scalar, scalar.maximum),
-        }
+        kind = self._types.conversions(plan.message, each.name, each.number)
+        return None if kind is None or kind.named else kind
+
+    def _members(self, each: Settable, note: str) -> list[Member]:
+        match each:
+            case ValueStep() | MemberValue():
+                return [Member(f"{self._types.of(each.number)} {each.name};", note)]
+            case BytesStep():
+                return _run_members(each, "uint8_t", "bytes", note)
+            case ItemsStep():
+                return _run_members(each, self._types.of(each.number), "items", note)
+            case _:
+                assert_never(each)
 
 
-def _whole(value: int) -> str:
-    """An integer constant of the least type that holds it everywhere."""
-    size = abs(value).bit_length()
-    suffix = "" if size < 16 else "L" if size < 32 else "LL" if size < 64 else "ULL"
-    return bracketed(f"{value}{suffix}")
+def _run_members(run: RunStep, item: str, what: str, note: str) -> list[Member]:
+    most = run.length.maximum
+    number = Member(f"{count_type(most)} {run.name}_{run.quantity};", f"{what} in {run.name}")
+    return [*([] if run.fixed else [number]), Member(f"{item} {run.name}[{most}];", note)]
 
 
-def _members(value: Value) -> list[Member]:
-    kind, note = value.type, member_note(value)
-    if isinstance(kind, Scalar):
-        return [Member(f"{scalar_type(kind)} {value.name};", note)]
-    item = integer_type(kind.item.bits, signed=kind.item.signed) if isinstance(kind, Array) else "uint8_t"
-    most = kind.length.maximum
-    members = [Member(f"{item} {value.name}[{most}];", note)]
-    if not kind.length.fixed:
-        what = "items" if isinstance(kind, Array) else "bytes"
-        number = Member(f"{count_type(most)} {count_member(value.field)};", f"{what} in {value.name}")
-        members.insert(0, number)
-    return members
+def _initialiser(each: Settable) -> str:
+    match each:
+        case ValueStep() | MemberValue():
+            return scalar_literal(each.number, each.number.default)
+        case BytesStep():
+            items = [unsigned(byte, 8, hexadecimal=True) for byte in each.default]
+        case ItemsStep():
+            items = [scalar_literal(each.number, item) for item in each.default]
+        case _:
+            assert_never(each)
+    content = f"{{{', '.join(items)}}}" if any(each.default) else "{0}"
+    return content if each.fixed else f"{len(items)}U, {content}"
 
 
-def _initialiser(value: Value) -> str:
-    kind = value.type
-    if isinstance(kind, Scalar):
-        return scalar_literal(kind, kind.default)
-    items = (
-        [scalar_literal(kind.item, item) for item in kind.default]
-        if isinstance(kind, Array)
-        else _bytes(kind)
-    )
-    zero = not any(kind.default)
-    content = "{0}" if zero else f"{{{', '.join(items)}}}"
-    return content if kind.length.fixed else f"{len(items)}U, {content}"
-
-
-def _bytes(kind: Blob) -> list[str]:
-    return [unsigned(byte, 8, hexadecimal=True) for byte in kind.default]
-
-
-def _size_text(message: Message) -> str:
-    least, most = message.min_size, message.max_size
+def _size_text(least: int, most: int) -> str:
     return f"{most} byte{'s' if most > 1 else ''}" if least == most else f"{least}..{most} bytes"
 
 
-def extended_widths(messages: tuple[Message, ...]) -> list[int]:
-    """Widths of the C types of signed integers that the wire has fewer bits for."""
-    found = {
-        storage(scalar.bits)
-        for message in messages
-        for each in message.fields
-        for scalar in _scalars(each)
-        if scalar.signed and scalar.bits != storage(scalar.bits)
-    }
-    return sorted(found)
-
-
-def _scalars(each: Field) -> list[Scalar]:
-    kind = each.type
-    if isinstance(kind, Bits):
-        return [member.type for member in kind.members]
-    return [kind] if isinstance(kind, Scalar) else [kind.item] if isinstance(kind, Array) else []
-
-
-def nearest_helpers(messages: tuple[Message, ...]) -> list[dict[str, str]]:
+def nearest_helpers(types: Types, messages: tuple[MessagePlan, ...]) -> list[dict[str, str]]:
     """The C types that physical values are rounded to."""
-    types = {
-        scalar_type(value.type): None
+    kinds = (
+        types.conversions(message.message, each.name, each.number)
         for message in messages
-        for value in message.values
-        if isinstance(value.type, Scalar) and value.type.scaling
-    }
+        for each in message.payload.settable
+        if isinstance(each, ValueStep | MemberValue)
+    )
     return [
         {
-            "name": kind.removesuffix("_t"),
-            "type": kind,
-            "zero": "0U" if kind.startswith("u") else "0",
-            "one": "1U" if kind.startswith("u") else "1",
+            "name": plain.removesuffix("_t"),
+            "type": plain,
+            "zero": "0U" if plain.startswith("u") else "0",
+            "one": "1U" if plain.startswith("u") else "1",
         }
-        for kind in types
+        for plain in dict.fromkeys(kind.plain for kind in kinds if kind)
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qlinkgen.model.message import Message
-from qlinkgen.model.naming import snake
+from qlinkgen.model.naming import GENERATED_NAMES, snake
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Scalar
@@ -77,12 +77,23 @@ class Names:
         self.prefix = protocol.name
         self.upper = protocol.name.upper()
         self._taken = {each.name for each in protocol.enums} | {each.name for each in protocol.flags}
+        self._messages = protocol.messages
         self._commands = {
             message.name: command
             for command in protocol.commands
             for message in (command.request, command.response)
             if message is not None
         }
+
+    def type_stem(self, name: str) -> str:
+        """A named type as part of a name; one called like something else in the header gets a suffix."""
+        taken = {*GENERATED_NAMES, *self._taken, "direction", "listener"}
+        for message in self._messages:
+            stem = self.stem(message)
+            taken |= {stem, *(f"{stem}_{value.name}" for value in message.values)}
+        while name in taken:
+            name += "_type"
+        return name
 
     def command_of(self, message: Message) -> Command | None:
         """The transaction of a message; a look-up, so that cost grows with the number of messages alone."""

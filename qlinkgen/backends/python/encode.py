@@ -43,7 +43,7 @@ from qlinkgen.plan.payload import (
     ReservedStep,
     Step,
     ValueStep,
-    conditions,
+    limits,
 )
 from qlinkgen.plan.tree import MessagePlan
 
@@ -215,10 +215,7 @@ class Encoder:
     def _indexed(self, name: str, number: Scalar) -> None:
         """A local that holds a value as an integer of Python's own, in range."""
         self._lines.append(f"{name}_raw = {self.place.use('index')}(self.{attribute(name)})")
-        rules = conditions(number)
-        if not any(isinstance(rule, Within) for rule in rules):
-            rules = (Within(number.natural_minimum, number.natural_maximum), *rules)
-        self._require(f"{name}_raw", *rules)
+        self._require(f"{name}_raw", *limits(number))
 
     def _bits(self, step: BitsStep) -> None:
         terms = [term for member in step.members if (term := self._member(member))]

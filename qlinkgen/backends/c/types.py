@@ -1,0 +1,137 @@
+"""C types of numbers: those that the schema names, each with its conversions once, and the plain ones."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import assert_never
+
+from qlinkgen.backends import c_text
+from qlinkgen.backends.c.constants import constant_type
+from qlinkgen.backends.c.names import Names, bracketed, scalar_literal, scalar_type
+from qlinkgen.model.message import Message
+from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.plan.payload import BytesStep, ItemsStep, MemberValue, ValueStep
+from qlinkgen.plan.tree import Plan
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A named type, or a scaled value of a type without a name.
+
+    Attributes:
+        stem: what its functions and its C type begin with.
+        title: text of its comment.
+        number: what a raw value is.
+        named: it has a C type of its own.
+    """
+
+    stem: str
+    title: str
+    number: Scalar
+    named: bool
+
+    @property
+    def plain(self) -> str:
+        """The C type of a raw value where it is not named."""
+        return scalar_type(self.number)
+
+    @property
+    def type(self) -> str:
+        """The C type of a raw value."""
+        return f"{self.stem}_t" if self.named else self.plain
+
+    @property
+    def constant(self) -> str:
+        """What its macros begin with."""
+        return self.stem.upper()
+
+    @property
+    def scale(self) -> Mapping[str, str] | None:
+        """Its conversions, None where raw values are the physical ones."""
+        number = self.number
+        if number.scaling is None:
+            return None
+        return {
+            "factor": _whole(number.scaling.factor),
+            "bias": _whole(number.scaling.bias),
+            "divisor": _whole(number.scaling.divisor),
+            "helper": self.plain.removesuffix("_t"),
+            "minimum": scalar_literal(number, number.minimum),
+            "maximum": scalar_literal(number, number.maximum),
+        }
+
+
+class Types:
+    """The C types of the numbers of one header."""
+
+    def __init__(self, plan: Plan, names: Names) -> None:
+        """Note what the kept messages have."""
+        self._plan = plan
+        self._names = names
+
+    @cached_property
+    def named(self) -> Mapping[str, Kind]:
+        """The types that the schema names, by name, in order of their first use.
+
+        A field may narrow its type: the type is what most of its fields make of it.
+        """
+        found: dict[str, Counter[Scalar]] = {}
+        for number in self._numbers():
+            if number.type_name and not isinstance(number.meaning, Enum | Flags) and number.meaning != "bool":
+                found.setdefault(number.type_name, Counter())[_kept(number)] += 1
+        return {name: self._kind(name, counts.most_common(1)[0][0]) for name, counts in found.items()}
+
+    def of(self, number: Scalar) -> str:
+        """The C type of a struct member."""
+        plain, meaning = scalar_type(number), number.meaning
+        if isinstance(meaning, Enum | Flags):
+            return f"{self._names.prefix}_{meaning.name}_t" if plain == constant_type(meaning) else plain
+        kind = self.named.get(number.type_name)
+        return kind.type if kind and kind.plain == plain else plain
+
+    def conversions(self, message: Message, value: str, number: Scalar) -> Kind | None:
+        """What converts a scaled value: its type, or functions of its own where it differs from that."""
+        if number.scaling is None:
+            return None
+        kind = self.named.get(number.type_name)
+        if kind and kind.number == _kept(number):
+            return kind
+        return Kind(f"{self._names.function(message)}_{value}", _title(value, number), number, named=False)
+
+    def _kind(self, name: str, number: Scalar) -> Kind:
+        title = _title(name, number) if number.scaling else f"in {number.unit}" if number.unit else ""
+        title = c_text.comment_line(f"Type {name}{': ' if title else ''}{title}")
+        return Kind(f"{self._names.prefix}_{self._names.type_stem(name)}", title, number, named=True)
+
+    def _numbers(self) -> Iterator[Scalar]:
+        for message in self._plan.messages:
+            for each in message.payload.settable:
+                match each:
+                    case ValueStep() | MemberValue() | ItemsStep():
+                        yield each.number
+                    case BytesStep():
+                        pass
+                    case _:
+                        assert_never(each)
+
+
+def _kept(number: Scalar) -> Scalar:
+    """What conversions depend on."""
+    return Scalar(
+        bits=number.bits, signed=number.signed, chunks=(), minimum=number.minimum, maximum=number.maximum,
+        scaling=number.scaling, unit=number.unit,
+    )  # fmt: skip
+
+
+def _title(name: str, number: Scalar) -> str:
+    return c_text.comment_line(f"{name} = (raw * FACTOR + BIAS) / DIVISOR {number.unit}".rstrip())
+
+
+def _whole(value: int) -> str:
+    """An integer constant of the least type that holds it everywhere."""
+    size = abs(value).bit_length()
+    suffix = "" if size < 16 else "L" if size < 32 else "LL" if size < 64 else "ULL"
+    return bracketed(f"{value}{suffix}")
