@@ -60,11 +60,19 @@ class Conversation:
             if len(self._waiting) < size and not last:
                 return
             asked, self._asked = self._asked, None
-            if size and len(self._waiting) >= size:
+            if last and self._unchecked(asked):
+                offset = self._offset
+                yield decode_unchecked(self._codec, self._take(len(self._waiting)), asked, offset)
+            elif size and len(self._waiting) >= size:
                 found = decode_answer(self._codec, bytes(self._waiting[:size]), asked, self._offset)
                 if self._is_answer(found, asked):
                     self._take(size)
                     yield found
+
+    def _unchecked(self, asked: Any) -> bool:
+        """The rest of the stream is an answer whose check value was not read."""
+        rest = bytes(self._waiting)
+        return len(rest) == unchecked_size(self._protocol, asked) and not are_requests(self._protocol, rest)
 
     def _take(self, size: int) -> bytes:
         taken = bytes(self._waiting[:size])
@@ -99,6 +107,7 @@ class Answers:
     def __init__(self, protocol: Protocol, codec: ModuleType, asked: Any) -> None:
         """Every response answers ``asked``."""
         self._size = answer_size(protocol, asked)
+        self._unchecked_size = unchecked_size(protocol, asked)
         self._codec, self._asked = codec, asked
         self._offset = 0
         self._waiting = bytearray()
@@ -113,8 +122,10 @@ class Answers:
             self._offset += len(raw)
 
     def finish(self) -> Iterator[Event]:
-        """The end of the stream."""
-        if self._waiting:
+        """The end of the stream: an answer is whole without its check value, which the host need not read."""
+        if self._waiting and len(self._waiting) == self._unchecked_size:
+            yield decode_unchecked(self._codec, bytes(self._waiting), self._asked, self._offset)
+        elif self._waiting:
             text = f"{len(self._waiting)} bytes; a response to {self._asked.NAME} has {self._size}"
             yield Bad("truncated", self._offset, bytes(self._waiting), text)
 
@@ -123,6 +134,32 @@ def answer_size(protocol: Protocol, asked: Any) -> int:
     """Bytes of the response to a request object, check value included; 0 if nothing answers."""
     command = protocol.command_of(protocol.by_name[asked.NAME])
     return max_frame_size(protocol.frame, command.response) if command and command.response else 0
+
+
+def unchecked_size(protocol: Protocol, asked: Any) -> int:
+    """Bytes of the response to a request object without its check value; 0 if it has none."""
+    command = protocol.command_of(protocol.by_name[asked.NAME])
+    return command.response.max_size if command and command.response else 0
+
+
+def are_requests(protocol: Protocol, data: bytes) -> bool:
+    """Whether bytes are nothing but whole requests, whatever their values."""
+    sizes = {message.id: 1 + message.max_size for message in protocol.received("request")}
+    at = 0
+    while at < len(data):
+        if data[at] not in sizes:
+            return False
+        at += sizes[data[at]]
+    return at == len(data)
+
+
+def decode_unchecked(codec: ModuleType, payload: bytes, asked: Any, offset: int) -> Event:
+    """The response in a payload whose check value was not read, or what is wrong with it."""
+    response = codec.COMMANDS[asked.NAME.removesuffix(".request")].response
+    try:
+        return response.from_bytes(payload)
+    except codec.DecodeError as error:
+        return Bad(error.kind, offset, payload, str(error))
 
 
 def decode_answer(codec: ModuleType, raw: bytes, asked: Any, offset: int) -> Event:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from qlinkgen.cli.anatomy import Anatomy, Byte, PayloadReader, at, counted, nearest_id, raw_of
+from qlinkgen.cli.conversations import are_requests
 from qlinkgen.model.frame import PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
@@ -20,6 +21,9 @@ def explain_packet(protocol: Protocol, data: bytes, request: bytes | None) -> An
     return reader.answer_to(request, at(data))
 
 
+_ASK = "give the request with --request then"
+
+
 class _Reader:
     def __init__(self, protocol: Protocol, frame: PacketFrame) -> None:
         self._protocol, self._frame = protocol, frame
@@ -33,7 +37,7 @@ class _Reader:
             return self._anatomy
         rest = data[1 + message.max_size :]
         if rest:
-            self._response(message, raw_of(data[: 1 + message.max_size]), rest)
+            self._response(message, raw_of(data[: 1 + message.max_size]), rest, alone=False)
         return self._anatomy
 
     def answer_to(self, request: bytes, data: list[Byte]) -> Anatomy:
@@ -46,7 +50,7 @@ class _Reader:
             )
             return self._anatomy
         self._anatomy.title = message.command
-        self._response(message, request, data)
+        self._response(message, request, data, alone=True)
         return self._anatomy
 
     def _request(self, data: list[Byte]) -> Message | None:
@@ -70,12 +74,16 @@ class _Reader:
             return None
         return message
 
-    def _response(self, asked: Message, request: bytes, data: list[Byte]) -> None:
+    def _response(self, asked: Message, request: bytes, data: list[Byte], *, alone: bool) -> None:
         command = self._protocol.command_of(asked)
         answer = command.response if command else None
         checksum = self._frame.checksum
         if answer is None or checksum is None:
             self._anatomy.row(data, "(next packet)", f"nothing answers {asked.command}")
+            return
+        if not alone and len(data) == answer.max_size and are_requests(self._protocol, raw_of(data)):
+            self._anatomy.row(data, "(next packet)", "`qlinkgen decode` takes whole conversations")
+            self._anatomy.notes.append(f"it may also be an answer without its check value: {_ASK}")
             return
         payload, behind = data[: answer.max_size], data[answer.max_size :]
         PayloadReader(self._anatomy, answer).read(payload)
