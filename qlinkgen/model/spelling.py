@@ -11,14 +11,17 @@ _LONGEST = 80
 def similar(word: str, known: Iterable[str], most: int = 1) -> tuple[str, ...]:
     """Return the known words that differ from a word as typing errors do, the nearest first.
 
-    An error is a character too many, too few or wrong, or two that are swapped; one is allowed for every four
-    characters. In a word of three a wrong character is too much: `f32` is not `u32`, nor `lrc` `arc`.
+    An error is a character too many, too few or wrong, or two that are swapped. One is allowed; where the
+    first character is right, one for every three characters begun. In a word of three a wrong character is
+    too much: `f32` is not `u32`, nor `lrc` `arc`.
     """
     asked = word[:_LONGEST].lower()
     found = []
     for each in known:
-        errors = _errors(asked, each.lower())
-        if errors <= max(1, len(asked) // 4) and not (len(asked) <= 3 and _one_replaced(asked, each.lower())):
+        other = each.lower()
+        errors = _errors(asked, other)
+        most_errors = (len(asked) + 2) // 3 if asked[:1] == other[:1] else 1
+        if errors <= most_errors and not (len(asked) <= 3 and _one_replaced(asked, other)):
             found.append((errors, each))
     return tuple(each for _, each in sorted(found)[:most])
 
