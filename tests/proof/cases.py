@@ -33,7 +33,7 @@ UNLIKE: Mapping[tuple[str, str], Mapping[tuple[str, str], int]] = {
     ("dynamixel", "c"): {("crc", "length"): 1},
     ("kitchen_sink", "c"): {("crc", "length"): 3},
     ("modbus_rtu", "c"): {("frame", "range"): 12, ("frame", "unknown"): 2, ("crc", "length"): 12},
-    ("wide", "c"): {("crc", "length"): 1},
+    ("wide", "c"): {("crc", "length"): 1, ("length", "truncated"): 1},
     ("mc1231a", "construct"): {
         ("length", "truncated"): 68,
         ("illegal", "truncated"): 41,
