@@ -5,8 +5,6 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 from qlinkgen.backends.base import Options, Outputs
 from qlinkgen.model.protocol import Protocol
@@ -21,53 +19,31 @@ class Target:
     Attributes:
         name: word behind ``--target``.
         summary: what it is, for help texts.
-        load: imports the back-end and returns its `generate`.
+        module: where its `generate` is; imported when it is asked for.
     """
 
     name: str
     summary: str
-    load: Callable[[], Generate]
+    module: str
 
-
-def _backend(name: str) -> Any:
-    return importlib.import_module(f"qlinkgen.backends.{name}")
-
-
-def _plain(name: str) -> Generate:
-    generate: Generate = _backend(name).generate
-    return generate
-
-
-def _vectors_of(protocol: Protocol, options: Options) -> Outputs:
-    """The vectors take the encoder that makes their bytes as an argument; it is construct's."""
-    outputs: Outputs = _backend("vectors").generate(protocol, options, _backend("construct").live(protocol))
-    return outputs
-
-
-def _vectors() -> Generate:
-    return _vectors_of
-
-
-def _conformance() -> Generate:
-    """A kit holds the vectors, and is written against the header."""
-    kits = importlib.import_module("qlinkgen.cli.kits")
-    return partial(kits.generate, vectors=_vectors_of)
-
-
-def _target(name: str, summary: str, backend: str = "") -> Target:
-    return Target(name, summary, partial(_plain, backend or name))
+    def load(self) -> Generate:
+        """Import the module."""
+        generate: Generate = importlib.import_module(self.module).generate
+        return generate
 
 
 TARGETS = {
     target.name: target
     for target in (
-        _target("python", "typed module, standard library only"),
-        _target("bus", "typed calls of masters and handlers of slaves", "python.bus"),
-        _target("c", "self-contained C99 header"),
-        _target("construct", "structures for the construct library"),
-        Target("vectors", "test vectors as JSON", _vectors),
+        Target("python", "typed module, standard library only", "qlinkgen.backends.python"),
+        Target("bus", "typed calls of masters and handlers of slaves", "qlinkgen.backends.python.bus"),
+        Target("c", "self-contained C99 header", "qlinkgen.backends.c"),
+        Target("construct", "structures for the construct library", "qlinkgen.backends.construct"),
+        Target("vectors", "test vectors as JSON", "qlinkgen.backends.vectors"),
         Target(
-            "conformance", "C program that holds a header against the vectors, on any target", _conformance
+            "conformance",
+            "C program that holds a header against the vectors, on any target",
+            "qlinkgen.cli.kits",
         ),
     )
 }

@@ -38,13 +38,15 @@ from qlinkgen.plan.framing import (
     LengthPart,
     MarkPart,
     Marks,
-    Part,
     PayloadPart,
     Rescan,
 )
 from qlinkgen.plan.reading import Astray, BadFrame, FrameReader, Missing, Taken, read_marked
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
+
+#: Parts whose bytes do not depend on those of others.
+Unchecked = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | PayloadPart
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,18 +85,30 @@ class Codec:
             raise Unsendable(self.plan.frame.address, whom)
         return self.seal(name, content.pack(message.payload, values), whom, request)
 
-    def seal(
-        self, name: str, payload: bytes, address: int = 0, request: bytes = b"", number: int | None = None
-    ) -> bytes:
-        """The frame of a payload that may be wrong, right in all else; ``number`` replaces the message id."""
+    def seal(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
+        """The frame of a payload that may be wrong, right in all else."""
         message = self.plan.message(name)
+        return self.join(message, self.cells(message, self.sent(payload), address), request)
+
+    def sent(self, payload: bytes) -> bytes:
+        """The payload as a length counts it: with its inserted bytes, where it is stuffed alone."""
         transparency = self.plan.frame.transparency
-        sent = transparency.rule.stuff(payload) if isinstance(transparency, PayloadStuffing) else payload
-        shown = message.id if number is None else number
-        cells = {part.name: _cell(part, sent, shown, address) for part in message.envelope.parts}
-        if (part := message.envelope.check) is not None:
-            cells[part.name] = part.check.pack(self.check_value(message.envelope, cells, request))
-        frame = b"".join(cells[part.name] for part in message.envelope.parts)
+        return transparency.rule.stuff(payload) if isinstance(transparency, PayloadStuffing) else payload
+
+    def cells(self, message: MessagePlan, sent: bytes, address: int = 0) -> dict[str, bytes]:
+        """The bytes of each part but the check value."""
+        return {
+            part.name: _cell(part, sent, message.id, address)
+            for part in message.envelope.parts
+            if not isinstance(part, CheckPart)
+        }
+
+    def join(self, message: MessagePlan, cells: Mapping[str, bytes], request: bytes = b"") -> bytes:
+        """The frame of these parts as it is sent; a check value that is not among them is the right one."""
+        part, transparency = message.envelope.check, self.plan.frame.transparency
+        if part is not None and part.name not in cells:
+            cells = {**cells, part.name: part.check.pack(self.check_value(message.envelope, cells, request))}
+        frame = b"".join(cells[each.name] for each in message.envelope.parts)
         match transparency:
             case FrameStuffing():
                 return transparency.stuff(frame)
@@ -187,8 +201,8 @@ def take_packet(message: MessagePlan, wire: bytes) -> Taken:
     return taken
 
 
-def _cell(part: Part, payload: bytes, number: int, address: int) -> bytes:
-    """The bytes of a part, those of the check value left out."""
+def _cell(part: Unchecked, payload: bytes, number: int, address: int) -> bytes:
+    """The bytes of a part."""
     match part:
         case ConstantPart():
             return part.data
@@ -202,7 +216,5 @@ def _cell(part: Part, payload: bytes, number: int, address: int) -> bytes:
             return bytes((part.byte(number, address),))
         case PayloadPart():
             return payload
-        case CheckPart():
-            return b""
         case _:
             assert_never(part)

@@ -10,7 +10,7 @@ from typing import assert_never
 
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.expr import Condition, Within
+from qlinkgen.plan.expr import Condition
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -226,7 +226,7 @@ def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> di
         case ValueStep():
             return {step.name: _valid(step.name, step.integer, step.conditions, data, at)}
         case ConstantStep():
-            _valid(step.name, step.integer, (Within(step.value, step.value),), data, at)
+            _valid(step.name, step.integer, step.conditions, data, at)
         case CountStep():
             _valid(step.name, step.integer, (), data, at)
         case BitsStep():
@@ -258,18 +258,10 @@ def _valid(name: str, integer: Integer, rules: tuple[Condition, ...], data: byte
 def _members(step: BitsStep, whole: int, at: int) -> dict[str, Raw]:
     found: dict[str, Raw] = {}
     for member in step.members:
-        bits = whole >> member.shift & ((1 << member.bits) - 1)
-        match member:
-            case MemberValue():
-                value = member.number.integer.signed_value(bits)
-                if broken(member.conditions, value):
-                    raise BadContent("range", member.name, at)
-                found[member.name] = value
-            case MemberConstant():
-                if bits != member.value:
-                    raise BadContent("range", member.name, at)
-            case MemberReserved():
-                pass
-            case _:
-                assert_never(member)
+        integer = member.number.integer
+        value = integer.signed_value(whole >> member.shift & integer.mask)
+        if broken(member.conditions, value):
+            raise BadContent("range", member.name, at)
+        if isinstance(member, MemberValue):
+            found[member.name] = value
     return found

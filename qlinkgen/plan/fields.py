@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.content import BadContent, broken, count_items
-from qlinkgen.plan.expr import Condition, Within
+from qlinkgen.plan.expr import Condition
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -17,9 +17,6 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Learn,
     Member,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
     PayloadPlan,
     ReservedStep,
     Step,
@@ -91,10 +88,8 @@ class Fields:
                 self.spans.append(Span(step, places, raw, size, None, short))
             return
         match step:
-            case ValueStep():
+            case ValueStep() | ConstantStep():
                 self._integer(step, step.integer, step.conditions, places)
-            case ConstantStep():
-                self._integer(step, step.integer, (Within(step.value, step.value),), places)
             case CountStep():
                 self._learn(step, self._integer(step, step.integer, (), places))
             case ReservedStep():
@@ -135,18 +130,7 @@ class Fields:
     def _member(self, member: Member, whole: int, places: tuple[int, ...]) -> None:
         integer = member.number.integer
         number = integer.signed_value(whole >> member.shift & integer.mask)
-        rules: tuple[Condition, ...] = ()
-        match member:
-            case MemberValue():
-                rules = member.conditions
-            case MemberConstant():
-                value = integer.signed_value(member.value)
-                rules = (Within(value, value),)
-            case MemberReserved():
-                pass
-            case _:
-                assert_never(member)
-        self._span(member, places, number, places[0] if broken(rules, number) else None)
+        self._span(member, places, number, places[0] if broken(member.conditions, number) else None)
 
     def _span(
         self, of: Step | Member, places: tuple[int, ...], number: int | None, bad: int | None = None

@@ -63,6 +63,11 @@ class ConstantStep:
     value: int
     number: Scalar
 
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """What must hold of the integer on the wire."""
+        return (Within(self.value, self.value),)
+
 
 @dataclass(frozen=True)
 class ReservedStep:
@@ -123,6 +128,12 @@ class MemberConstant:
         """The number is in two's complement."""
         return self.number.signed
 
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """What must hold of the number."""
+        value = self.number.integer.signed_value(self.value)
+        return (Within(value, value),)
+
 
 @dataclass(frozen=True)
 class MemberReserved:
@@ -133,6 +144,9 @@ class MemberReserved:
     bits: int
     value: int
     number: Scalar
+
+    #: What must hold of the number.
+    conditions = ()
 
 
 Member = MemberValue | MemberConstant | MemberReserved

@@ -102,6 +102,10 @@ class Plan:
         """Messages that a decoder for a direction accepts, by number."""
         return {message.id: message for message in self.received(direction)}
 
+    def hears(self, message: MessagePlan) -> Direction:
+        """The direction in which a decoder is told to listen for a message."""
+        return self.heard[0] if message.direction == "message" else message.direction
+
     @property
     def max_wire_size(self) -> int:
         """Most bytes that a kept message takes on the wire."""

@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 
 from qlinkgen.backends.base import Options, Outputs, banner, copied
-from qlinkgen.cli import targets
 from qlinkgen.cli.targets import Target
 from qlinkgen.model.protocol import Protocol
 from tests.cli.conftest import Run
@@ -38,8 +37,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
         files = {f"{protocol.name}.py": module, "_support.py": support, "py.typed": ""}
         return {f"{options.package}/{name}": text for name, text in files.items()}
 
-    monkeypatch.setitem(targets.TARGETS, "c", Target("c", "", lambda: c))
-    monkeypatch.setitem(targets.TARGETS, "python", Target("python", "", lambda: python))
+    made = {"c": c, "python": python}
+    monkeypatch.setattr(Target, "load", lambda target: made[target.name])
 
 
 @pytest.fixture

@@ -70,7 +70,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def check(kit: Path, compiler: str) -> None:
-    kits.ran(kits.compiled(kit.with_name("kit"), compiler, "-std=c99", kits.STDIO, kit)).check()
+    kits.ran(kits.compiled(kit.with_name("kit"), compiler, "-std=c99", kits.STDIO, kit)).check("wide")
 
 
 @pytest.mark.parametrize("most", [250, 16000, 65535])

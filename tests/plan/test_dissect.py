@@ -62,7 +62,7 @@ _SHAPES = {
         [_DOUBLE, _SIZE, _NUMBER, _NODE, _DATA, _CRC],
         "{after: 7E 7E, insert: 0x7E, exempt: [start, size, id, node, check], checksum: after}",
     ),
-    "neither_length_nor_check": (["start: {role: constant, value: 0x44}", _NUMBER, _NODE, _DATA], ""),
+    "neither_length_nor_check": (["start: {role: constant, value: 0x68}", _NUMBER, _NODE, _DATA], ""),
     "no_length_stuffed": (
         [_DOUBLE, _NUMBER, _NODE, _DATA, _SUM],
         "{after: 0x7E, insert: 0x00, exempt: [start]}",

@@ -25,6 +25,27 @@ SHIPPED = ("qlink", "trio", "mc1231a")
 OTHERS = tuple(sorted(path.stem for path in (ROOT / "tests" / "schemas").glob("*.yaml")))
 PROTOCOLS = (*SHIPPED, *OTHERS)
 
+#: Wrong frames that C and construct, which do not print the plan of a frame yet, give another kind: the kind
+#: found and that of the plan, and how many there are. An entry goes as soon as they agree.
+UNLIKE: Mapping[tuple[str, str], Mapping[tuple[str, str], int]] = {
+    ("qlink", "c"): {("crc", "length"): 1},
+    ("mc1231a", "c"): {("crc", "length"): 1},
+    ("dynamixel", "c"): {("crc", "length"): 1},
+    ("kitchen_sink", "c"): {("crc", "length"): 3},
+    ("modbus_rtu", "c"): {("frame", "range"): 12, ("frame", "unknown"): 2, ("crc", "length"): 12},
+    ("wide", "c"): {("crc", "length"): 1, ("length", "truncated"): 1},
+    ("mc1231a", "construct"): {
+        ("length", "truncated"): 68,
+        ("illegal", "truncated"): 41,
+        ("crc", "length"): 1,
+    },
+    ("modbus_rtu", "construct"): {
+        ("length", "truncated"): 13,
+        ("crc", "truncated"): 17,
+        ("crc", "length"): 2,
+    },
+}
+
 
 @dataclass(frozen=True)
 class Case:
@@ -74,7 +95,7 @@ def module(name: str) -> Any:
 @functools.cache
 def generated(name: str) -> Mapping[str, Any]:
     """The vectors that the compiler writes, read back from their text."""
-    [text] = vectors.generate(protocol(name), Options(), reference(name)).values()
+    [text] = vectors.generate(protocol(name), Options()).values()
     return json.loads(text, parse_float=Decimal)  # type: ignore[no-any-return]
 
 

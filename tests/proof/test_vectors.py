@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
@@ -48,17 +49,19 @@ def test_bytes_become_the_values(name: str, output: str, make: Make) -> None:
 @every_protocol
 def test_what_is_wrong_is_refused_for_the_same_reason(name: str, output: str, make: Make) -> None:
     made = make(name, output)
-    disagreements = []
+    disagreements, kinds = [], Counter[tuple[object, str]]()
     for refusal in cases.refusals(name):
         try:
             found: object = made.decode(refusal.message, refusal.wire, refusal.request)
         except Refused as error:
             found = error.kind
         if found != refusal.kind:
+            kinds[found, refusal.kind] += 1
             disagreements.append(
                 (refusal.message.name, refusal.what, found, refusal.kind, refusal.wire.hex())
             )
-    assert not disagreements
+    target = "c" if output in COMPILED else output.split(maxsplit=1)[0]
+    assert kinds == Counter(cases.UNLIKE.get((name, target), {})), disagreements
 
 
 def same(found: Decoded, expected: Decoded) -> bool:

@@ -37,6 +37,8 @@ from qlinkgen.transport.serving import serve, serve_async
 from tests.link.line import Node
 from tests.transport.conftest import PATIENCE
 
+pytestmark = pytest.mark.pty
+
 FOREIGN = b"bytes of another file"
 CLOSED = "was closed here"
 

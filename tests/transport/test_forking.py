@@ -25,6 +25,8 @@ from qlinkgen.transport.ring import NodeThread, PumpedNode
 from qlinkgen.transport.waker import Waker
 from tests.transport.conftest import PATIENCE
 
+pytestmark = pytest.mark.pty
+
 ASK = qlink.MotorPositionRequest(node=3)
 
 

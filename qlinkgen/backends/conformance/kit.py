@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from qlinkgen.backends.base import Options, banner
+from qlinkgen.backends.base import banner
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import numbers, wrapped
 from qlinkgen.backends.conformance.messages import ERRORS, Entries
@@ -12,8 +12,8 @@ from qlinkgen.backends.conformance.rows import Right, kinds_in, most_values, row
 from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame
-from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import Plan
+from qlinkgen.plan.framing import Marks, Rescan
 
 #: Bits of a row's first byte that name kinds; the two above them say "by hand" and "refused".
 _KINDS = 6
@@ -22,33 +22,31 @@ _KINDS = 6
 class Kit:
     """Lowers the vectors of a protocol to the tables of a C file."""
 
-    def __init__(self, protocol: Protocol, options: Options, sources: Sources) -> None:
-        """What is kept is what the header keeps under the same options."""
-        self._protocol = protocol
+    def __init__(self, plan: Plan, sources: Sources) -> None:
+        """``plan`` has what the header has."""
+        self._plan = plan
         self._header = sources.header
-        # The generated vectors are made under the same options, so they say which messages are kept.
-        kept = {entry["message"] for entry in sources.generated["vectors"]}
-        self._messages = tuple(message for message in protocol.messages if message.name in kept)
-        rows = rows_of(protocol, sources)
-        self._rows = {message.name: rows[message.name] for message in self._messages}
+        self._rows = rows_of(plan, sources)
         self._every = [row for each in self._rows.values() for row in each]
-        self._entries = Entries(protocol, options.role, sources, self._messages, self._rows)
+        self._entries = Entries(plan, sources.header, self._rows)
 
     def view(self) -> dict[str, Any]:
         """What the templates place."""
         header, entries = self._header, self._entries.views()
-        check, kinds, noise = self._check(), self._kinds(), streams.noise(self._protocol)
+        check, kinds, noise = self._check(), self._kinds(), streams.noise(self._plan)
         tests = bool(check) + sum(entry[key] for entry in entries for key in _COUNTED)
         most_wire = max(len(row.wire) for row in self._every)
         return {
-            "about": [piece for line in banner(self._protocol) for piece in wrapped(line)],
+            "about": [piece for line in banner(self._plan.protocol) for piece in wrapped(line)],
             "p": header.prefix,
             "P": header.upper,
             **{name: getattr(header, name) for name in _HABITS},
             "address_type": f"uint{header.address_bits}_t",
             "address_bytes": header.address_bits // 8,
-            "marked": isinstance(self._protocol.frame, MarkedFrame),
-            "broadcast": header.address and self._protocol.bus.broadcast is not None,
+            "marked": isinstance(self._plan.frame.receiver, Marks),
+            "rescans": isinstance(self._plan.frame.receiver, Rescan),
+            "packets": self._plan.frame.needs_request,
+            "broadcast": header.address and self._plan.protocol.bus.broadcast is not None,
             "size_bytes": self._entries.size_bytes,
             **self._types(entries, most_wire, tests),
             "check": check,
@@ -63,7 +61,7 @@ class Kit:
             # An answer without a payload that nothing frames or checks.
             "empty_wires": not all(row.wire for row in self._every if isinstance(row, Right)),
             "most_request": max(len(row.request) for row in self._every),
-            "most_values": max(1, *(most_values(header, message) for message in self._messages)),
+            "most_values": max(1, *(most_values(header, each.message) for each in self._plan.messages)),
             "most_events": self._entries.most_events + 1,
             "entries": entries,
             "last": len(entries) - 1,
@@ -81,7 +79,7 @@ class Kit:
     def _types(self, entries: list[dict[str, Any]], most_wire: int, tests: int) -> dict[str, Any]:
         """Unsigned types that hold every number of the kit; 16 bits where they do, for small targets."""
         members = max(len(entry["members"]) for entry in entries)
-        values = max(most_values(self._header, message) for message in self._messages)
+        values = max(most_values(self._header, each.message) for each in self._plan.messages)
         printed = max(tests, most_wire, (1 << self._header.address_bits) - 1)
         return {
             # A number in a struct is followed by up to seven bytes of padding.
@@ -97,18 +95,16 @@ class Kit:
         kinds = tuple(kinds_in(self._rows))
         if len(kinds) > _KINDS:
             raise GenerationError(
-                f"{self._protocol.name}: {len(kinds)} kinds of vectors; a kit holds {_KINDS}"
+                f"{self._plan.protocol.name}: {len(kinds)} kinds of vectors; a kit holds {_KINDS}"
             )
         return kinds
 
     def _check(self) -> dict[str, Any] | None:
         """The check value of the nine characters 123456789, where it is a CRC."""
-        frame, bits = self._protocol.frame, self._header.check_bits
-        part = frame.part("checksum") if isinstance(frame, DelimitedFrame) else frame
-        checksum = part.checksum if part else None
-        if checksum is None or not bits or not isinstance(checksum.algorithm, Algorithm):
+        check, bits = self._plan.frame.check, self._header.check_bits
+        if check is None or not bits or not isinstance(check.algorithm, Algorithm):
             return None
-        algorithm = checksum.algorithm
+        algorithm = check.algorithm
         suffix = {8: "u", 16: "u", 32: "ul", 64: "ull"}[bits]
         value = f"0x{algorithm.check:0{bits // 4}X}"
         return {"name": algorithm.name, "bits": bits, "value": value, "literal": value + suffix}
@@ -119,6 +115,6 @@ def _unsigned(most: int) -> str:
 
 
 #: What the templates ask of the header under its own name.
-_HABITS = ("id", "address", "directed", "unpacks", "rescans", "packets", "listener", "sum_bits")
+_HABITS = ("id", "address", "directed", "unpacks", "listener", "sum_bits")
 #: Numbers of tests of a message.
 _COUNTED = ("tests", "asked_tests", "told_tests")

@@ -8,12 +8,12 @@ from typing import Any
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import call, comment, folded, numbers, row_lines
 from qlinkgen.backends.conformance.rows import Right, Row, Wrong
-from qlinkgen.backends.conformance.sources import Sources
+from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.backends.conformance.streams import INTACT, Stream
 from qlinkgen.backends.conformance.unsent import Unsent, unsent
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Scalar
+from qlinkgen.plan import MessagePlan, Plan
 
 #: Words for the errors of a header, in the order of their numbers.
 ERRORS = (
@@ -26,22 +26,13 @@ _RANGE = "range"
 class Entries:
     """Lowers the messages that are kept, in schema order."""
 
-    def __init__(
-        self,
-        protocol: Protocol,
-        role: str,
-        sources: Sources,
-        messages: Sequence[Message],
-        rows: Mapping[str, Sequence[Row]],
-    ) -> None:
-        """Role is the side that the header is for, or "both"."""
-        self._protocol = protocol
-        self._role = role
-        self._header = sources.header
-        self._messages = messages
+    def __init__(self, plan: Plan, header: Header, rows: Mapping[str, Sequence[Row]]) -> None:
+        """``rows`` are the vectors of each message."""
+        self._plan = plan
+        self._header = header
         self._rows = rows
-        self._numbers = {message.name: number for number, message in enumerate(messages)}
-        self._streams = {message.name: self._stream(sources, message) for message in messages}
+        self._numbers = {message.name: number for number, message in enumerate(plan.messages)}
+        self._streams = {each.name: streams.stream(plan, each, rows[each.name]) for each in plan.messages}
         most = max(size for each in rows.values() for row in each for size in _sizes(row))
         #: Bytes that say how long a part of a row is.
         self.size_bytes = 1 if most <= 0xFF else 2 if most <= 0xFFFF else 3
@@ -54,47 +45,31 @@ class Entries:
 
     def views(self) -> list[dict[str, Any]]:
         """Each message for the templates."""
-        return [self._view(message) for message in self._messages]
+        return [self._view(message) for message in self._plan.messages]
 
     # Who does what
 
-    def _encoded(self, message: Message) -> bool:
-        sender = {"request": "master", "response": "slave"}.get(message.direction, self._role)
-        return self._role in ("both", sender)
-
-    def _decoded(self, message: Message) -> bool:
-        receiver = {"request": "slave", "response": "master"}.get(message.direction, self._role)
-        return self._role in ("both", receiver)
-
-    def _asked(self, message: Message) -> bool:
+    def _asked(self, message: MessagePlan) -> bool:
         """A slave has a function for it."""
-        ring = self._protocol.directions == ("message",)
-        return self._role != "master" and not ring and message.direction != "response"
+        return "request" in self._plan.heard and message.direction != "response"
 
-    def _told(self, message: Message) -> bool:
+    def _told(self, message: MessagePlan) -> bool:
         """A listener has a function for it."""
-        ring = self._protocol.directions == ("message",)
-        listens = self._role != "slave" or ring
+        listens = self._plan.heard != ("request",)
         return bool(self._header.listener) and listens and message.direction != "request"
 
-    def _answer(self, message: Message) -> Message | None:
-        command = self._protocol.command_of(message)
+    def _answer(self, message: MessagePlan) -> Message | None:
+        command = self._plan.protocol.command_of(message.message)
         answer = command.response if command else None
         return answer if answer and answer.name in self._numbers else None
 
-    def _stream(self, sources: Sources, message: Message) -> Stream | None:
-        direction = streams.received_as(self._header, self._protocol, message, self._role)
-        if direction is None or not self._decoded(message):
-            return None
-        return streams.stream(self._protocol, sources, direction, self._rows[message.name])
-
     # A message
 
-    def _view(self, message: Message) -> dict[str, Any]:
-        header, rows, found = self._header, self._rows[message.name], self._streams[message.name]
-        framed = self._decoded(message) and not (header.packets and message.direction == "response")
-        as_heard = streams.received_as(header, self._protocol, message, self._role)
-        refused = self._unsent(message) if self._encoded(message) else []
+    def _view(self, plan: MessagePlan) -> dict[str, Any]:
+        header, message = self._header, plan.message
+        rows, found = self._rows[plan.name], self._streams[plan.name]
+        framed = plan.decoded and not (self._plan.frame.needs_request and plan.direction == "response")
+        refused = self._unsent(message) if plan.encoded else []
         view = {
             "number": self._numbers[message.name],
             "name": message.name,
@@ -104,19 +79,19 @@ class Entries:
             "has_struct": bool(message.values),
             "has_bytes": bool(message.fields),
             "members": [line for value in message.values for line in self._members(message, value)],
-            "encoded": self._encoded(message),
-            "decoded": self._decoded(message),
+            "encoded": plan.encoded,
+            "decoded": plan.decoded,
             "framed": framed,
-            "taken_as": as_heard or message.direction,
+            "taken_as": self._plan.hears(plan),
             "received": found is not None,
             "lines": [line for index, row in enumerate(rows) for line in self._lines(row, found, index)],
             "unsent_lines": [line for row in refused for line in self._unsent_lines(row)],
-            "tests": len(refused) + self._tests(message, rows, found),
+            "tests": len(refused) + self._tests(plan, rows, found),
             "asked_tests": 0,
             "told_tests": 0,
         }
         view |= self._calls(message, view)
-        view |= self._dispatched(message, rows)
+        view |= self._dispatched(plan, rows)
         return view | {"entry_lines": _entry(message, view, found)}
 
     def _calls(self, message: Message, view: Mapping[str, Any]) -> dict[str, Any]:
@@ -132,11 +107,12 @@ class Entries:
             "decode_lines": call(f"return {function}_{decode}({store}{decode_part}bytes, size);"),
         }
 
-    def _dispatched(self, message: Message, rows: Sequence[Row]) -> dict[str, Any]:
-        header, refused = self._header, sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
+    def _dispatched(self, plan: MessagePlan, rows: Sequence[Row]) -> dict[str, Any]:
+        header, message = self._header, plan.message
+        refused = sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
         view: dict[str, Any] = {"slave_member": "", "told_member": "", "answer": None}
-        if self._asked(message):
-            answer = self._answer(message)
+        if self._asked(plan):
+            answer = self._answer(plan)
             view["slave_member"] = header.slave_member(message)
             view["asked_tests"] = refused + sum(isinstance(row, Right) and bool(row.kinds) for row in rows)
             if answer:
@@ -146,16 +122,16 @@ class Entries:
                     "function": header.function(answer),
                     "has_struct": bool(answer.values),
                 }
-        if self._told(message):
+        if self._told(plan):
             view["told_member"] = header.told_member(message)
             view["told_tests"] = refused + sum(isinstance(row, Right) for row in rows)
         return view
 
-    def _tests(self, message: Message, rows: Sequence[Row], found: Stream | None) -> int:
+    def _tests(self, plan: MessagePlan, rows: Sequence[Row], found: Stream | None) -> int:
         """Tests of making, taking apart and receiving."""
         sent = sum(isinstance(row, Right) and not row.decode_only for row in rows)
         fed = sum(each is not None for each in found.events) if found else 0
-        return fed + (sent if self._encoded(message) else 0) + (len(rows) if self._decoded(message) else 0)
+        return fed + (sent if plan.encoded else 0) + (len(rows) if plan.decoded else 0)
 
     def _unsent(self, message: Message) -> list[Unsent]:
         rows = self._rows[message.name]

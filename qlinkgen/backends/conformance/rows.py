@@ -9,9 +9,9 @@ from typing import Any
 
 from qlinkgen.backends.conformance.sources import Header, Sources
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.model.values import Native, default_of, from_json, raw_from_native
+from qlinkgen.plan import Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +57,21 @@ class Wrong:
 Row = Right | Wrong
 
 
-def rows_of(protocol: Protocol, sources: Sources) -> dict[str, list[Row]]:
-    """Every vector by the full name of its message; the wrong ones stand among the right ones.
+def rows_of(plan: Plan, sources: Sources) -> dict[str, list[Row]]:
+    """Every vector by the full name of its message; the wrong ones are mixed with the right ones.
 
-    The last one of a message is right: behind it nothing is left in a receiver.
+    The last one of a message is right: after it nothing is left in a receiver.
     """
-    right: dict[str, list[Right]] = {}
-    wrong: dict[str, list[Wrong]] = {}
+    right: dict[str, list[Right]] = {message.name: [] for message in plan.messages}
+    wrong: dict[str, list[Wrong]] = {message.name: [] for message in plan.messages}
     for document in (sources.generated, sources.by_hand):
         for entry in document.get("vectors", ()):
-            right.setdefault(entry["message"], []).append(_right(protocol, sources.header, entry))
+            if entry["message"] in right:
+                right[entry["message"]].append(_right(plan, sources.header, entry))
         for entry in document.get("faults", ()):
-            wrong.setdefault(entry["message"], []).append(_wrong(protocol, entry))
-    return {name: _mixed(right[name], wrong.get(name, [])) for name in right}
+            if entry["message"] in wrong:
+                wrong[entry["message"]].append(_wrong(plan, entry))
+    return {name: _mixed(right[name], wrong[name]) for name in right}
 
 
 def _mixed(right: Sequence[Right], wrong: Sequence[Wrong]) -> list[Row]:
@@ -80,13 +82,13 @@ def _mixed(right: Sequence[Right], wrong: Sequence[Wrong]) -> list[Row]:
     return mixed
 
 
-def _right(protocol: Protocol, header: Header, entry: Mapping[str, Any]) -> Right:
-    message = protocol.by_name[entry["message"]]
+def _right(plan: Plan, header: Header, entry: Mapping[str, Any]) -> Right:
+    message = plan.by_name[entry["message"]].message
     by_hand = "kinds" not in entry
     return Right(
         message=message,
         kinds=() if by_hand else tuple(entry["kinds"]),
-        address=entry.get(protocol.address_name or "", message.default_address),
+        address=entry.get(plan.frame.address, message.default_address),
         values=b"".join(_value(header, value, entry) for value in message.values),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),
@@ -96,11 +98,11 @@ def _right(protocol: Protocol, header: Header, entry: Mapping[str, Any]) -> Righ
     )
 
 
-def _wrong(protocol: Protocol, entry: Mapping[str, Any]) -> Wrong:
+def _wrong(plan: Plan, entry: Mapping[str, Any]) -> Wrong:
     return Wrong(
-        message=protocol.by_name[entry["message"]],
+        message=plan.by_name[entry["message"]].message,
         kind=entry["kind"],
-        what=entry.get("what", ""),
+        what=f"{entry['part']}: {entry['what']}" if "what" in entry else "",
         wire=bytes.fromhex(entry["wire"]),
         request=bytes.fromhex(entry.get("request", "")),
         source="" if "what" in entry else _source(entry),

@@ -1,13 +1,13 @@
-"""What the kit is made of: arguments all, as back-ends do not know each other."""
+"""What the kit is made of beside the plan: arguments all, as back-ends do not know each other."""
 
 from __future__ import annotations
 
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from qlinkgen.model.message import Direction, Field, Message
+from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Scalar
 
 
@@ -52,16 +52,6 @@ class Header(typing.Protocol):
     @property
     def unpacks(self) -> bool:
         """Taking a frame apart needs a buffer."""
-        ...
-
-    @property
-    def rescans(self) -> bool:
-        """One byte can bring several events, and the end of a stream some more."""
-        ...
-
-    @property
-    def packets(self) -> bool:
-        """An answer is taken apart by its message's own function, and nothing receives it."""
         ...
 
     @property
@@ -113,28 +103,6 @@ class Header(typing.Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
-    """What a receiver told: an intact message with its payload, or the kind of a fault."""
-
-    kind: str = ""
-    message: str = ""
-    address: int = 0
-    payload: bytes = b""
-
-
-class Listener(typing.Protocol):
-    """A receiver that is known to be right."""
-
-    def feed(self, data: bytes) -> Sequence[Heard]:
-        """What the next bytes complete."""
-        ...
-
-    def finish(self) -> Sequence[Heard]:
-        """What is left at the end of a stream."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
 class Sources:
     """Everything that the kit states, and what it is written against.
 
@@ -142,10 +110,8 @@ class Sources:
         header: the header.
         generated: vectors as the target `vectors` writes them: ``vectors`` and ``faults``.
         by_hand: vectors that people worked out, in the form of schemas/vectors; {} where there are none.
-        listen: makes a receiver of a direction, to say what a stream brings.
     """
 
     header: Header
     generated: Mapping[str, Any]
     by_hand: Mapping[str, Any]
-    listen: Callable[[Direction], Listener]

@@ -137,6 +137,9 @@ class Decoder:
             lines = [f"{raw} = {integers.read(address.integer, place.data, lambda more: str(at + more))}"]
             lines += self._address_check(address, raw, _INDENT + 4)
             chosen = [f"{place.address}={raw}", *chosen]
+        elif place.address and self.message.allowed is not None:
+            # The caller of `_read` puts in the right one.
+            chosen = [f"{place.address}={self.message.message.default_address}", *chosen]
         lines += wrapped("return cls(", chosen, ")", _INDENT + 4)
         return [f"if {test}:", *indented(lines)]
 

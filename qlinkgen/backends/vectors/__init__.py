@@ -1,133 +1,137 @@
-"""Test vectors: for every message a few choices of values and their bytes, and frames wrong in one way each.
+"""Test vectors: for every message a few choices of values and their bytes, and frames with one wrong part.
 
-Which values is decided here and in `choice`, what is wrong in `faults`. The bytes come from a `Reference`: an
-argument, as back-ends do not know each other, ``generate(protocol, options, construct.live(protocol))``.
+`choice` decides which values, `faults` what is wrong. The bytes, and the kind of every fault, are those of
+the plan's interpreter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import assert_never
 
 from qlinkgen.backends.base import Options, Outputs, banner
-from qlinkgen.backends.vectors import choice, faults, writer
-from qlinkgen.backends.vectors.choice import Chance, Raw
-from qlinkgen.backends.vectors.reference import Good, Reference
-from qlinkgen.model.frame import PacketFrame
-from qlinkgen.model.message import Direction, Message
+from qlinkgen.backends.vectors import choice, writer
+from qlinkgen.backends.vectors.choice import Chance
+from qlinkgen.backends.vectors.faults import Faults, Good
+from qlinkgen.backends.vectors.writer import Json
+from qlinkgen.model.message import Direction, Value
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Scalar
-from qlinkgen.model.values import to_json
+from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.model.values import Native, native_from_raw, to_json
+from qlinkgen.plan import MessagePlan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import Raw, pack
 
-__all__ = ["KINDS", "Reference", "generate"]
+__all__ = ["KINDS", "generate"]
 
 #: Kinds of vectors that every message has. Kinds that come to the same bytes share a line.
 KINDS = ("defaults", "minimum", "maximum", "a5", "random1", "random2")
+_RULES = {"minimum": choice.MINIMUM, "maximum": choice.MAXIMUM, "a5": choice.A5}
 
 
-def generate(protocol: Protocol, options: Options, reference: Reference) -> Outputs:
+def generate(protocol: Protocol, options: Options) -> Outputs:
     """The vectors of a protocol: path below the output folder to text."""
-    vectors = _Vectors(protocol, reference)
-    kept = [
-        each
-        for each in protocol.messages
-        if not options.only or {each.name, each.command} & set(options.only)
-    ]
+    vectors = _Vectors(protocol)
+    kept = plan_of(protocol, Options(only=options.only)).messages
     good = {message.name: vectors.of(message) for message in kept}
-    head = {
-        "about": banner(protocol),
-        "protocol": protocol.name,
-    }
-    rows = (row for message in kept for row in vectors.rows(message, good[message.name]))
-    text = writer.document(head, {"vectors": rows, "faults": _faults(protocol, reference, kept, good)})
+    head: dict[str, Json] = {"about": banner(protocol), "protocol": protocol.name}
+    rows = (row for each in good.values() for row in vectors.rows(each))
+    text = writer.document(head, {"vectors": rows, "faults": vectors.faults(good.values())})
     return {f"vectors/{protocol.name}.json": text}
-
-
-def _faults(
-    protocol: Protocol, reference: Reference, messages: list[Message], good: Mapping[str, Mapping[str, Good]]
-) -> Iterator[Mapping[str, Any]]:
-    begun: set[Direction] = set()
-    for message in messages:
-        vectors = good[message.name]
-        if message.direction not in begun:
-            begun.add(message.direction)
-            yield from (bad.entry() for bad in faults.of_protocol(protocol, reference, vectors))
-        yield from (bad.entry() for bad in faults.of_message(protocol, reference, vectors))
 
 
 class _Vectors:
     """Makes the vectors of one protocol's messages."""
 
-    def __init__(self, protocol: Protocol, reference: Reference) -> None:
+    def __init__(self, protocol: Protocol) -> None:
         self._protocol = protocol
-        self._reference = reference
-        self._packets = isinstance(protocol.frame, PacketFrame)
-        #: Requests already made, for the responses of packets.
-        self._requests: dict[tuple[str, str], bytes] = {}
+        # A response may be kept without the request that its packet answers.
+        self._codec = Codec(plan_of(protocol))
 
-    def of(self, message: Message) -> dict[str, Good]:
+    def of(self, message: MessagePlan) -> dict[str, Good]:
         """The vectors of a message by kind."""
         return {kind: self._one(message, kind) for kind in KINDS}
 
-    def _one(self, message: Message, kind: str) -> Good:
+    def _one(self, message: MessagePlan, kind: str) -> Good:
         chance = Chance(f"{self._protocol.name} {message.name} {kind}")
-        raws = _raws(message, kind, chance)
+        values = _values(message, kind, chance)
         address = _address(message, kind, chance)
         request = self._request(message, kind)
-        payload = self._reference.payload(message.name, choice.natives(message, raws))
-        wire = self._reference.seal(message.name, payload, address or 0, request)
-        if self._packets and message.direction == "request":
-            self._requests[message.command, kind] = wire
-        return Good(message, address, raws, payload, wire, request)
+        wire = self._codec.encode(message.name, values, address, request)
+        return Good(message, address, values, pack(message.payload, values), wire, request)
 
-    def _request(self, message: Message, kind: str) -> bytes:
-        if not self._packets or message.direction != "response":
+    def _request(self, message: MessagePlan, kind: str) -> bytes:
+        """The packet that a response answers, where it means nothing without it."""
+        if not self._codec.plan.frame.needs_request or message.direction != "response":
             return b""
-        if (message.command, kind) not in self._requests:
-            self._one(self._protocol.message(f"{message.command}.request"), kind)
-        return self._requests[message.command, kind]
+        return self._one(self._codec.plan.message(f"{message.message.command}.request"), kind).wire
 
-    def rows(self, message: Message, vectors: Mapping[str, Good]) -> Iterator[Mapping[str, Any]]:
+    def faults(self, messages: Iterable[Mapping[str, Good]]) -> Iterator[Mapping[str, Json]]:
+        """The wrong frames; those that are alike for all messages are made of the first of a direction."""
+        faults = Faults(self._codec)
+        begun: set[Direction] = set()
+        for good in messages:
+            one = good["defaults"]
+            yield from (bad.entry() for bad in faults.of(one, first=one.message.direction not in begun))
+            begun.add(one.message.direction)
+
+    def rows(self, vectors: Mapping[str, Good]) -> Iterator[Mapping[str, Json]]:
         """The lines of a message in the file; equal frames are one."""
         kinds: dict[tuple[bytes, bytes], list[str]] = {}
         for kind, good in vectors.items():
             kinds.setdefault((good.request, good.wire), []).append(kind)
         for same in kinds.values():
-            yield self._row(message, same, vectors[same[0]])
+            yield self._row(same, vectors[same[0]])
 
-    def _row(self, message: Message, kinds: list[str], good: Good) -> Mapping[str, Any]:
-        row: dict[str, Any] = {"message": message.name, "kinds": kinds}
-        if good.address is not None and self._protocol.address_name:
-            row[self._protocol.address_name] = good.address
-        row |= _values(message, good)
+    def _row(self, kinds: list[str], good: Good) -> Mapping[str, Json]:
+        row: dict[str, Json] = {"message": good.message.name, "kinds": kinds}
+        if good.address is not None:
+            row[self._codec.plan.frame.address] = good.address
+        row |= _shown(good)
         if good.request:
             row["request"] = good.request.hex()
         return row | {"payload": good.payload.hex(), "wire": good.wire.hex()}
 
 
-def _values(message: Message, good: Good) -> Mapping[str, Any]:
+def _shown(good: Good) -> Mapping[str, Json]:
     """Values as a decoder prints them, and the integers on the wire of those that differ from them."""
-    fields, raw = {}, {}
-    for value in message.values:
-        shown = to_json(value, choice.native(value, good.values[value.name]))
-        fields[value.name] = shown
-        if isinstance(value.type, Scalar) and (type(shown) is not int or shown != good.values[value.name]):
-            raw[value.name] = good.values[value.name]
-    return {"fields": fields} | ({"raw": raw} if raw else {})
+    fields: dict[str, Json] = {}
+    raw: dict[str, Json] = {}
+    for value in good.message.message.values:
+        number = good.values[value.name]
+        shown = fields[value.name] = to_json(value, _native(value, number))
+        if isinstance(number, int) and (type(shown) is not int or shown != number):
+            raw[value.name] = number
+    return {"fields": fields, "raw": raw} if raw else {"fields": fields}
 
 
-def _raws(message: Message, kind: str, chance: Chance) -> dict[str, Raw]:
+def _native(value: Value, raw: Raw) -> Native:
+    """A value on the wire as Python holds it."""
+    match value.type:
+        case Scalar():
+            assert isinstance(raw, int)
+            return native_from_raw(value.type, raw)
+        case Blob(text=True):
+            assert isinstance(raw, bytes)
+            return raw.decode("ascii")
+        case Blob() | Array():
+            return raw
+        case _:
+            assert_never(value.type)
+
+
+def _values(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:
     if kind == "defaults":
-        return {value.name: choice.default(value) for value in message.values}
-    rules = {"minimum": choice.MINIMUM, "maximum": choice.MAXIMUM, "a5": choice.A5}
-    rule = rules.get(kind) or choice.random(chance)
-    return {value.name: rule.raw(value) for value in message.values}
+        return choice.defaults(message.payload)
+    return (_RULES.get(kind) or choice.random(chance)).values(message.payload)
 
 
-def _address(message: Message, kind: str, chance: Chance) -> int | None:
-    if not message.addresses:
+def _address(message: MessagePlan, kind: str, chance: Chance) -> int | None:
+    if message.allowed is None:
         return None
-    first, last = message.addresses[0][0], message.addresses[-1][1]
+    ranges = message.allowed.ranges
     if kind.startswith("random"):
-        return chance.between(*message.addresses[chance.between(0, len(message.addresses) - 1)])
-    return {"minimum": first, "maximum": last}.get(kind, message.default_address)
+        some = ranges[chance.between(0, len(ranges) - 1)]
+        return chance.between(some.low, some.high)
+    given = {"minimum": ranges[0].low, "maximum": ranges[-1].high}
+    return given.get(kind, message.message.default_address)

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from typing import assert_never
 
-from qlinkgen.model.message import Message, Value
-from qlinkgen.model.types import Array, Bits, Blob, Flags, Length, Scalar
-from qlinkgen.model.values import Native, native_from_raw
-
-Raw = int | bytes | list[int]
-
-#: Byte that the a5 vectors are filled with, so that all that can be stuffed is.
-_PATTERN = 0xA5
+from qlinkgen.model.integer import Integer, unpack_chunks
+from qlinkgen.model.types import Length, Scalar
+from qlinkgen.plan.content import Raw, broken, default_of
+from qlinkgen.plan.expr import Clear
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    MemberValue,
+    PayloadPlan,
+    ReservedStep,
+    ValueStep,
+    conditions,
+)
 
 
 class Chance:
@@ -41,42 +50,69 @@ class Rule:
     """How the values of one kind of vector are chosen."""
 
     def __init__(
-        self, number: Callable[[Scalar, int], int], count: Callable[[Length], int], octet: Callable[[], int]
+        self,
+        number: Callable[[Scalar, int], int],
+        count: Callable[[Length], int],
+        octet: Callable[[int], int],
+        pattern: bytes = b"\0",
     ) -> None:
-        """``number`` is told the integer and the pattern's bits in its place."""
+        """``octet`` is told its index; ``number`` the integer, and the bits of the pattern in its place."""
         self._number = number
         self._count = count
         self._octet = octet
+        self._pattern = pattern
 
-    def raw(self, value: Value) -> Raw:
-        """The value on the wire."""
-        kind = value.type
-        if isinstance(kind, Blob):
-            mask = 0x7F if kind.text else 0xFF
-            return bytes(self._octet() & mask for _ in range(self._count(kind.length)))
-        if isinstance(kind, Array):
-            return [self._scalar(kind.item, _pattern(kind.item)) for _ in range(self._count(kind.length))]
-        return self._scalar(kind, _pattern_of(value))
+    def values(self, plan: PayloadPlan) -> dict[str, Raw]:
+        """The values of a payload as they are on the wire."""
+        found: dict[str, Raw] = {}
+        for step in plan.steps:
+            match step:
+                case ValueStep():
+                    found[step.name] = self._chosen(step.number, self._bits(step.integer))
+                case BitsStep():
+                    bits = self._bits(step.integer)
+                    for member in step.members:
+                        if isinstance(member, MemberValue):
+                            found[member.name] = self._chosen(member.number, bits >> member.shift)
+                case BytesStep():
+                    mask = 0x7F if step.text else 0xFF
+                    found[step.name] = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
+                case ItemsStep():
+                    bits, count = self._bits(step.item), self._count(step.length)
+                    found[step.name] = [self._chosen(step.number, bits) for _ in range(count)]
+                case ConstantStep() | ReservedStep() | CountStep():
+                    pass
+                case _:
+                    assert_never(step)
+        return found
 
-    def _scalar(self, scalar: Scalar, pattern: int) -> int:
-        number = self._number(scalar, pattern)
-        meaning = scalar.meaning
-        return number & meaning.mask if isinstance(meaning, Flags) and meaning.reserved_zero else number
+    def _bits(self, integer: Integer) -> int:
+        return unpack_chunks((self._pattern * integer.size)[: integer.size], integer.chunks)
+
+    def _chosen(self, scalar: Scalar, bits: int) -> int:
+        number = self._number(scalar, bits & scalar.integer.mask)
+        for each in conditions(scalar):
+            number &= ~each.mask if isinstance(each, Clear) else -1
+        return number
 
 
 def _fitting(scalar: Scalar, pattern: int) -> int:
     """The pattern in as many low bytes as the range allows; the default where it allows none."""
     for bits in range(scalar.bits, 0, -8):
-        number = pattern & (1 << bits) - 1
-        number -= number >> (scalar.bits - 1) << scalar.bits if scalar.signed else 0
+        number = scalar.integer.signed_value(pattern & (1 << bits) - 1)
         if scalar.minimum <= number <= scalar.maximum:
             return number
     return scalar.default
 
 
-MINIMUM = Rule(lambda scalar, _: scalar.minimum, lambda length: length.minimum, lambda: 0x00)
-MAXIMUM = Rule(lambda scalar, _: scalar.maximum, lambda length: length.maximum, lambda: 0xFF)
-A5 = Rule(_fitting, lambda length: length.maximum, lambda: _PATTERN)
+def filled(pattern: bytes) -> Rule:
+    """The pattern over and over, wherever the ranges allow it."""
+    return Rule(_fitting, lambda length: length.maximum, lambda index: pattern[index % len(pattern)], pattern)
+
+
+MINIMUM = Rule(lambda scalar, _: scalar.minimum, lambda length: length.minimum, lambda _: 0x00)
+MAXIMUM = Rule(lambda scalar, _: scalar.maximum, lambda length: length.maximum, lambda _: 0xFF)
+A5 = filled(b"\xa5")
 
 
 def random(chance: Chance) -> Rule:
@@ -84,41 +120,15 @@ def random(chance: Chance) -> Rule:
     return Rule(
         lambda scalar, _: chance.between(scalar.minimum, scalar.maximum),
         lambda length: chance.between(length.minimum, length.maximum),
-        lambda: chance.between(0, 0xFF),
+        lambda _: chance.between(0, 0xFF),
     )
 
 
-def default(value: Value) -> Raw:
-    """What is sent when nothing is given."""
-    kind = value.type
-    return list(kind.default) if isinstance(kind, Array) else kind.default
-
-
-def native(value: Value, raw: Raw) -> Native:
-    """A value on the wire as Python holds it."""
-    kind = value.type
-    if isinstance(kind, Scalar):
-        assert isinstance(raw, int)
-        return native_from_raw(kind, raw)
-    if isinstance(kind, Blob) and kind.text:
-        assert isinstance(raw, bytes)
-        return raw.decode("ascii")
-    assert not isinstance(raw, int)
-    return raw
-
-
-def natives(message: Message, raws: Mapping[str, Raw]) -> dict[str, Native]:
-    """All values of a message as Python holds them."""
-    return {value.name: native(value, raws[value.name]) for value in message.values}
-
-
-def _pattern(scalar: Scalar) -> int:
-    return sum((_PATTERN & chunk.mask) << chunk.shift for chunk in scalar.chunks)
-
-
-def _pattern_of(value: Value) -> int:
-    assert isinstance(value.type, Scalar)
-    if value.bits is None:
-        return _pattern(value.type)
-    assert isinstance(value.field.type, Bits)
-    return _pattern(value.field.type.container) >> value.bits.shift & (1 << value.type.bits) - 1
+def defaults(plan: PayloadPlan) -> dict[str, Raw]:
+    """What is sent when nothing is given; items that must be given have the default of an item."""
+    found = {each.name: default_of(each) for each in plan.settable}
+    for each in plan.settable:
+        items = found[each.name]
+        if isinstance(each, ItemsStep) and isinstance(items, list):
+            found[each.name] = [each.number.default if broken(each.conditions, i) else i for i in items]
+    return found

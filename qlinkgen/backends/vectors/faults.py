@@ -1,196 +1,312 @@
-"""Frames that are wrong in one way each, and the word that every decoder has for it.
+"""Frames that are wrong in one part each, and the kind that every decoder gives them.
 
-Only what every decoder must see alike is here. The kinds are those of decoding exactly one frame.
+A fault is made of the parts of a right frame: one of them is changed, and what follows from it (a length, the
+check value, inserted bytes) is computed again. The kind is what the plan's interpreter says of exactly one
+frame. A change that leaves a right frame gives no vector.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import assert_never
 
-from qlinkgen.backends.vectors.reference import Good, Reference
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
-from qlinkgen.model.message import Message
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Blob, Scalar
+from qlinkgen.backends.vectors.choice import filled
+from qlinkgen.backends.vectors.writer import Json
+from qlinkgen.model.integer import Integer
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import Raw, count_items, pack
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
+)
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    ReservedStep,
+    Step,
+    ValueStep,
+)
+from qlinkgen.plan.reading import BadFrame
+from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.tree import MessagePlan
+
+
+@dataclass(frozen=True, slots=True)
+class Good:
+    """A frame as it should be."""
+
+    message: MessagePlan
+    address: int | None
+    values: Mapping[str, Raw]
+    payload: bytes
+    wire: bytes
+    #: The packet that it answers, where frames are packets.
+    request: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Bad:
-    """One wrong frame."""
+    """One wrong frame.
+
+    Attributes:
+        part: the part of the frame that is wrong, or in which it breaks off.
+        what: what is wrong with it.
+    """
 
     kind: str
+    part: str
     what: str
-    message: Message
     wire: bytes
-    request: bytes = b""
+    good: Good
 
-    def entry(self) -> Mapping[str, Any]:
+    def entry(self) -> Mapping[str, Json]:
         """The line in the file."""
-        request = {"request": self.request.hex()} if self.request else {}
+        request: dict[str, Json] = {"request": self.good.request.hex()} if self.good.request else {}
         return {
             "kind": self.kind,
-            "message": self.message.name,
+            "message": self.good.message.name,
+            "part": self.part,
             "what": self.what,
             "wire": self.wire.hex(),
             **request,
         }
 
 
-def of_message(protocol: Protocol, reference: Reference, vectors: Mapping[str, Good]) -> Iterator[Bad]:
-    """Faults of one message, made from its vectors by kind."""
-    good = vectors["defaults"]
-    yield from _out_of_range(reference, good)
-    frame = protocol.frame
-    if isinstance(frame, DelimitedFrame):
-        yield from _delimited(frame, reference, vectors)
-    elif isinstance(frame, MarkedFrame):
-        yield from _marked(frame, reference, good)
-    else:
-        yield from _packet(frame, good)
+class Faults:
+    """Makes wrong frames of right ones."""
+
+    def __init__(self, codec: Codec) -> None:
+        """``codec`` says what is wrong with them."""
+        self._codec = codec
+
+    def of(self, good: Good, *, first: bool) -> Iterator[Bad]:
+        """The faults of a message; the first one of its direction also has those that all have alike."""
+        seen = {good.wire}
+        for part, what, wire in _Frame(self._codec, good).changes(first=first):
+            if wire not in seen and (kind := self._kind(good, wire)):
+                yield Bad(kind, part, what, wire, good)
+            seen.add(wire)
+
+    def _kind(self, good: Good, wire: bytes) -> str:
+        try:
+            self._codec.decode(wire, self._codec.plan.hears(good.message), good.request)
+        except BadFrame as bad:
+            return bad.kind
+        return ""
 
 
-def _out_of_range(reference: Reference, good: Good) -> Iterator[Bad]:
-    """Each integer in front of the fields of variable size, one step past its range."""
-    for field in good.message.fields:
-        scalar, at = field.type, good.message.offset(field.name)
-        if at is None:
+class _Frame:
+    """A right frame, taken to its parts."""
+
+    def __init__(self, codec: Codec, good: Good) -> None:
+        self._codec, self._good, self._message = codec, good, good.message
+        self._envelope, self._transparency = good.message.envelope, codec.plan.frame.transparency
+        self._cells = self._made(good.payload)
+
+    def changes(self, *, first: bool) -> Iterator[tuple[str, str, bytes]]:
+        """The name of a part, what is wrong with it, and the frame: everything that is tried."""
+        for part in self._envelope.parts:
+            if first or not isinstance(part, ConstantPart | LengthPart | IdPart):
+                for what, cells in self._changed(part):
+                    yield part.name, what, self._joined({**self._cells, **cells})
+        yield from self._misplaced()
+        wire = self._good.wire
+        for size in range(0 if first else len(wire) - 1, len(wire)):
+            yield self._part_at(self._cells, wire, size), f"it ends after {size} bytes", wire[:size]
+        if first:
+            yield self._envelope.parts[-1].name, "a byte follows the frame", wire + b"\1"
+
+    def _made(self, payload: bytes) -> dict[str, bytes]:
+        return self._codec.cells(self._message, self._codec.sent(payload), self._good.address or 0)
+
+    def _joined(self, cells: Mapping[str, bytes]) -> bytes:
+        return self._codec.join(self._message, cells, self._good.request)
+
+    # Parts
+
+    def _changed(self, part: Part) -> Iterator[tuple[str, Mapping[str, bytes]]]:
+        """What is wrong with a part, and all parts that are other ones."""
+        name = part.name
+        match part:
+            case ConstantPart():
+                data = part.data[:-1] + bytes((part.data[-1] ^ 1,))
+                yield f"{name} is {data.hex()}", {name: data}
+            case LengthPart() | IdPart() | AddressPart():
+                for number in self._numbers(part):
+                    yield f"{name} is {number}", {name: part.integer.pack(number)}
+            case MarkPart():
+                yield from self._marks(part)
+            case PayloadPart():
+                yield from ((what, self._made(payload)) for what, payload in self._payloads())
+            case CheckPart():
+                yield from ((what, {name: part.check.pack(value)}) for what, value in self._checks(part))
+            case _:
+                assert_never(part)
+
+    def _numbers(self, part: LengthPart | IdPart | AddressPart) -> Iterable[int]:
+        most = part.integer.maximum
+        match part:
+            case LengthPart():
+                now = part.integer.unpack(self._cells[part.name])
+                near = (part.least - 1, now - 1, now + 1, part.most + 1)
+                return [number for number in near if 0 <= number <= most]
+            case IdPart():
+                return self._unused(most)
+            case AddressPart():
+                return _outside(self._message.allowed, 0, most)
+            case _:
+                assert_never(part)
+
+    def _unused(self, most: int) -> Iterable[int]:
+        """A number that no message has, if there is one."""
+        ends = {part.end_id for part in self._envelope.parts if isinstance(part, MarkPart)}
+        taken = {message.id for message in self._codec.plan.messages} | ends
+        return itertools.islice((number for number in range(1, most + 1) if number not in taken), 1)
+
+    def _marks(self, part: MarkPart) -> Iterator[tuple[str, Mapping[str, bytes]]]:
+        name, (byte,) = part.name, self._cells[part.name]
+        yield f"{name} has another address", {name: bytes((byte ^ 1 << part.address.shift,))}
+        yield f"{name} is not marked", {name: bytes((byte ^ part.marker,))}
+        if part.end_id is not None:
+            yield f"{name} is a header", {name: bytes((byte ^ 1 << part.id.shift,))}
             return
-        if not isinstance(scalar, Scalar) or not scalar.settable or scalar.maximum == scalar.natural_maximum:
-            continue
-        number = scalar.maximum + 1
-        patch = bytes(number >> chunk.shift & chunk.mask for chunk in scalar.chunks)
-        payload = good.payload[:at] + patch + good.payload[at + len(patch) :]
-        wire = reference.seal(good.message.name, payload, good.address or 0, good.request)
-        yield Bad("range", f"{field.name} is {number}", good.message, wire, good.request)
+        for number in self._unused(part.id.mask):
+            yield f"{part.id_name} is {number}", {name: bytes((part.byte(number, part.address_of(byte)),))}
+        for address in _outside(self._message.allowed, 0, part.address.mask):
+            yield f"{part.address_name} is {address}", self._codec.cells(self._message, b"", address)
+
+    def _checks(self, part: CheckPart) -> Iterator[tuple[str, int]]:
+        mask, refusal = part.check.mask, part.check.rejected
+        value = self._codec.check_value(self._envelope, self._cells, self._good.request) & mask
+        bits = (1 << bit for bit in range(mask.bit_length()) if mask >> bit & 1)
+        yield "a bit is flipped", next(value ^ bit for bit in bits if value ^ bit != refusal)
+        if refusal is not None:
+            yield "the command is refused", refusal
+
+    def _payloads(self) -> Iterator[tuple[str, bytes]]:
+        plan, payload, length = self._message.payload, self._good.payload, self._envelope.length
+        counts = count_items(plan, payload)
+        for step in plan.steps:
+            at = step.place.front.value(counts)
+            for name, number, data in _spoilt(step, payload[at:]):
+                yield f"{name} is {number}", payload[:at] + data + payload[at + len(data) :]
+        if length is None or length.integer.unpack(self._cells[length.name]) < length.integer.maximum:
+            yield "a byte too many", payload + b"\0"
+        yield "the last byte is missing", payload[:-1]
+        if isinstance(self._transparency, SevenBit) and payload:
+            yield "a byte is marked", bytes((payload[0] | self._transparency.marker,)) + payload[1:]
+
+    # Stuffing
+
+    def _misplaced(self) -> Iterator[tuple[str, str, bytes]]:
+        """Frames full of stuffed bytes, one of whose inserted bytes is wrong."""
+        plan, address = self._message.payload, self._good.address or 0
+        match self._transparency:
+            case FrameStuffing(rule):
+                cells = self._made(pack(plan, filled(rule.after).values(plan)))
+                wire = self._joined(cells)
+                for at in _lone(rule, wire, self._inserted(wire)):
+                    for what, data in _damaged(rule, wire, at):
+                        yield self._part_at(cells, wire, at - 1), what, data
+            case PayloadStuffing(rule):
+                sent = rule.stuff(pack(plan, filled(rule.after).values(plan)))
+                for at in _lone(rule, sent, rule.places(sent)):
+                    for what, data in _damaged(rule, sent, at):
+                        cells = self._codec.cells(self._message, data, address)
+                        yield self._envelope.payload.name, what, self._joined(cells)
+            case Plain() | SevenBit():
+                pass
+            case _:
+                assert_never(self._transparency)
+
+    def _inserted(self, wire: bytes) -> list[int]:
+        """Places of the bytes inserted into a stuffed frame."""
+        if not isinstance(self._transparency, FrameStuffing):
+            return []
+        front, end = self._transparency.front, len(wire) - self._transparency.back
+        return [front + at for at in self._transparency.rule.places(wire[front:end])]
+
+    def _part_at(self, cells: Mapping[str, bytes], wire: bytes, at: int) -> str:
+        """The part to which a byte of a frame belongs."""
+        at -= sum(place < at for place in self._inserted(wire))
+        for part in self._envelope.parts:
+            at -= len(cells[part.name]) if isinstance(part, PayloadPart) else part.size
+            if at < 0:
+                return part.name
+        return self._envelope.parts[-1].name
 
 
-def _unused_id(protocol: Protocol, message: Message, last: int, avoid: bytes = b"") -> int | None:
-    both = (message.direction, "message")
-    taken = {
-        each.id for each in protocol.messages if message.direction == "message" or each.direction in both
-    }
-    return next(
-        (number for number in range(1, last + 1) if number not in taken and number not in avoid), None
-    )
+def _lone(rule: Insertion, sent: bytes, places: Iterable[int]) -> Iterable[int]:
+    """The first place of an inserted byte without which its neighbours are neither right nor a preamble."""
+    hidden = (rule.insert, rule.after[0])
+    lone = (at for at in places if at + 1 < len(sent) and sent[at + 1] not in hidden)
+    return itertools.islice(lone, 1)
 
 
-# Frames between preamble and checksum
+def _damaged(rule: Insertion, sent: bytes, at: int) -> Iterator[tuple[str, bytes]]:
+    other = next(byte for byte in (rule.insert ^ 1, rule.insert ^ 2) if byte not in rule.after[:1])
+    yield "an inserted byte is another one", sent[:at] + bytes((other,)) + sent[at + 1 :]
+    yield "an inserted byte is missing", sent[:at] + sent[at + 1 :]
 
 
-def _delimited(frame: DelimitedFrame, reference: Reference, vectors: Mapping[str, Good]) -> Iterator[Bad]:
-    good = vectors["defaults"]
-    message = good.message
-    if frame.part("checksum") is not None and (wire := _bit_flipped(frame, good.wire)):
-        yield Bad("crc", "a bit is flipped", message, wire)
-    if frame.part("length") is not None:
-        yield Bad("truncated", "the last two bytes are missing", message, good.wire[:-2])
-        if message.fixed and message.max_size < frame.payload.max_size:
-            wire = reference.seal(message.name, good.payload + b"\0", good.address or 0)
-            yield Bad("length", "the payload has a byte too many", message, wire)
-    # Without a preamble nothing but id and address tells a frame from noise.
-    if frame.preamble and message.addresses and (outside := message.addresses[-1][1] + 1) <= 0xFF:
-        yield Bad("range", f"sent to {outside}", message, reference.seal(message.name, good.payload, outside))
-    stuffing = frame.stuffing
-    if stuffing and not stuffing.before_checksum and (wire := _badly_stuffed(frame, vectors["a5"].wire)):
-        yield Bad("stuffing", "an inserted byte is another one", message, wire)
+# Values that are not allowed --------------------------------------------------------------------------------
 
 
-def _bit_flipped(frame: DelimitedFrame, wire: bytes) -> bytes | None:
-    """A bit of the last byte flipped, or of one in front of it where stuffing would be disturbed."""
-    after = frame.stuffing.after if frame.stuffing else b""
-    for at in range(len(wire) - 1, frame.header_size, -1):
-        changed = wire[:at] + bytes([wire[at] ^ 1]) + wire[at + 1 :]
-        if not after or (wire[at - 1] not in after and wire[at] not in after and changed[at] not in after):
-            return changed
-    return None
+def _spoilt(step: Step, data: bytes) -> Iterator[tuple[str, int, bytes]]:
+    """Name, number and bytes of values that a step cannot have; ``data`` begins with the right ones."""
+    match step:
+        case ValueStep() | ConstantStep():
+            yield from _beside(step.name, step.integer, step.conditions)
+        case CountStep():
+            number = step.integer.unpack(data[: step.integer.size])
+            yield from _beside(step.name, step.integer, (Within(number, number),))
+        case BitsStep():
+            whole = step.integer.unpack(data[: step.integer.size])
+            for member in step.members:
+                own = member.number.integer
+                for name, number, _ in _beside(member.name, own, member.conditions):
+                    bits = whole & ~(own.mask << member.shift) | (number & own.mask) << member.shift
+                    yield name, number, step.integer.pack(step.integer.signed_value(bits & step.integer.mask))
+        case BytesStep():
+            if step.text and step.length.minimum:
+                yield step.name, data[0] | 0x80, bytes((data[0] | 0x80,))
+        case ItemsStep():
+            yield from _beside(step.name, step.item, step.conditions if step.length.minimum else ())
+        case ReservedStep():
+            pass
+        case _:
+            assert_never(step)
 
 
-def _badly_stuffed(frame: DelimitedFrame, wire: bytes) -> bytes | None:
-    assert frame.stuffing is not None
-    at = wire.find(frame.stuffing.after + bytes([frame.stuffing.insert]), len(frame.preamble))
-    if at < 0:
-        return None
-    place = at + len(frame.stuffing.after)
-    return wire[:place] + bytes([frame.stuffing.insert ^ 1]) + wire[place + 1 :]
+def _beside(name: str, integer: Integer, rules: Iterable[Condition]) -> Iterator[tuple[str, int, bytes]]:
+    for rule in rules:
+        for number in _outside(rule, integer.minimum, integer.maximum):
+            yield name, number, integer.pack(number)
 
 
-# Frames between marked bytes
-
-
-def _marked(frame: MarkedFrame, reference: Reference, good: Good) -> Iterator[Bad]:
-    wire, message = good.wire, good.message
-    if frame.checksum is not None and message.checksum:
-        yield Bad("crc", "a bit is flipped", message, wire[:-2] + bytes([wire[-2] ^ 1]) + wire[-1:])
-    yield Bad("truncated", "the end is missing", message, wire[:-1])
-    other = wire[-1] ^ 1 << frame.address_bits.shift
-    yield Bad("frame", "the end has another address", message, wire[:-1] + bytes([other]))
-    yield Bad(
-        "frame",
-        "the payload has a marked byte",
-        message,
-        wire[:1] + bytes([wire[1] | frame.marker]) + wire[2:],
-    )
-    if not any(isinstance(field.type, Blob) for field in message.fields):
-        payload = good.payload + b"\0"
-        yield Bad(
-            "frame",
-            "the payload has a byte too many",
-            message,
-            reference.seal(message.name, payload, good.address or 0),
-        )
-
-
-# Packets
-
-
-def _packet(frame: PacketFrame, good: Good) -> Iterator[Bad]:
-    message, wire = good.message, good.wire
-    if message.direction == "request" or frame.checksum is None:
-        return
-    refusal = b""
-    if frame.rejected is not None:
-        refusal = bytes(frame.rejected >> chunk.shift & chunk.mask for chunk in frame.checksum.chunks)
-    flipped = (wire[:-1] + bytes([wire[-1] ^ bit]) for bit in (1, 2))
-    changed = next(each for each in flipped if not (refusal and each.endswith(refusal)))
-    yield Bad("crc", "a bit is flipped", message, changed, good.request)
-    if refusal and not wire.endswith(refusal):
-        yield Bad("illegal", "the command is refused", message, good.payload + refusal, good.request)
-
-
-def of_protocol(protocol: Protocol, reference: Reference, vectors: Mapping[str, Good]) -> Iterator[Bad]:
-    """Faults that a protocol has once in each direction, made from a message's vectors by kind."""
-    good, frame = vectors["defaults"], protocol.frame
-    last = frame.id_bits.mask if isinstance(frame, MarkedFrame) else 0xFF
-    stuffed = frame.stuffing.after if isinstance(frame, DelimitedFrame) and frame.stuffing else b""
-    number = _unused_id(protocol, good.message, last, stuffed)
-    if number is not None and _shows_id(frame, good.message):
-        kind = "frame" if isinstance(frame, MarkedFrame) else "unknown"
-        wire = reference.seal(good.message.name, good.payload, good.address or 0, good.request, number)
-        yield Bad(kind, f"the id is {number:#04x}", good.message, wire, good.request)
-    if isinstance(frame, DelimitedFrame):
-        yield from _wrong_length(frame, good)
-
-
-def _shows_id(frame: Frame, message: Message) -> bool:
-    """An unknown id is seen to be one: the bytes are a frame beyond doubt, and carry an id at all."""
-    if isinstance(frame, PacketFrame):
-        return message.direction != "response"
-    return not isinstance(frame, DelimitedFrame) or bool(frame.preamble)
-
-
-def _wrong_length(frame: DelimitedFrame, good: Good) -> Iterator[Bad]:
-    """Lengths that no frame can have; how long one can be that is stuffed first is not asked here."""
-    part = frame.part("length")
-    if part is None or part.scalar is None:
-        return
-    at, least, most = frame.offset(part.name), frame.payload.min_size, frame.payload.max_size
-    claims = [frame.length_bias + least - 1]
-    if frame.stuffing is None or not frame.stuffing.before_checksum:
-        claims.append(frame.length_bias + most + 1)
-    for claimed in claims:
-        if 0 <= claimed <= part.scalar.maximum:
-            patch = bytes(claimed >> chunk.shift & chunk.mask for chunk in part.scalar.chunks)
-            wire = good.wire[:at] + patch + good.wire[at + part.size :]
-            yield Bad("length", f"the length is {claimed}", good.message, wire)
+def _outside(rule: Condition | None, least: int, most: int) -> list[int]:
+    """A number from least to most for which a condition does not hold, if there is one."""
+    match rule:
+        case Within():
+            near = [rule.high + 1, rule.low - 1]
+        case OneOf():
+            near = [number for each in rule.ranges for number in (each.high + 1, each.low - 1)]
+        case Clear():
+            near = [rule.mask & -rule.mask]
+        case None:
+            return []
+        case _:
+            assert_never(rule)
+    return [number for number in near if least <= number <= most and not rule.holds(number)][:1]

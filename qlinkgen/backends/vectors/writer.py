@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from decimal import Decimal
-from typing import Any
+
+Json = str | int | float | Decimal | None | Sequence["Json"] | Mapping[str, "Json"]
 
 
-def document(head: Mapping[str, Any], lists: Mapping[str, Iterable[Mapping[str, Any]]]) -> str:
+def document(head: Mapping[str, Json], lists: Mapping[str, Iterable[Mapping[str, Json]]]) -> str:
     """An object of a few plain entries and of lists, whose items get a line each."""
     lines = [f"  {text(key)}: {text(value)}" for key, value in head.items()]
     for key, items in lists.items():
@@ -17,7 +18,7 @@ def document(head: Mapping[str, Any], lists: Mapping[str, Iterable[Mapping[str, 
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def text(value: Any) -> str:
+def text(value: Json) -> str:
     """A value as JSON in one line."""
     if isinstance(value, Decimal):
         return str(value)

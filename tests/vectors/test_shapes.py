@@ -1,0 +1,187 @@
+"""Vectors of frames of every shape: each says what targets find, and each fault is in the part it names."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import json
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from decimal import Decimal
+from typing import Any
+
+import pytest
+from construct import ConstructError
+
+from qlinkgen.backends import construct, python, vectors
+from qlinkgen.backends.base import Options
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import from_json
+from qlinkgen.plan import MessagePlan, Plan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    PayloadPart,
+)
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, SevenBit
+from qlinkgen.schema import loads
+from tests.c import test_shapes
+from tests.proof import cases
+from tests.support.whole import schemas
+
+Row = Mapping[str, Any]
+#: Random whole schemas, beside the shapes that the C headers are tested with.
+SEEDS = range(16)
+
+
+@functools.cache
+def protocols() -> tuple[Protocol, ...]:
+    """Shapes that schemas accept, random schemas, and one whose preamble is found nowhere else."""
+    shapes = [protocol for _, protocol in itertools.chain(test_shapes.pairs(), test_shapes.others())]
+    random = [loads(schemas.generate(seed), "whole.yaml")[0] for seed in SEEDS]
+    hunting = cases.protocol("qlink")
+    return (hunting, *shapes, *(protocol for protocol in random if protocol is not None))
+
+
+@functools.cache
+def written() -> tuple[tuple[Plan, Mapping[str, list[Row]]], ...]:
+    """The plan and the vectors of each protocol."""
+    found = []
+    for protocol in protocols():
+        (text,) = vectors.generate(protocol, Options()).values()
+        found.append((plan_of(protocol), json.loads(text, parse_float=Decimal)))
+    return tuple(found)
+
+
+def rows(kind: str) -> Iterator[tuple[Plan, MessagePlan, Row]]:
+    for plan, document in written():
+        yield from ((plan, plan.message(row["message"]), row) for row in document[kind])
+
+
+def wire(row: Row, key: str = "wire") -> bytes:
+    return bytes.fromhex(row.get(key, ""))
+
+
+def test_many_shapes() -> None:
+    assert len(protocols()) > 150
+    found = {type(plan.frame.receiver).__name__ for plan, _ in written()}
+    assert found == {"Hunt", "Rescan", "Marks", "InStep"}
+
+
+def test_every_right_vector_decodes_in_python_and_construct() -> None:
+    for plan, document in written():
+        module, live = python.load(plan.protocol), construct.live(plan.protocol)
+        for row in document["vectors"]:
+            if not row["wire"]:  # a response of nothing at all: no bytes are no frame
+                continue
+            message = plan.message(row["message"])
+            fields = {v.name: from_json(v, row["fields"][v.name]) for v in message.message.values}
+            found = decoded(module, plan, message, row)
+            assert message.name == found.NAME
+            assert {name: getattr(found, name) for name in fields} == fields, row
+            parsed = live.parse(plan.hears(message), wire(row), wire(row, "request"))
+            assert parsed["message"] == message.name
+            assert {name: parsed["fields"][name] for name in fields} == fields, row
+            address = row.get(plan.frame.address)
+            assert address == (getattr(found, plan.frame.address) if plan.frame.address else None)
+            assert address == parsed.get(plan.frame.address)
+
+
+def decoded(module: Any, plan: Plan, message: MessagePlan, row: Row) -> Any:
+    """What generated Python makes of a vector."""
+    direction = plan.hears(message)
+    decode = getattr(module, "decode" if direction == "message" else f"decode_{direction}")
+    return decode(wire(row), *([module.decode_request(wire(row, "request"))] if row.get("request") else []))
+
+
+def test_every_fault_has_its_kind_in_python_and_is_none_of_constructs_frames() -> None:
+    for plan, document in written():
+        module, live = python.load(plan.protocol), construct.live(plan.protocol)
+        for row in document["faults"]:
+            message = plan.message(row["message"])
+            with pytest.raises(module.DecodeError) as caught:
+                decoded(module, plan, message, row)
+            assert caught.value.kind == row["kind"], (plan.protocol.schema_file, row)
+            with pytest.raises(ConstructError):
+                live.parse(plan.hears(message), wire(row), wire(row, "request"))
+
+
+#: What a part alone is wrong in, as far as its kind does not depend on the rest of the frame.
+KINDS = {ConstantPart: "frame", CheckPart: "crc", MarkPart: "frame", AddressPart: "range", IdPart: "unknown"}
+
+
+def test_every_part_has_a_vector() -> None:
+    """Whatever surrounds it: a constant or another part may follow the check value."""
+    for plan, document in written():
+        kinds: dict[tuple[str, str], set[str]] = defaultdict(set)
+        for row in document["faults"]:
+            kinds[row["message"], row["part"]].add(row["kind"])
+        begun: set[str] = set()
+        for message in plan.messages:
+            for part in message.envelope.parts:
+                found = kinds[message.name, part.name]
+                match part:
+                    case ConstantPart() | IdPart() if message.direction not in begun:
+                        assert KINDS[type(part)] in found, (plan.protocol.name, message.name, part)
+                    case LengthPart() if message.direction not in begun:
+                        assert found & {"length", "truncated"}
+                    case CheckPart() | MarkPart():
+                        assert KINDS[type(part)] in found, (plan.protocol.name, message.name, part)
+                    case AddressPart():
+                        every = (
+                            message.allowed is None or message.allowed.ranges[0].high == part.integer.maximum
+                        )
+                        assert every or "range" in found
+                    case ConstantPart() | IdPart() | LengthPart() | PayloadPart():
+                        pass
+            begun.add(message.direction)
+
+
+def test_a_wrong_part_is_the_only_one() -> None:
+    """Of the frame without stuffing; a check value is that of the wrong part."""
+    for plan, message, row in rows("faults"):
+        part = next(each for each in message.envelope.parts if each.name == row["part"])
+        if isinstance(plan.frame.transparency, FrameStuffing | PayloadStuffing | SevenBit):
+            continue
+        if not isinstance(part, ConstantPart | CheckPart) or row["kind"] in {"truncated", "length"}:
+            continue
+        envelope, frame = message.envelope, wire(row)
+        at, cells = 0, {}
+        for each in envelope.parts:
+            size = len(frame) - envelope.overhead if isinstance(each, PayloadPart) else each.size
+            cells[each.name], at = frame[at : at + size], at + size
+        wrong = {
+            each.name
+            for each in envelope.parts
+            if (isinstance(each, ConstantPart) and cells[each.name] != each.data)
+            or (isinstance(each, CheckPart) and cells[each.name] != checked(plan, message, cells, row))
+        }
+        assert wrong == {part.name}, (plan.protocol.name, row)
+
+
+def checked(plan: Plan, message: MessagePlan, cells: Mapping[str, bytes], row: Row) -> bytes:
+    part = message.envelope.check
+    assert part is not None
+    return part.check.pack(Codec(plan).check_value(message.envelope, cells, wire(row, "request")))
+
+
+def test_a_frame_is_cut_everywhere() -> None:
+    """The first message of each direction breaks off after every number of bytes that is no frame."""
+    for plan, document in written():
+        module = python.load(plan.protocol)
+        begun: set[str] = set()
+        for message in plan.messages:
+            if message.direction in begun:
+                continue
+            begun.add(message.direction)
+            whole = next(row for row in document["vectors"] if row["message"] == message.name)
+            wrong = {row["wire"] for row in document["faults"] if row["message"] == message.name}
+            for size in range(len(wire(whole))):
+                cut = {**whole, "wire": whole["wire"][: 2 * size]}
+                if cut["wire"] not in wrong:
+                    decoded(module, plan, message, cut)
