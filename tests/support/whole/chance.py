@@ -105,7 +105,7 @@ def pieces(data: bytes, rng: random.Random) -> list[bytes]:
     return [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
 
 
-def smallest(data: bytes, fails: Callable[[bytes], bool], tries: int = 150) -> bytes:
+def smallest(data: bytes, fails: Callable[[bytes], bool], tries: int = 80) -> bytes:
     """The data with everything taken out that a failure does not need."""
     size = max(1, len(data) // 2)
     while size:

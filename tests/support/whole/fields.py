@@ -43,6 +43,8 @@ class FieldMaker:
     rng: random.Random
     words: _Words
     shape: Shape
+    #: Share of the fields that have a variable size.
+    variable: float = 0.3
     taken: set[str] = field(default_factory=set)
     enums: Doc = field(default_factory=dict)
     flags: Doc = field(default_factory=dict)
@@ -123,7 +125,7 @@ class FieldMaker:
     def _add_field(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         roll = self.rng.random()
         name = self.words.name(taken)
-        if roll < 0.3 and not room.fixed:
+        if roll < self.variable and not room.fixed:
             self._variable(name, made, taken, room)
             return
         if roll < 0.42:

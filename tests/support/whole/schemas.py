@@ -15,6 +15,8 @@ from tests.support.whole.frames import Shape
 Doc = dict[str, Any]
 _PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
 _YAML_WORDS = frozenset("true false null yes no on off y n nan inf".split())  # noqa: SIM905
+#: One schema of so many has mostly fields of variable size.
+_VARIABLE = 5
 #: Mappings that lie deeper than this are written on one line.
 _BLOCKS = 4
 
@@ -84,6 +86,8 @@ class _Maker:
         if shape.groups:
             document["groups"] = shape.groups
         maker = FieldMaker(rng, self.words, shape)
+        if self.seed % _VARIABLE == _VARIABLE - 1:
+            maker.variable = 0.7
         document |= maker.types()
         document["frame"] = shape.frame
         document["bus"] = self._bus(shape)

@@ -86,20 +86,16 @@ class Reference:
             payload = self.frame.opened(message, wire, request)
             return Seen(message.name, None, values.decode(message, payload))
         if isinstance(self.frame, Frame):
-            return self._one(Searcher(self.frame, self.known(direction)), wire)
-        return self._one(self.receiver(direction), wire)
-
-    def _one(self, receiver: Receiver, wire: bytes) -> Seen:
-        """A frame is whole if it is all that a receiver finds; one inserted byte may follow it."""
-        events = receiver.run(wire)
-        first = events[0] if events else Event("truncated", 0, 0, wire)
-        if first.kind != "message":
-            raise Wrong(first.kind)
-        rest = wire[len(first.raw) :]
-        swallowed = isinstance(receiver, Searcher) and receiver.swallowed == len(rest) == 1
-        if first.offset or (rest and not swallowed):
+            event, rest = Searcher(self.frame, self.known(direction)).whole(wire)
+        else:
+            events = self.receiver(direction).run(wire)
+            event = events[0] if events else Event("truncated", 0, 0, wire)
+            rest = wire[len(event.raw) :]
+        if event.kind != "message":
+            raise Wrong(event.kind)
+        if rest or event.offset:
             raise Wrong("length", "bytes follow the frame")
-        return Seen(first.name, first.address, first.values)
+        return Seen(event.name, event.address, event.values)
 
     def receiver(self, direction: str) -> Receiver:
         """A new receiver."""

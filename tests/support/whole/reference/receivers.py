@@ -160,7 +160,20 @@ class Searcher(Receiver):
         self.frame, self.splitter = frame, Splitter(frame, known)
         self.buffer, self.start, self.skipped = b"", 0, b""
         self.swallow, self.ended = False, False
-        self.needed, self.swallowed = 0, 0
+        self.needed = 0
+
+    def whole(self, wire: bytes) -> tuple[Event, bytes]:
+        """The event of the frame in front, and the bytes behind it. Raises Wrong."""
+        self.buffer = wire
+        try:
+            event, size, pending = self._attempt()
+        except NeedMore:
+            raise Wrong("truncated") from None
+        except Refused as refused:
+            raise Wrong(refused.kind or "frame") from None
+        rest = wire[size:]
+        inserted = bytes([self.frame.stuffing.insert]) if self.frame.stuffing and pending else b""
+        return event, b"" if rest == inserted else rest
 
     def take(self, byte: int) -> Iterator[Event]:
         """Everything that the bytes so far tell."""
@@ -183,7 +196,6 @@ class Searcher(Receiver):
                 self.swallow = False
                 if self.frame.stuffing and self.buffer[0] == self.frame.stuffing.insert:
                     self._advance(1)
-                    self.swallowed += 1
                     continue
             try:
                 event, size, self.swallow = self._attempt()
