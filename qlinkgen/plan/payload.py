@@ -64,7 +64,7 @@ class ConstantStep:
     number: Scalar
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> tuple[Limit, ...]:
         """What must hold of the integer on the wire."""
         return (Within(self.value, self.value),)
 
@@ -129,7 +129,7 @@ class MemberConstant:
         return self.number.signed
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> tuple[Limit, ...]:
         """What must hold of the number."""
         value = self.number.integer.signed_value(self.value)
         return (Within(value, value),)

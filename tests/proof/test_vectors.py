@@ -11,7 +11,7 @@ import pytest
 
 from tests.proof import cases
 from tests.proof.conftest import EVERY, Make
-from tests.proof.outputs import Decoded, Refused
+from tests.proof.outputs import COMPILED, Decoded, Refused
 
 everywhere = pytest.mark.parametrize("output", EVERY)
 every_protocol = pytest.mark.parametrize("name", cases.PROTOCOLS)
