@@ -14,8 +14,8 @@ import pytest
 
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import MessagePlan, Plan, plan_of
-from qlinkgen.plan.content import BadContent, Raw, pack, unpack
-from qlinkgen.plan.payload import BytesStep, ItemsStep, MemberValue, ValueStep
+from qlinkgen.plan.content import BadContent, Raw, Unsendable, pack, unpack
+from qlinkgen.plan.payload import BytesStep, CountStep, ItemsStep, MemberValue, ValueStep, least_size
 from qlinkgen.schema import loads
 from tests.c.conftest import SANITIZED
 from tests.c.test_shapes import EMPTY, FIELDS
@@ -47,6 +47,7 @@ COUNTED = {
     ),
     "count of two groups": f'{{n: {{type: u14, {SEVEN}, counts: v}}, v: "u16[0..3]"}}',
     "narrow second count": '{n: {type: u16, counts: v}, m: {type: u8, counts: v}, v: "u8[]"}',
+    "signed second count": '{n: {type: u16, counts: v}, m: {type: i8, counts: v}, v: "u8[]"}',
     "wide count": '{n: {type: u64, counts: v, counts_in: bytes}, v: "u32[2..3]"}',
     "signed count": '{n: {type: i8, counts: v}, v: "u16[0..3]"}',
     "meanings": (
@@ -119,6 +120,23 @@ def damaged(payload: bytes, chance: random.Random) -> bytes:
     return bytes(data)
 
 
+def truncated(message: MessagePlan) -> Iterator[bytes]:
+    """Counts that hold the low bits of too large a number."""
+    for run in message.payload.runs:
+        for size in {run.length.maximum, min(run.length.maximum, 200)} - {message.payload.sendable(run).high}:
+            parts = []
+            for step in message.payload.steps:
+                match step:
+                    case CountStep() if step.run == run.name:
+                        bits = size * step.scale & step.integer.mask
+                        parts.append(step.integer.pack(step.integer.signed_value(bits)))
+                    case BytesStep() | ItemsStep() if step.name == run.name:
+                        parts.append(bytes(size * step.item_size))
+                    case _:
+                        parts.append(bytes(least_size(step)))
+            yield b"".join(parts)
+
+
 def payloads(message: MessagePlan) -> Iterator[bytes]:
     chance = random.Random(message.name)
     for _ in range(12):
@@ -126,6 +144,7 @@ def payloads(message: MessagePlan) -> Iterator[bytes]:
         yield right
         yield from (right[:size] for size in range(min(len(right), 24)))
         yield from (damaged(right, chance) for _ in range(60))
+    yield from truncated(message)
 
 
 def told(message: MessagePlan, payload: bytes) -> str:
@@ -179,3 +198,17 @@ def test_the_same_bytes(name: str, plan: Plan, driver: Driver) -> None:
         words = [shown(chosen[each.name]) for each in message.payload.settable]
         answer = driver.ask("encode", message.name, "-", *words).split()
         assert answer[:2] == ["ok", pack(message.payload, chosen).hex() or "-"], words
+
+
+@pytest.mark.parametrize("name", NAMES, ids=NAMES.values())
+def test_a_size_that_no_count_tells_is_refused(name: str, plan: Plan, driver: Driver) -> None:
+    message, chance = plan.message(name), random.Random(name)
+    for run in message.payload.runs:
+        bounds = message.payload.sendable(run)
+        for size in {bounds.low - 1, bounds.high + 1} & set(range(run.length.maximum + 1)):
+            chosen = values(message, chance)
+            chosen[run.name] = bytes(size) if isinstance(run, BytesStep) else [run.number.minimum] * size
+            with pytest.raises(Unsendable):
+                pack(message.payload, chosen)
+            words = [shown(chosen[each.name]) for each in message.payload.settable]
+            assert driver.ask("encode", message.name, "-", *words) == "error length"

@@ -35,15 +35,6 @@ def test_signatures_are_wrapped_in_one_way(name: str, tmp_path: Path) -> None:
         assert first.endswith("(") == bool(more) == (len(whole) > WIDTH)
 
 
-@pytest.mark.parametrize("name", PROTOCOLS)
-def test_constants_are_folded(name: str, tmp_path: Path) -> None:
-    text = header(name, tmp_path)
-    decoders = re.findall(r"_decode\([^;{]*\)\n\{\n(.*?)^\}$", text, re.MULTILINE | re.DOTALL)
-    assert decoders
-    for body in decoders:
-        assert ("size_t rest;" in body) == ("rest -=" in body)
-
-
 @pytest.mark.parametrize(
     ("text", "folded"),
     [

@@ -41,6 +41,7 @@ flags: {{bits16: {{type: u16, doc: D., values: {{fast: 0, far: 4}}}}}}
 types:
   {name}: {{type: i16, scale: 1/10, unit: mm}}
   plain: {{type: u24, unit: V, range: 0..9}}
+  alike: {{type: u24, unit: V, range: 0..9}}
 frame:
   parts:
     len: {{role: length, type: u8, counts: [id, data]}}
@@ -61,6 +62,16 @@ commands:
       e: {{type: u8, bits: {{f: {{at: 0..1}}, g: {{at: 4..7, type: level}}}}}}
       h: below
     response: {{a: {name}, p: plain, n: {{type: u8, counts: q}}, q: "u16[0..3]"}}
+  get:
+    id: 3
+    doc: D.
+    request: {{p: plain}}
+    response: {{p: {{type: plain, doc: Said.}}}}
+  put:
+    id: 4
+    doc: D.
+    request: {{p: alike}}
+    response: {{p: alike}}
 messages:
   {message}: {{id: 2, doc: D., fields: {{own: {{type: u16, scale: 3}}, x: {name}}}}}
 """
@@ -100,3 +111,13 @@ def test_every_name_is_clean(compiler: str, tmp_path: Path, require_tool: Callab
     words = [require_tool(compiler, package=package), *target, *STRICT, "-fsyntax-only", *files]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[:3000]
+
+
+def test_what_is_alike_is_there_once() -> None:
+    """A struct and its code; but members of another type stay apart, and every text stays."""
+    text = header("speed")
+    assert "/* p: Said.; in V; 0..9 */\ntypedef host_get_request_t host_get_response_t;" in text
+    assert "#define HOST_GET_RESPONSE_INIT HOST_GET_REQUEST_INIT" in text
+    assert text.count("return host_get_request_decode(message, payload, size);") == 1
+    assert "host_alike_t p; " in text
+    assert "typedef host_put_request_t host_put_response_t;" in text

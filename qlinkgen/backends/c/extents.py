@@ -73,8 +73,7 @@ class Learner:
     def learn(self, count: CountStep) -> None:
         """The number of items of the run that is counted, if it is one that it may have."""
         integer, number, wide = count.integer, self.number(count), count.integer.bits > 16
-        held, most = Within(0, integer.mask), min(count.bounds.high, integer.maximum)
-        bounds = Within(count.bounds.low, most)
+        held, bounds = Within(0, integer.mask), count.bounds  # no number that is negative lies in them
         if wide:  # more than a size_t may hold
             self.refuse(broken([bounds], number, held, integer.bits), "LENGTH")
         if count.scale > 1:
