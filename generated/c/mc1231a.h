@@ -96,7 +96,8 @@ typedef enum mc1231a_event {
     MC1231A_EVENT_LENGTH,
     MC1231A_EVENT_UNKNOWN,
     MC1231A_EVENT_TRUNCATED,
-    MC1231A_EVENT_FRAMING
+    MC1231A_EVENT_FRAMING,
+    MC1231A_EVENT_RANGE
 } mc1231a_event_t;
 
 #define MC1231A_MAX_PAYLOAD_SIZE 4U
@@ -672,25 +673,6 @@ static inline int mc1231a_close_(uint16_t request_sum, size_t size, uint8_t *wir
     return (int)total;
 }
 
-/* Verifies the check value of an answer. */
-static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_t size, size_t least)
-{
-    const uint8_t *end;
-    uint16_t value;
-    const uint16_t refused = 0U;
-    if (size < (least + 2U)) {
-        return MC1231A_ERROR_TRUNCATED;
-    }
-    end = &wire[size - 2U];
-    value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, size - 2U));
-    if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
-        /* The value of a refusal, where it is not the right one by chance. */
-        return ((end[0] != (uint8_t)(refused >> 8)) || (end[1] != (uint8_t)(refused))) ? MC1231A_ERROR_CRC :
-            MC1231A_ERROR_ILLEGAL;
-    }
-    return MC1231A_OK;
-}
-
 /* The answer to a command that the slave does not support. */
 static inline int mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
 {
@@ -706,6 +688,29 @@ static inline int mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
     end[0] = (uint8_t)(value >> 8);
     end[1] = (uint8_t)(value);
     return (int)total;
+}
+
+/* Whether an answer has all bytes of its payload and no more, and the right check value. */
+static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_t size, size_t payload)
+{
+    const uint8_t *end;
+    uint16_t value;
+    const uint16_t refused = 0U;
+    const size_t total = payload + 2U;
+    if (size < total) {
+        return MC1231A_ERROR_TRUNCATED;
+    }
+    if (size > total) {
+        return MC1231A_ERROR_LENGTH;
+    }
+    end = &wire[payload];
+    value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, payload));
+    if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
+        /* The value of a refusal, where it is not the right one by chance. */
+        return ((end[0] != (uint8_t)(refused >> 8)) || (end[1] != (uint8_t)(refused))) ? MC1231A_ERROR_CRC :
+            MC1231A_ERROR_ILLEGAL;
+    }
+    return MC1231A_OK;
 }
 
 /* Takes exactly one whole request apart. Its values are checked by mc1231a_request_check or by decoding it. */
@@ -954,11 +959,7 @@ static inline int mc1231a_set_prfl_s_crv_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_prfl_s_crv_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_prfl_trap.request, id 0x09 (section Host commands): Select trapezoidal point-to-point profiling. */
@@ -991,11 +992,7 @@ static inline int mc1231a_set_prfl_trap_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_prfl_trap_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_prfl_vel.request, id 0x0A (section Host commands): Select velocity-contouring profiling. */
@@ -1026,11 +1023,7 @@ static inline int mc1231a_set_prfl_vel_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_prfl_vel_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_prfl_gear.request, id 0x0C (section Host commands): Select electronic-gear profiling. */
@@ -1061,11 +1054,7 @@ static inline int mc1231a_set_prfl_gear_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_prfl_gear_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_pos.request, id 0x10 (section Host commands): Load destination position.
@@ -1135,11 +1124,7 @@ static inline int mc1231a_set_pos_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_set_pos_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_vel.request, id 0x11 (section Host commands): Load velocity limit for the move.
@@ -1224,11 +1209,7 @@ static inline int mc1231a_set_vel_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_set_vel_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_VEL_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_VEL_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_acc.request, id 0x12 (section Host commands): Load acceleration (trapezoidal and velocity
@@ -1324,11 +1305,7 @@ static inline int mc1231a_set_acc_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_set_acc_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACC_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACC_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_max_acc.request, id 0x15 (section Host commands): Load peak acceleration (S-curve mode).
@@ -1413,11 +1390,7 @@ static inline int mc1231a_set_max_acc_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_max_acc_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_jerk.request, id 0x13 (section Host commands): Load jerk (S-curve mode).
@@ -1502,11 +1475,7 @@ static inline int mc1231a_set_jerk_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_set_jerk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_JERK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_JERK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_ratio.request, id 0x14 (section Host commands): Load electronic gear ratio.
@@ -1594,11 +1563,7 @@ static inline int mc1231a_set_ratio_response_to_frame(uint16_t request_sum, uint
 
 static inline int mc1231a_set_ratio_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_RATIO_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_RATIO_RESPONSE_MIN_SIZE);
 }
 
 /* ---- stop.request, id 0x46 (section Host commands): Stop abruptly at the next update, known as clr_prfl
@@ -1633,11 +1598,7 @@ static inline int mc1231a_stop_response_to_frame(uint16_t request_sum, uint8_t *
 
 static inline int mc1231a_stop_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_STOP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_STOP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- smooth_stop.request, id 0x4E (section Host commands): Stop with deceleration at the next update,
@@ -1672,11 +1633,7 @@ static inline int mc1231a_smooth_stop_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_smooth_stop_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- synch_prfl.request, id 0x47 (section Host commands): At next update make target position equal
@@ -1711,11 +1668,7 @@ static inline int mc1231a_synch_prfl_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_synch_prfl_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_pos.request, id 0x4A (section Host commands): Read back buffered destination position.
@@ -2459,11 +2412,7 @@ static inline int mc1231a_set_kp_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_set_kp_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_kd.request, id 0x27 (section Host commands): Load derivative gain.
@@ -2532,11 +2481,7 @@ static inline int mc1231a_set_kd_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_set_kd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KD_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KD_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_ki.request, id 0x26 (section Host commands): Load integral gain.
@@ -2605,11 +2550,7 @@ static inline int mc1231a_set_ki_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KI_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KI_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_kvff.request, id 0x2B (section Host commands): Load velocity feed-forward gain.
@@ -2682,11 +2623,7 @@ static inline int mc1231a_set_kvff_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_set_kvff_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KVFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KVFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_i_lm.request, id 0x28 (section Host commands): Load integration limit.
@@ -2756,11 +2693,7 @@ static inline int mc1231a_set_i_lm_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_set_i_lm_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_I_LM_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_I_LM_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtr_lmt.request, id 0x06 (section Host commands): Set the ceiling of the filter output; takes
@@ -2833,11 +2766,7 @@ static inline int mc1231a_set_mtr_lmt_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_mtr_lmt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtr_bias.request, id 0x0F (section Host commands): Set the DC offset added to the filter output;
@@ -2910,11 +2839,7 @@ static inline int mc1231a_set_mtr_bias_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_pos_err.request, id 0x29 (section Host commands): Set position-error limit that raises motion
@@ -2989,11 +2914,7 @@ static inline int mc1231a_set_pos_err_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_pos_err_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_kp.request, id 0x50 (section Host commands): Read back buffered proportional gain.
@@ -3725,11 +3646,7 @@ static inline int mc1231a_set_auto_stop_on_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_auto_stop_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_auto_stop_off.request, id 0x44 (section Host commands): Keep motor on after motion error.
@@ -3764,11 +3681,7 @@ static inline int mc1231a_set_auto_stop_off_response_to_frame(uint16_t request_s
 
 static inline int mc1231a_set_auto_stop_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_time_brk.request, id 0x17 (section Host commands): Arm time breakpoint.
@@ -3803,11 +3716,7 @@ static inline int mc1231a_set_time_brk_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_time_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_pos_brk.request, id 0x18 (section Host commands): Arm breakpoint on target position reached
@@ -3844,11 +3753,7 @@ static inline int mc1231a_set_pos_brk_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_pos_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_neg_brk.request, id 0x19 (section Host commands): Arm breakpoint on target position reached
@@ -3885,11 +3790,7 @@ static inline int mc1231a_set_neg_brk_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_neg_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_actl_pos_brk.request, id 0x1B (section Host commands): Arm breakpoint on actual position reached
@@ -3926,11 +3827,7 @@ static inline int mc1231a_set_actl_pos_brk_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_actl_pos_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_actl_neg_brk.request, id 0x1C (section Host commands): Arm breakpoint on actual position reached
@@ -3967,11 +3864,7 @@ static inline int mc1231a_set_actl_neg_brk_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_actl_neg_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtn_cmplt_brk.request, id 0x35 (section Host commands): Arm breakpoint on motion complete,
@@ -4008,11 +3901,7 @@ static inline int mc1231a_set_mtn_cmplt_brk_response_to_frame(uint16_t request_s
 
 static inline int mc1231a_set_mtn_cmplt_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_ext_brk.request, id 0x5E (section Host commands): Arm breakpoint on an external signal, without
@@ -4049,11 +3938,7 @@ static inline int mc1231a_set_ext_brk_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_ext_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_brk_off.request, id 0x6D (section Host commands): Disarm any pending breakpoint. */
@@ -4084,11 +3969,7 @@ static inline int mc1231a_set_brk_off_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_brk_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_brk_pnt.request, id 0x16 (section Host commands): Load breakpoint compare value.
@@ -4152,11 +4033,7 @@ static inline int mc1231a_set_brk_pnt_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_brk_pnt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE);
 }
 
 /* ---- update.request, id 0x1A (section Host commands): Make all buffered values active now. */
@@ -4187,11 +4064,7 @@ static inline int mc1231a_update_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_update_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_UPDATE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_UPDATE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- multi_update.request, id 0x5B (section Host commands): Update several axes at the same instant.
@@ -4255,11 +4128,7 @@ static inline int mc1231a_multi_update_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_multi_update_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_auto_update_on.request, id 0x5C (section Host commands): Let breakpoints cause an update. */
@@ -4290,11 +4159,7 @@ static inline int mc1231a_set_auto_update_on_response_to_frame(uint16_t request_
 
 static inline int mc1231a_set_auto_update_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_auto_update_off.request, id 0x5D (section Host commands): Stop breakpoints from causing an
@@ -4332,11 +4197,7 @@ static inline int mc1231a_set_auto_update_off_response_to_frame(uint16_t request
 static inline int mc1231a_set_auto_update_off_response_from_frame(
     uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_brk_pnt.request, id 0x57 (section Host commands): Read back breakpoint compare value. */
@@ -4470,11 +4331,7 @@ static inline int mc1231a_set_intrpt_mask_response_to_frame(uint16_t request_sum
 
 static inline int mc1231a_set_intrpt_mask_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_intrpt.request, id 0x30 (section Host commands): Read status of the axis that interrupted. */
@@ -4608,11 +4465,7 @@ static inline int mc1231a_rst_intrpt_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_rst_intrpt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_intrpt_mask.request, id 0x56 (section Host commands): Read back interrupt mask. */
@@ -4710,11 +4563,7 @@ static inline int mc1231a_clr_status_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- rst_status.request, id 0x34 (section Host commands): Clear chosen event bits.
@@ -4781,11 +4630,7 @@ static inline int mc1231a_rst_status_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_rst_status_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_RST_STATUS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_RST_STATUS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_status.request, id 0x31 (section Host commands): Read the axis status word. */
@@ -4957,11 +4802,7 @@ static inline int mc1231a_set_capt_index_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_capt_index_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_capt_home.request, id 0x65 (section Host commands): Capture position on home signal. */
@@ -4992,11 +4833,7 @@ static inline int mc1231a_set_capt_home_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_capt_home_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_capt.request, id 0x36 (section Host commands): Read captured position and re-arm capture. */
@@ -5094,11 +4931,7 @@ static inline int mc1231a_set_output_pwm_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_output_pwm_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_output_dac16.request, id 0x3B (section Host commands): Select 16-bit DAC output for every axis. */
@@ -5129,11 +4962,7 @@ static inline int mc1231a_set_output_dac16_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_output_dac16_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE);
 }
 
 /* ---- mtr_on.request, id 0x43 (section Host commands): Close the loop: filter drives the motor. */
@@ -5164,11 +4993,7 @@ static inline int mc1231a_mtr_on_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_mtr_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_MTR_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_MTR_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- mtr_off.request, id 0x42 (section Host commands): Open the loop: manual motor command drives the
@@ -5205,11 +5030,7 @@ static inline int mc1231a_mtr_off_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_mtr_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_MTR_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_MTR_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtr_cmd.request, id 0x62 (section Host commands): Write manual motor command (open loop only).
@@ -5279,11 +5100,7 @@ static inline int mc1231a_set_mtr_cmd_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_mtr_cmd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_mtr_cmd.request, id 0x3A (section Host commands): Read motor command now being output. */
@@ -5431,11 +5248,7 @@ static inline int mc1231a_set_buf_mtr_cmd_response_to_frame(uint16_t request_sum
 
 static inline int mc1231a_set_buf_mtr_cmd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_buf_mtr_cmd.request, id 0x69 (section Host commands): Read back buffered motor command. */
@@ -5600,11 +5413,7 @@ static inline int mc1231a_axis_on_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_axis_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- axis_off.request, id 0x40 (section Host commands): Disable servicing of the axis. */
@@ -5635,11 +5444,7 @@ static inline int mc1231a_axis_off_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_axis_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_actl_pos.request, id 0x4D (section Host commands): Set the actual position; the target is
@@ -5712,11 +5517,7 @@ static inline int mc1231a_set_actl_pos_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_actl_pos_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_actl_pos.request, id 0x37 (section Host commands): Read actual position. */
@@ -5851,11 +5652,7 @@ static inline int mc1231a_set_lmt_sense_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_lmt_sense_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_lmt_swtch.request, id 0x67 (section Host commands): Read limit inputs of every axis. */
@@ -5957,11 +5754,7 @@ static inline int mc1231a_lmts_on_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_lmts_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- lmts_off.request, id 0x71 (section Host commands): Disable limit-switch handling.
@@ -5996,11 +5789,7 @@ static inline int mc1231a_lmts_off_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_lmts_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_home.request, id 0x05 (section Host commands): Read home inputs.
@@ -6137,11 +5926,7 @@ static inline int mc1231a_set_smpl_time_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_smpl_time_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_smpl_time.request, id 0x61 (section Host commands): Read servo loop time.
@@ -6242,11 +6027,7 @@ static inline int mc1231a_reset_response_to_frame(uint16_t request_sum, uint8_t 
 
 static inline int mc1231a_reset_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_RESET_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_RESET_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_vrsn.request, id 0x6C (section Host commands): Read product and software version.
@@ -6459,11 +6240,7 @@ static inline int mc1231a_set_phase_cnts_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_phase_cnts_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_phase_offset.request, id 0x76 (section Host commands): Set the phase offset from the index
@@ -6532,11 +6309,7 @@ static inline int mc1231a_set_phase_offset_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_phase_offset_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_phase_time.request, id 0x72 (section Host commands): Set duration of algorithmic phase
@@ -6605,11 +6378,7 @@ static inline int mc1231a_set_phase_time_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_phase.request, id 0x84 (section Host commands): Set phase angle directly.
@@ -6676,11 +6445,7 @@ static inline int mc1231a_set_phase_response_to_frame(uint16_t request_sum, uint
 
 static inline int mc1231a_set_phase_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- init_phase.request, id 0x7A (section Host commands): Start phase initialisation (algorithmic or
@@ -6717,11 +6482,7 @@ static inline int mc1231a_init_phase_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_init_phase_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_phase_info.request, id 0x7F (section Host commands): Read commutation flags. */

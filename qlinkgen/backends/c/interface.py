@@ -9,10 +9,10 @@ from qlinkgen.backends.c.encode import count_member
 from qlinkgen.backends.c.frames import frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
-from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Scalar
+from qlinkgen.plan import plan_of
 
 __all__ = ["Interface", "interface"]
 
@@ -95,16 +95,16 @@ class Interface:
 
 def interface(protocol: Protocol) -> Interface:
     """Describe the header of a protocol."""
-    frame, section = protocol.frame, frame_section(protocol, Layouts(protocol.name))
+    section = frame_section(plan_of(protocol), Layouts(protocol.name))
     view = section.view
     return Interface(
         names=Names(protocol),
         id=view["id"],
         id_bits=_bits(view["id_type"]),
-        address=view["address"] or "",
-        address_bits=_bits(view.get("address_type", "")) if view["address"] else 0,
+        address=view["address"],
+        address_bits=_bits(view["address_type"]),
         directed=view["needs_direction"],
-        unpacks=isinstance(frame, DelimitedFrame) and frame.stuffing is not None,
+        unpacks=bool(view["body_size"]),
         rescans=section.rescans,
         packets=section.slave_only,
         listener=""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from qlinkgen.backends.c.names import unsigned, unsigned_type
-from qlinkgen.model.types import Chunk, Scalar
+from qlinkgen.model.integer import Chunk, Integer
+from qlinkgen.model.types import Scalar
 
 Chunks = tuple[Chunk, ...]
 
@@ -27,7 +28,7 @@ class Layouts:
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
 
-    def put(self, scalar: Scalar, place: str, index: str, value: str) -> str:
+    def put(self, scalar: Scalar | Integer, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
         if scalar.size == 1:
             if scalar.signed and scalar.bits < 8:  # no sign in bits that the wire does not have
@@ -35,13 +36,13 @@ class Layouts:
             return f"{place}[{index}] = {value};"
         return f"{self._call('put', scalar)}({pointer(place, index)}, {value});"
 
-    def get(self, scalar: Scalar, place: str, index: str) -> str:
+    def get(self, scalar: Scalar | Integer, place: str, index: str) -> str:
         """An expression for the unsigned value that is there."""
         if scalar.size == 1:
             return f"{place}[{index}]"
         return f"{self._call('get', scalar)}({pointer(place, index)})"
 
-    def misfit(self, scalar: Scalar, place: str, index: str) -> str | None:
+    def misfit(self, scalar: Scalar | Integer, place: str, index: str) -> str | None:
         """A condition that holds where bits of no chunk are set, None where there are no such bits."""
         if all(chunk.bits == 8 for chunk in scalar.chunks):
             return None
@@ -54,14 +55,14 @@ class Layouts:
         """The functions of every layout in use."""
         return [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
 
-    def _call(self, verb: str, scalar: Scalar) -> str:
+    def _call(self, verb: str, scalar: Scalar | Integer) -> str:
         key = (scalar.bits, scalar.chunks)
         self._used.add((verb, *key))
         if key not in self._names:
             self._names[key] = self._name(scalar)
         return f"{self.prefix}_{verb}_{self._names[key]}_"
 
-    def _name(self, scalar: Scalar) -> str:
+    def _name(self, scalar: Scalar | Integer) -> str:
         if scalar.byteorder:
             return f"u{scalar.bits}_{'be' if scalar.byteorder == 'big' else 'le'}"
         known = sum(1 for name in self._names.values() if name.startswith(f"u{scalar.bits}_groups"))
