@@ -96,7 +96,8 @@ typedef enum mc1231a_event {
     MC1231A_EVENT_LENGTH,
     MC1231A_EVENT_UNKNOWN,
     MC1231A_EVENT_TRUNCATED,
-    MC1231A_EVENT_FRAMING
+    MC1231A_EVENT_FRAMING,
+    MC1231A_EVENT_RANGE
 } mc1231a_event_t;
 
 #define MC1231A_MAX_PAYLOAD_SIZE 4U
@@ -843,25 +844,6 @@ static inline int mc1231a_close_(uint16_t request_sum, size_t size, uint8_t *wir
     return (int)total;
 }
 
-/* Verifies the check value of an answer. */
-static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_t size, size_t least)
-{
-    const uint8_t *end;
-    uint16_t value;
-    const uint16_t refused = 0U;
-    if (size < (least + 2U)) {
-        return MC1231A_ERROR_TRUNCATED;
-    }
-    end = &wire[size - 2U];
-    value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, size - 2U));
-    if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
-        /* The value of a refusal, where it is not the right one by chance. */
-        return ((end[0] != (uint8_t)(refused >> 8)) || (end[1] != (uint8_t)(refused))) ? MC1231A_ERROR_CRC :
-            MC1231A_ERROR_ILLEGAL;
-    }
-    return MC1231A_OK;
-}
-
 /* The answer to a command that the slave does not support. */
 static inline int mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
 {
@@ -877,6 +859,29 @@ static inline int mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
     end[0] = (uint8_t)(value >> 8);
     end[1] = (uint8_t)(value);
     return (int)total;
+}
+
+/* Whether an answer has all bytes of its payload and no more, and the right check value. */
+static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_t size, size_t payload)
+{
+    const uint8_t *end;
+    uint16_t value;
+    const uint16_t refused = 0U;
+    const size_t total = payload + 2U;
+    if (size < total) {
+        return MC1231A_ERROR_TRUNCATED;
+    }
+    if (size > total) {
+        return MC1231A_ERROR_LENGTH;
+    }
+    end = &wire[payload];
+    value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, payload));
+    if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
+        /* The value of a refusal, where it is not the right one by chance. */
+        return ((end[0] != (uint8_t)(refused >> 8)) || (end[1] != (uint8_t)(refused))) ? MC1231A_ERROR_CRC :
+            MC1231A_ERROR_ILLEGAL;
+    }
+    return MC1231A_OK;
 }
 
 /* Takes exactly one whole request apart. Its values are checked by mc1231a_request_check or by decoding it. */
@@ -1105,11 +1110,7 @@ static inline int mc1231a_set_prfl_s_crv_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_prfl_s_crv_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_prfl_trap.request, id 0x09 (section Host commands): Select trapezoidal point-to-point profiling. */
@@ -1142,11 +1143,7 @@ static inline int mc1231a_set_prfl_trap_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_prfl_trap_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_prfl_vel.request, id 0x0A (section Host commands): Select velocity-contouring profiling. */
@@ -1177,11 +1174,7 @@ static inline int mc1231a_set_prfl_vel_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_prfl_vel_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_prfl_gear.request, id 0x0C (section Host commands): Select electronic-gear profiling. */
@@ -1212,11 +1205,7 @@ static inline int mc1231a_set_prfl_gear_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_prfl_gear_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_pos.request, id 0x10 (section Host commands): Load destination position.
@@ -1286,11 +1275,7 @@ static inline int mc1231a_set_pos_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_set_pos_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_vel.request, id 0x11 (section Host commands): Load velocity limit for the move.
@@ -1354,11 +1339,7 @@ static inline int mc1231a_set_vel_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_set_vel_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_VEL_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_VEL_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_acc.request, id 0x12 (section Host commands): Load acceleration (trapezoidal and velocity
@@ -1433,11 +1414,7 @@ static inline int mc1231a_set_acc_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_set_acc_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACC_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACC_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_max_acc.request, id 0x15 (section Host commands): Load peak acceleration (S-curve mode).
@@ -1501,11 +1478,7 @@ static inline int mc1231a_set_max_acc_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_max_acc_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_jerk.request, id 0x13 (section Host commands): Load jerk (S-curve mode).
@@ -1569,11 +1542,7 @@ static inline int mc1231a_set_jerk_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_set_jerk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_JERK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_JERK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_ratio.request, id 0x14 (section Host commands): Load electronic gear ratio.
@@ -1640,11 +1609,7 @@ static inline int mc1231a_set_ratio_response_to_frame(uint16_t request_sum, uint
 
 static inline int mc1231a_set_ratio_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_RATIO_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_RATIO_RESPONSE_MIN_SIZE);
 }
 
 /* ---- stop.request, id 0x46 (section Host commands): Stop abruptly at the next update, known as clr_prfl
@@ -1679,11 +1644,7 @@ static inline int mc1231a_stop_response_to_frame(uint16_t request_sum, uint8_t *
 
 static inline int mc1231a_stop_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_STOP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_STOP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- smooth_stop.request, id 0x4E (section Host commands): Stop with deceleration at the next update,
@@ -1718,11 +1679,7 @@ static inline int mc1231a_smooth_stop_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_smooth_stop_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- synch_prfl.request, id 0x47 (section Host commands): At next update make target position equal
@@ -1757,11 +1714,7 @@ static inline int mc1231a_synch_prfl_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_synch_prfl_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_pos.request, id 0x4A (section Host commands): Read back buffered destination position.
@@ -2329,11 +2282,7 @@ static inline int mc1231a_set_kp_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_set_kp_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KP_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KP_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_kd.request, id 0x27 (section Host commands): Load derivative gain.
@@ -2386,11 +2335,7 @@ static inline int mc1231a_set_kd_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_set_kd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KD_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KD_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_ki.request, id 0x26 (section Host commands): Load integral gain.
@@ -2443,11 +2388,7 @@ static inline int mc1231a_set_ki_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KI_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KI_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_kvff.request, id 0x2B (section Host commands): Load velocity feed-forward gain.
@@ -2504,11 +2445,7 @@ static inline int mc1231a_set_kvff_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_set_kvff_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_KVFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_KVFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_i_lm.request, id 0x28 (section Host commands): Load integration limit.
@@ -2562,11 +2499,7 @@ static inline int mc1231a_set_i_lm_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_set_i_lm_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_I_LM_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_I_LM_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtr_lmt.request, id 0x06 (section Host commands): Set the ceiling of the filter output; takes
@@ -2623,11 +2556,7 @@ static inline int mc1231a_set_mtr_lmt_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_mtr_lmt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtr_bias.request, id 0x0F (section Host commands): Set the DC offset added to the filter output;
@@ -2700,11 +2629,7 @@ static inline int mc1231a_set_mtr_bias_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_pos_err.request, id 0x29 (section Host commands): Set position-error limit that raises motion
@@ -2763,11 +2688,7 @@ static inline int mc1231a_set_pos_err_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_pos_err_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_kp.request, id 0x50 (section Host commands): Read back buffered proportional gain.
@@ -3417,11 +3338,7 @@ static inline int mc1231a_set_auto_stop_on_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_auto_stop_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_auto_stop_off.request, id 0x44 (section Host commands): Keep motor on after motion error.
@@ -3456,11 +3373,7 @@ static inline int mc1231a_set_auto_stop_off_response_to_frame(uint16_t request_s
 
 static inline int mc1231a_set_auto_stop_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_time_brk.request, id 0x17 (section Host commands): Arm time breakpoint.
@@ -3495,11 +3408,7 @@ static inline int mc1231a_set_time_brk_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_time_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_pos_brk.request, id 0x18 (section Host commands): Arm breakpoint on target position reached
@@ -3536,11 +3445,7 @@ static inline int mc1231a_set_pos_brk_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_pos_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_neg_brk.request, id 0x19 (section Host commands): Arm breakpoint on target position reached
@@ -3577,11 +3482,7 @@ static inline int mc1231a_set_neg_brk_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_neg_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_actl_pos_brk.request, id 0x1B (section Host commands): Arm breakpoint on actual position reached
@@ -3618,11 +3519,7 @@ static inline int mc1231a_set_actl_pos_brk_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_actl_pos_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_actl_neg_brk.request, id 0x1C (section Host commands): Arm breakpoint on actual position reached
@@ -3659,11 +3556,7 @@ static inline int mc1231a_set_actl_neg_brk_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_actl_neg_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtn_cmplt_brk.request, id 0x35 (section Host commands): Arm breakpoint on motion complete,
@@ -3700,11 +3593,7 @@ static inline int mc1231a_set_mtn_cmplt_brk_response_to_frame(uint16_t request_s
 
 static inline int mc1231a_set_mtn_cmplt_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_ext_brk.request, id 0x5E (section Host commands): Arm breakpoint on an external signal, without
@@ -3741,11 +3630,7 @@ static inline int mc1231a_set_ext_brk_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_ext_brk_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_brk_off.request, id 0x6D (section Host commands): Disarm any pending breakpoint. */
@@ -3776,11 +3661,7 @@ static inline int mc1231a_set_brk_off_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_brk_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_brk_pnt.request, id 0x16 (section Host commands): Load breakpoint compare value.
@@ -3844,11 +3725,7 @@ static inline int mc1231a_set_brk_pnt_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_brk_pnt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE);
 }
 
 /* ---- update.request, id 0x1A (section Host commands): Make all buffered values active now. */
@@ -3879,11 +3756,7 @@ static inline int mc1231a_update_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_update_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_UPDATE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_UPDATE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- multi_update.request, id 0x5B (section Host commands): Update several axes at the same instant.
@@ -3947,11 +3820,7 @@ static inline int mc1231a_multi_update_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_multi_update_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_auto_update_on.request, id 0x5C (section Host commands): Let breakpoints cause an update. */
@@ -3982,11 +3851,7 @@ static inline int mc1231a_set_auto_update_on_response_to_frame(uint16_t request_
 
 static inline int mc1231a_set_auto_update_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_auto_update_off.request, id 0x5D (section Host commands): Stop breakpoints from causing an
@@ -4024,11 +3889,7 @@ static inline int mc1231a_set_auto_update_off_response_to_frame(uint16_t request
 static inline int mc1231a_set_auto_update_off_response_from_frame(
     uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_brk_pnt.request, id 0x57 (section Host commands): Read back breakpoint compare value. */
@@ -4152,11 +4013,7 @@ static inline int mc1231a_set_intrpt_mask_response_to_frame(uint16_t request_sum
 
 static inline int mc1231a_set_intrpt_mask_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_intrpt.request, id 0x30 (section Host commands): Read status of the axis that interrupted. */
@@ -4270,11 +4127,7 @@ static inline int mc1231a_rst_intrpt_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_rst_intrpt_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_intrpt_mask.request, id 0x56 (section Host commands): Read back interrupt mask. */
@@ -4362,11 +4215,7 @@ static inline int mc1231a_clr_status_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- rst_status.request, id 0x34 (section Host commands): Clear chosen event bits.
@@ -4423,11 +4272,7 @@ static inline int mc1231a_rst_status_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_rst_status_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_RST_STATUS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_RST_STATUS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_status.request, id 0x31 (section Host commands): Read the axis status word. */
@@ -4579,11 +4424,7 @@ static inline int mc1231a_set_capt_index_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_capt_index_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_capt_home.request, id 0x65 (section Host commands): Capture position on home signal. */
@@ -4614,11 +4455,7 @@ static inline int mc1231a_set_capt_home_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_capt_home_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_capt.request, id 0x36 (section Host commands): Read captured position and re-arm capture. */
@@ -4706,11 +4543,7 @@ static inline int mc1231a_set_output_pwm_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_output_pwm_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_output_dac16.request, id 0x3B (section Host commands): Select 16-bit DAC output for every axis. */
@@ -4741,11 +4574,7 @@ static inline int mc1231a_set_output_dac16_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_output_dac16_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE);
 }
 
 /* ---- mtr_on.request, id 0x43 (section Host commands): Close the loop: filter drives the motor. */
@@ -4776,11 +4605,7 @@ static inline int mc1231a_mtr_on_response_to_frame(uint16_t request_sum, uint8_t
 
 static inline int mc1231a_mtr_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_MTR_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_MTR_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- mtr_off.request, id 0x42 (section Host commands): Open the loop: manual motor command drives the
@@ -4817,11 +4642,7 @@ static inline int mc1231a_mtr_off_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_mtr_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_MTR_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_MTR_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_mtr_cmd.request, id 0x62 (section Host commands): Write manual motor command (open loop only).
@@ -4875,11 +4696,7 @@ static inline int mc1231a_set_mtr_cmd_response_to_frame(uint16_t request_sum, ui
 
 static inline int mc1231a_set_mtr_cmd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_mtr_cmd.request, id 0x3A (section Host commands): Read motor command now being output. */
@@ -4995,11 +4812,7 @@ static inline int mc1231a_set_buf_mtr_cmd_response_to_frame(uint16_t request_sum
 
 static inline int mc1231a_set_buf_mtr_cmd_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_buf_mtr_cmd.request, id 0x69 (section Host commands): Read back buffered motor command. */
@@ -5154,11 +4967,7 @@ static inline int mc1231a_axis_on_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_axis_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- axis_off.request, id 0x40 (section Host commands): Disable servicing of the axis. */
@@ -5189,11 +4998,7 @@ static inline int mc1231a_axis_off_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_axis_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_actl_pos.request, id 0x4D (section Host commands): Set the actual position; the target is
@@ -5250,11 +5055,7 @@ static inline int mc1231a_set_actl_pos_response_to_frame(uint16_t request_sum, u
 
 static inline int mc1231a_set_actl_pos_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_actl_pos.request, id 0x37 (section Host commands): Read actual position. */
@@ -5379,11 +5180,7 @@ static inline int mc1231a_set_lmt_sense_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_lmt_sense_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_lmt_swtch.request, id 0x67 (section Host commands): Read limit inputs of every axis. */
@@ -5475,11 +5272,7 @@ static inline int mc1231a_lmts_on_response_to_frame(uint16_t request_sum, uint8_
 
 static inline int mc1231a_lmts_on_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_ON_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_ON_RESPONSE_MIN_SIZE);
 }
 
 /* ---- lmts_off.request, id 0x71 (section Host commands): Disable limit-switch handling.
@@ -5514,11 +5307,7 @@ static inline int mc1231a_lmts_off_response_to_frame(uint16_t request_sum, uint8
 
 static inline int mc1231a_lmts_off_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_home.request, id 0x05 (section Host commands): Read home inputs.
@@ -5635,11 +5424,7 @@ static inline int mc1231a_set_smpl_time_response_to_frame(uint16_t request_sum, 
 
 static inline int mc1231a_set_smpl_time_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_smpl_time.request, id 0x61 (section Host commands): Read servo loop time.
@@ -5730,11 +5515,7 @@ static inline int mc1231a_reset_response_to_frame(uint16_t request_sum, uint8_t 
 
 static inline int mc1231a_reset_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_RESET_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_RESET_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_vrsn.request, id 0x6C (section Host commands): Read product and software version.
@@ -5937,11 +5718,7 @@ static inline int mc1231a_set_phase_cnts_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_phase_cnts_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_phase_offset.request, id 0x76 (section Host commands): Set the phase offset from the index
@@ -6010,11 +5787,7 @@ static inline int mc1231a_set_phase_offset_response_to_frame(uint16_t request_su
 
 static inline int mc1231a_set_phase_offset_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_phase_time.request, id 0x72 (section Host commands): Set duration of algorithmic phase
@@ -6083,11 +5856,7 @@ static inline int mc1231a_set_phase_time_response_to_frame(uint16_t request_sum,
 
 static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE);
 }
 
 /* ---- set_phase.request, id 0x84 (section Host commands): Set phase angle directly.
@@ -6144,11 +5913,7 @@ static inline int mc1231a_set_phase_response_to_frame(uint16_t request_sum, uint
 
 static inline int mc1231a_set_phase_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_SET_PHASE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- init_phase.request, id 0x7A (section Host commands): Start phase initialisation (algorithmic or
@@ -6185,11 +5950,7 @@ static inline int mc1231a_init_phase_response_to_frame(uint16_t request_sum, uin
 
 static inline int mc1231a_init_phase_response_from_frame(uint16_t request_sum, const uint8_t *wire, size_t size)
 {
-    const int status = mc1231a_open_(request_sum, wire, size, MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE);
-    if (status != MC1231A_OK) {
-        return status;
-    }
-    return ((size - 2U) == 0U) ? MC1231A_OK : MC1231A_ERROR_LENGTH;
+    return mc1231a_open_(request_sum, wire, size, MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE);
 }
 
 /* ---- get_phase_info.request, id 0x7F (section Host commands): Read commutation flags. */

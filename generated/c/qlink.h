@@ -102,7 +102,8 @@ typedef enum qlink_event {
     QLINK_EVENT_LENGTH,
     QLINK_EVENT_UNKNOWN,
     QLINK_EVENT_TRUNCATED,
-    QLINK_EVENT_FRAMING
+    QLINK_EVENT_FRAMING,
+    QLINK_EVENT_RANGE
 } qlink_event_t;
 
 #define QLINK_MAX_PAYLOAD_SIZE 26U
@@ -565,17 +566,21 @@ static inline int qlink_seal_(uint8_t id, uint8_t node, uint8_t *wire, size_t ca
     return (int)to;
 }
 
-/* Unpacks the frame at the front of received bytes into a body (the frame without preamble and stuffing). `used`
- * becomes the number of bytes taken; with QLINK_ERROR_TRUNCATED it is how many are needed at least. */
-static inline int qlink_scan_(const uint8_t *wire, size_t size, uint8_t *body, qlink_frame_t *frame, size_t *used)
+/* Unpacks the frame at the front of received bytes into a body (the frame without preamble and stuffing); or all of
+ * them as one `whole` frame. `used` becomes the number of bytes taken, 0 where no frame begins; with
+ * QLINK_ERROR_TRUNCATED it is how many are needed at least. */
+static inline int qlink_scan_(
+    const uint8_t *wire, size_t size, bool whole, uint8_t *body, qlink_frame_t *frame, size_t *used)
 {
     size_t from = 2U;
     size_t at = 0U;
     size_t total = 5U;
     size_t payload = 0U;
+    bool inserted = false; /* the next byte must be */
     const uint8_t *end;
     uint16_t value = qlink_check_start();
 
+    *used = 0U;
     if (size < 1U) {
         *used = 1U;
         return QLINK_ERROR_TRUNCATED;
@@ -593,28 +598,25 @@ static inline int qlink_scan_(const uint8_t *wire, size_t size, uint8_t *body, q
     while (at < total) {
         uint8_t byte;
         if (from == size) {
-            *used = size + (total - at);
+            *used = size + 1U;
             return QLINK_ERROR_TRUNCATED;
         }
         byte = wire[from];
         ++from;
+        if (inserted) {
+            if (byte != 0x00U) {
+                return (byte == 0xA5U) ? QLINK_ERROR_TRUNCATED : QLINK_ERROR_STUFFING;
+            }
+            inserted = false;
+            continue;
+        }
         body[at] = byte;
         if (at < (total - 2U)) {
             value = qlink_check_update(value, byte);
         }
         ++at;
-        if (body[at - 1U] == 0xA5U) {
-            const bool inserted = (from < size) && (wire[from] == 0x00U);
-            if (inserted) {
-                ++from;
-            } else if ((from < size) && (at < total)) { /* behind the last byte its absence is no error */
-                *used = from + 1U;
-                return QLINK_ERROR_STUFFING;
-            } else {
-                /* not there yet */
-            }
-        }
-        if (at == 3U) {
+        inserted = byte == 0xA5U;
+        if (at == 1U) {
             if ((body[0] < 4U) || (body[0] > 30U)) {
                 return QLINK_ERROR_LENGTH;
             }
@@ -624,6 +626,9 @@ static inline int qlink_scan_(const uint8_t *wire, size_t size, uint8_t *body, q
     }
     *used = from;
     end = &body[total - 2U];
+    if (whole && (from != size) && !(inserted && ((from + 1U) == size) && (wire[from] == 0x00U))) {
+        return QLINK_ERROR_LENGTH;
+    }
     value = qlink_check_finish(value);
     if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
         return QLINK_ERROR_CRC;
@@ -676,9 +681,8 @@ static inline int qlink_frame_encode(
  * qlink_request_check or _response_check or by decoding it. */
 static inline int qlink_frame_decode(qlink_frame_t *frame, uint8_t *buffer, const uint8_t *wire, size_t size)
 {
-    size_t used = 0U;
-    const int status = qlink_scan_(wire, size, buffer, frame, &used);
-    return ((status == QLINK_OK) && (used != size)) ? QLINK_ERROR_LENGTH : status;
+    size_t used;
+    return qlink_scan_(wire, size, true, buffer, frame, &used);
 }
 
 /* ---- node_setup.request, id 0x01 (section 7.1): Give a node its number, its output delays and its way of

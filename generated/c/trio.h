@@ -94,7 +94,8 @@ typedef enum trio_event {
     TRIO_EVENT_LENGTH,
     TRIO_EVENT_UNKNOWN,
     TRIO_EVENT_TRUNCATED,
-    TRIO_EVENT_FRAMING
+    TRIO_EVENT_FRAMING,
+    TRIO_EVENT_RANGE
 } trio_event_t;
 
 #define TRIO_MAX_PAYLOAD_SIZE 256U
@@ -491,35 +492,26 @@ static inline uint8_t *trio_place_(uint8_t *wire, size_t capacity, size_t size)
     return &wire[1];
 }
 
-/* What a message of an id looks like: fewest and most bytes, and whether a check value follows them. */
-static inline bool trio_shape_(uint8_t id, size_t *least, size_t *most, bool *checked)
+/* Whether a message of an id has so many bytes between header and end, and whether the last of them are a check
+ * value. */
+static inline bool trio_shape_(uint8_t id, size_t count, bool *checked)
 {
     switch (id) {
     case TRIO_CHARACTER_TRANSFER_ID:
-        *least = 1U;
-        *most = 256U;
         *checked = false;
-        return true;
+        return (count >= 1U) && (count <= 256U);
     case TRIO_DIRECT_VARIABLE_TRANSFER_ID:
-        *least = 12U;
-        *most = 12U;
         *checked = true;
-        return true;
+        return count == 14U;
     case TRIO_KEYPAD_OFFSET_ID:
-        *least = 1U;
-        *most = 1U;
         *checked = false;
-        return true;
+        return count == 1U;
     case TRIO_KEYPAD_MODE_MESSAGE_ID:
-        *least = 1U;
-        *most = 1U;
         *checked = false;
-        return true;
+        return count == 1U;
     default:
         break;
     }
-    *least = 0U;
-    *most = 0U;
     *checked = false;
     return false;
 }
@@ -545,13 +537,14 @@ static inline int trio_seal_(
     }
     wire[0] = (uint8_t)(0x80U | ((unsigned)address << 3) | (unsigned)id);
     if (checked) {
+        uint8_t *const end = &wire[at];
         uint16_t value = trio_check_start();
         for (size_t index = 1U; index < at; ++index) {
             value = trio_check_update(value, wire[index]);
         }
         value = trio_check_finish(value);
-        wire[at + 0U] = (uint8_t)(value & 0x7FU);
-        wire[at + 1U] = (uint8_t)((value >> 8) & 0x7FU);
+        end[0] = (uint8_t)(value & 0x7FU);
+        end[1] = (uint8_t)((value >> 8) & 0x7FU);
         at += 2U;
     }
     wire[at] = (uint8_t)(0x80U | ((unsigned)address << 3));
@@ -563,14 +556,12 @@ static inline int trio_seal_(
  * trio_message_check or by decoding it. */
 static inline int trio_frame_decode(trio_frame_t *frame, const uint8_t *wire, size_t size)
 {
-    const uint8_t *const payload = &wire[1];
-    size_t least;
-    size_t most;
+    size_t at = 1U;
     size_t count;
     bool checked;
     uint8_t byte;
 
-    if (size < 2U) {
+    if (size == 0U) {
         return TRIO_ERROR_TRUNCATED;
     }
     byte = wire[0];
@@ -579,47 +570,35 @@ static inline int trio_frame_decode(trio_frame_t *frame, const uint8_t *wire, si
     if (((byte & 0x80U) == 0U) || (frame->id == 0x00U)) {
         return TRIO_ERROR_FRAME;
     }
-    for (size_t index = 1U; index < (size - 1U); ++index) {
-        if ((wire[index] & 0x80U) != 0U) {
-            return TRIO_ERROR_FRAME;
-        }
+    while ((at < size) && ((wire[at] & 0x80U) == 0U)) {
+        ++at;
     }
-    byte = wire[size - 1U];
-    if ((byte & 0x80U) == 0U) {
+    if (at == size) {
         return TRIO_ERROR_TRUNCATED;
     }
-    if (((uint8_t)(byte & 0x07U) != 0x00U) || ((uint8_t)(((unsigned)byte >> 3) & 0x0FU) != frame->address)) {
+    count = at - 1U;
+    byte = wire[at];
+    if (((at + 1U) != size) || ((uint8_t)(byte & 0x07U) != 0x00U) ||
+        ((uint8_t)(((unsigned)byte >> 3) & 0x0FU) != frame->address) || (frame->address == 0U)) {
         return TRIO_ERROR_FRAME;
     }
-    if (frame->address == 0U) {
+    if (!trio_shape_(frame->id, count, &checked)) {
         return TRIO_ERROR_FRAME;
     }
-    if (!trio_shape_(frame->id, &least, &most, &checked)) {
-        return TRIO_ERROR_UNKNOWN;
-    }
-    count = size - 2U;
     if (checked) {
-        if (count < 2U) {
-            return TRIO_ERROR_LENGTH;
-        }
-        count -= 2U;
-    }
-    if ((count < least) || (count > most)) {
-        return TRIO_ERROR_LENGTH;
-    }
-    if (checked) {
-        const uint8_t *const end = &payload[count];
+        const uint8_t *const end = &wire[at - 2U];
         uint16_t value = trio_check_start();
-        for (size_t index = 0U; index < count; ++index) {
-            value = trio_check_update(value, payload[index]);
+        count -= 2U;
+        for (size_t index = 1U; index <= count; ++index) {
+            value = trio_check_update(value, wire[index]);
         }
         value = trio_check_finish(value);
-        if ((end[0] != (uint8_t)((value) & 0x7FU)) || (end[1] != (uint8_t)((value >> 8) & 0x7FU))) {
+        if ((end[0] != (uint8_t)(value & 0x7FU)) || (end[1] != (uint8_t)((value >> 8) & 0x7FU))) {
             return TRIO_ERROR_CRC;
         }
     }
     frame->size = count;
-    frame->payload = payload;
+    frame->payload = &wire[1];
     return TRIO_OK;
 }
 
@@ -932,18 +911,14 @@ static inline int trio_message_check(const trio_frame_t *frame)
 typedef struct trio_receiver {
     uint16_t check; /* over what is certainly no check byte */
     uint16_t count;
-    uint16_t most; /* bytes that may stand between header and end */
-    uint16_t least;
     uint8_t state;
     uint8_t header;
-    bool checked;
     uint8_t buffer[258];
 } trio_receiver_t;
 
 #define TRIO_IDLE_ 0U
 #define TRIO_HUNTING_ 1U /* behind a fault: only a header is of interest */
 #define TRIO_INSIDE_ 2U
-#define TRIO_REFUSED_ 3U /* behind a header that is not valid, up to its end */
 
 static inline void trio_receiver_init(trio_receiver_t *receiver)
 {
@@ -959,46 +934,33 @@ static inline trio_frame_t trio_receiver_frame(const trio_receiver_t *receiver)
     const uint8_t byte = receiver->header;
     frame.id = (uint8_t)(byte & 0x07U);
     frame.address = (uint8_t)(((unsigned)byte >> 3) & 0x0FU);
-    frame.size = receiver->checked ? (receiver->count - 2U) : receiver->count;
+    frame.size = receiver->count;
     frame.payload = receiver->buffer;
     return frame;
 }
 
-static inline void trio_receiver_begin_(trio_receiver_t *receiver, uint8_t byte)
-{
-    size_t least;
-    size_t most;
-    bool checked;
-    const bool known = trio_shape_((uint8_t)(byte & 0x07U), &least, &most, &checked) &&
-        ((uint8_t)(((unsigned)byte >> 3) & 0x0FU) != 0U);
-    receiver->state = known ? TRIO_INSIDE_ : TRIO_REFUSED_;
-    receiver->header = byte;
-    receiver->count = 0U;
-    if (checked) {
-        least += 2U;
-        most += 2U;
-    }
-    receiver->least = (uint16_t)least;
-    receiver->most = (uint16_t)most;
-    receiver->checked = checked;
-    receiver->check = trio_check_start();
-}
-
-static inline trio_event_t trio_receiver_end_(trio_receiver_t *receiver, uint8_t byte)
+static inline trio_event_t trio_receiver_end_(trio_receiver_t *receiver, uint8_t end_byte)
 {
     const uint8_t state = receiver->state;
-    receiver->state = ((state == TRIO_IDLE_) || (state == TRIO_HUNTING_)) ? TRIO_HUNTING_ : TRIO_IDLE_;
-    if (state == TRIO_HUNTING_) {
-        return TRIO_EVENT_NONE;
+    const uint8_t byte = receiver->header;
+    bool checked;
+    receiver->state = TRIO_HUNTING_;
+    if (state != TRIO_INSIDE_) {
+        return (state == TRIO_IDLE_) ? TRIO_EVENT_FRAMING : TRIO_EVENT_NONE;
     }
-    if ((state != TRIO_INSIDE_) || (((byte ^ receiver->header) & 0x78U) != 0U) || (receiver->count < receiver->least) ||
-        (receiver->count > receiver->most)) {
+    receiver->state = TRIO_IDLE_;
+    if ((((end_byte ^ byte) & 0x78U) != 0U) || ((uint8_t)(((unsigned)byte >> 3) & 0x0FU) == 0U)) {
         return TRIO_EVENT_FRAMING;
     }
-    if (receiver->checked) {
-        const uint8_t *const check = &receiver->buffer[receiver->count - 2U];
+    if (!trio_shape_((uint8_t)(byte & 0x07U), receiver->count, &checked)) {
+        return TRIO_EVENT_FRAMING;
+    }
+    if (checked) {
         const uint16_t value = trio_check_finish(receiver->check);
-        if ((check[0] != (uint8_t)((value) & 0x7FU)) || (check[1] != (uint8_t)((value >> 8) & 0x7FU))) {
+        const uint8_t *end;
+        receiver->count = (uint16_t)(receiver->count - 2U);
+        end = &receiver->buffer[receiver->count];
+        if ((end[0] != (uint8_t)(value & 0x7FU)) || (end[1] != (uint8_t)((value >> 8) & 0x7FU))) {
             return TRIO_EVENT_CRC;
         }
     }
@@ -1013,10 +975,13 @@ static inline trio_event_t trio_receive(trio_receiver_t *receiver, uint8_t byte)
         if ((uint8_t)(byte & 0x07U) == 0x00U) {
             return trio_receiver_end_(receiver, byte);
         }
-        if ((receiver->state == TRIO_INSIDE_) || (receiver->state == TRIO_REFUSED_)) {
+        if (receiver->state == TRIO_INSIDE_) {
             event = TRIO_EVENT_FRAMING;
         }
-        trio_receiver_begin_(receiver, byte);
+        receiver->state = TRIO_INSIDE_;
+        receiver->header = byte;
+        receiver->count = 0U;
+        receiver->check = trio_check_start();
         return event;
     }
     if (receiver->state == TRIO_HUNTING_) {
@@ -1027,7 +992,7 @@ static inline trio_event_t trio_receive(trio_receiver_t *receiver, uint8_t byte)
         return TRIO_EVENT_FRAMING;
     }
     receiver->buffer[receiver->count] = byte;
-    if (receiver->checked && (receiver->count >= 2U)) {
+    if (receiver->count >= 2U) {
         receiver->check = trio_check_update(receiver->check, receiver->buffer[receiver->count - 2U]);
     }
     ++receiver->count;

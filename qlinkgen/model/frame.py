@@ -127,25 +127,6 @@ class DelimitedFrame:
         """The payload."""
         return next(part for part in self.parts if part.role == "payload")
 
-    @cached_property
-    def unique_preamble(self) -> bool:
-        """Stuffing keeps the preamble from appearing inside a frame: a receiver never has to look back.
-
-        The preamble is a byte twice; everything behind it is stuffed after that byte, beginning with a length
-        of one byte that cannot be that byte.
-        """
-        stuffing, length = self.stuffing, self.part("length")
-        if stuffing is None or length is None or stuffing.before_checksum or len(self.parts) < 2:
-            return False
-        escaped = (
-            stuffing.after * 2 == self.preamble
-            and len(stuffing.after) == 1
-            and stuffing.insert not in stuffing.after
-        )
-        bounds = range(self.length_bias + self.payload.min_size, self.length_bias + self.payload.max_size + 1)
-        at_front = self.parts[1] is length and length.size == 1 and stuffing.after[0] not in bounds
-        return escaped and at_front and stuffing.exempt == (self.parts[0].name,)
-
     def offset(self, name: str) -> int:
         """Unstuffed bytes in front of a part; parts behind the payload are counted as if it were empty."""
         position = 0

@@ -368,6 +368,13 @@ class FramePlan:
         """Most payload bytes that the frame allows."""
         return self.envelope.payload.most
 
+    @property
+    def max_wire(self) -> int:
+        """Most bytes on the wire that anything can have which begins like a frame."""
+        most = self.envelope.max_frame
+        stuffing = self.transparency
+        return stuffing.most_frame(most) if isinstance(stuffing, FrameStuffing) else most
+
     def with_check(self, direction: Direction, *, checked: bool) -> Envelope:
         """The envelope of a message that carries the check value, or does not."""
         envelope = self.envelopes[direction]

@@ -74,6 +74,10 @@ class FrameStuffing:
         """Most bytes that a payload of so many bytes takes on the wire, as far as a length counts them."""
         return payload
 
+    def most_frame(self, size: int) -> int:
+        """Most bytes on the wire that a frame of so many bytes takes, whatever it holds."""
+        return size + self.rule.growth(size - self.front - self.back)
+
     def stuff(self, frame: bytes) -> bytes:
         """The frame as it is sent."""
         end = len(frame) - self.back

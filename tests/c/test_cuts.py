@@ -15,8 +15,10 @@ from pathlib import Path
 import pytest
 
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import plan_of
 from qlinkgen.schema import load
 from tests.c.conftest import SANITIZED
+from tests.support.agreement import events, kind
 from tests.support.cdriver import Driver, build
 
 MESSAGES = 8
@@ -173,7 +175,7 @@ def hostile(frame: bytes, rng: random.Random) -> bytes:
 def test_every_cut(shape: str, tmp_path: Path, require_tool: Callable[..., str]) -> None:
     compiler, rng = require_tool("gcc", package="gcc"), random.Random(shape)
     protocol, messages = made(shape, 1, tmp_path)
-    program = build(protocol, tmp_path, compiler, FLAGS)
+    program, plan = build(protocol, tmp_path, compiler, FLAGS), plan_of(protocol)
     with Driver(program) as driver:
         for number, message in enumerate(messages, 1):
             for _ in range(3):
@@ -182,11 +184,14 @@ def test_every_cut(shape: str, tmp_path: Path, require_tool: Callable[..., str])
                 said = driver.ask("cuts", "request", frame.hex()).split()[1:]
                 assert said[-1] == "intact", (message.fields, frame.hex())
                 assert "intact" not in said[:-1] or shape == "stuffed", (message.fields, frame.hex())
-                events = driver.ask("stream", "request", (frame + frame).hex()).split()[1:]
+                heard = driver.ask("stream", "request", (frame + frame).hex()).split()[1:]
                 told = f"message:m{number - 1}.request:-:{payload.hex() or '-'}"
                 due = [f"{len(frame) - 1}:{told}", f"{2 * len(frame) - 1}:{told}"]
-                assert events == due, (message.fields, frame.hex())
+                assert heard == due, (message.fields, frame.hex())
             for _ in range(16):
-                broken = hostile(SHAPES[shape].wire(number, message.payload()), rng).hex()
-                driver.ask("cuts", "request", broken)
-                driver.ask("stream", "request", broken)
+                broken = hostile(SHAPES[shape].wire(number, message.payload()), rng)
+                said = driver.ask("cuts", "request", broken.hex()).split()[1:]
+                expected = [kind(plan, "request", broken[:end]) for end in range(len(broken) + 1)]
+                assert said == expected, broken.hex()
+                said = driver.ask("stream", "request", broken.hex()).split()[1:]
+                assert said == events(plan, "request", broken), broken.hex()

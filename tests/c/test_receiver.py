@@ -1,21 +1,30 @@
-"""The receiver delivers what the reference model delivers, on streams of frames with every kind of damage."""
+"""Receiver and decoder of whole frames say what the interpreter of the plan says, whatever the damage.
+
+The family: the shipped protocols and those for tests, and shapes of frames from `test_shapes`. What is
+delivered, what is reported and with which byte is the same.
+"""
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
-from qlinkgen.model.message import Direction, Message
-from qlinkgen.model.protocol import Protocol
-from tests.c.conftest import PROTOCOLS, protocol_of
-from tests.support.cdriver import Driver, raw_text
+from qlinkgen.model.message import Direction
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.framing import Hunt, InStep
+from qlinkgen.schema import loads
+from tests.c import test_shapes
+from tests.c.conftest import PROTOCOLS, SANITIZED, protocol_of
+from tests.support.agreement import compare, events, kind, wire
+from tests.support.cdriver import Driver, build, raw_text
 from tests.support.random_raw import damaged, random_address, random_values
-from tests.support.receiver_model import Event, receiver
 
-STREAMS = 80
+ROUNDS = 40
 CASES = [
     (name, direction)
     for name in PROTOCOLS
@@ -24,64 +33,77 @@ CASES = [
 ]
 
 
-def wire_of(driver: Driver, protocol: Protocol, message: Message, rng: random.Random) -> bytes:
-    address = random_address(message, rng) if protocol.address_name else "-"
-    values = [
-        raw_text(value, raw) for value, raw in zip(message.values, random_values(message, rng), strict=True)
-    ]
-    status, *rest = driver.ask("encode", message.name, address, *values).split()
-    assert status == "ok", (message.name, address, values, rest)
-    return bytes.fromhex(rest[1].replace("-", ""))
-
-
-def marks_of(protocol: Protocol) -> bytes:
-    frame = protocol.frame
-    if isinstance(frame, DelimitedFrame):
-        stuffing = frame.stuffing
-        return frame.preamble + (stuffing.after + bytes([stuffing.insert]) if stuffing else b"") + b"\x00\x03"
-    return bytes([frame.marker, 0x8A, 0x99, 0x88]) if isinstance(frame, MarkedFrame) else b"\x00\x10"
-
-
-def told(event: Event) -> str:
-    if event.kind != "message":
-        return f"{event.at}:{event.kind}"
-    address = "-" if event.address is None else event.address
-    return f"{event.at}:message:{event.name}:{address}:{event.payload.hex() or '-'}"
-
-
-def expected(protocol: Protocol, direction: Direction, stream: bytes) -> list[str]:
-    machine, frame = receiver(protocol, direction), protocol.frame
-    events = [event for byte in stream for event in machine.feed(byte)]
-    if isinstance(frame, DelimitedFrame) and not frame.unique_preamble:
-        events += machine.finish()
-    return [told(event) for event in events]
-
-
 @pytest.mark.parametrize(("name", "direction"), CASES)
-def test_receiver_agrees_with_the_model(
+def test_agrees_with_the_interpreter(
     name: str, direction: Direction, drivers: Callable[[str], Driver]
 ) -> None:
-    protocol, driver, rng = protocol_of(name), drivers(name), random.Random(f"{name} {direction}")
-    messages, alphabet = protocol.received(direction), marks_of(protocol)
-    for number in range(STREAMS):
-        frames = [wire_of(driver, protocol, rng.choice(messages), rng) for _ in range(rng.randint(1, 6))]
-        stream = b"".join(frames)
-        if number % 10:
-            stream = damaged(stream, rng, alphabet)
-        assert driver.ask("stream", direction, stream.hex() or "-").split()[1:] == expected(
-            protocol, direction, stream
-        ), stream.hex()
+    rng = random.Random(f"{name} {direction}")
+    compare(plan_of(protocol_of(name)), direction, drivers(name), rng, ROUNDS)
 
 
-@pytest.mark.parametrize(("name", "direction"), CASES)
-def test_receiver_agrees_on_noise(name: str, direction: Direction, drivers: Callable[[str], Driver]) -> None:
-    protocol, driver, rng = protocol_of(name), drivers(name), random.Random(f"noise {name} {direction}")
-    alphabet = marks_of(protocol) + bytes(range(8))
-    for _ in range(STREAMS // 3):
-        stream = bytes(rng.choice(alphabet) for _ in range(rng.randint(0, 300)))
-        assert driver.ask("stream", direction, stream.hex() or "-").split()[1:] == expected(
-            protocol, direction, stream
-        ), stream.hex()
+def test_every_shape_agrees(shared: Path, require_tool: Callable[..., str]) -> None:
+    compiler = require_tool("gcc", package="gcc")
+    some = itertools.islice(test_shapes.pairs(), 16)  # the first have the most pairs of options
+    for number, (_, protocol) in enumerate(itertools.chain(some, [*test_shapes.others()][::9])):
+        plan, rng = plan_of(protocol), random.Random(number)
+        with Driver(build(protocol, shared / "shapes", compiler, ("-O0", "-std=c99"))) as driver:
+            for direction in protocol.directions:
+                if direction != "response" or not plan.frame.needs_request:
+                    compare(plan, direction, driver, rng, 8)
+
+
+@pytest.mark.parametrize("name", ["mc1231a", "unchecked"])
+def test_answers_of_packets_agree(
+    name: str, shared: Path, drivers: Callable[[str], Driver], require_tool: Callable[..., str]
+) -> None:
+    """The plan alone tells what is wrong with an answer, right or damaged, to a request of its command."""
+    if name == "mc1231a":
+        _answers(plan_of(protocol_of(name)), drivers(name))
+        return
+    frame, nodes, _ = test_shapes.OTHERS["packet"]
+    shape = {"fields": "numbers", "traffic": "command"}
+    protocol, _ = loads("\n".join(test_shapes._text(name, [frame], nodes, shape)), "unchecked.yaml")
+    assert protocol
+    compiler = require_tool("gcc", package="gcc")
+    with Driver(build(protocol, shared / "shapes", compiler, SANITIZED)) as driver:
+        _answers(plan_of(protocol), driver)
+
+
+def _answers(plan: Plan, driver: Driver) -> None:
+    assert isinstance(plan.frame.receiver, InStep)
+    rng = random.Random(1)
+    for command in plan.commands:
+        if command.response is None:
+            continue
+        asked, answer = plan.by_name[command.request.name], plan.by_name[command.response.name]
+        for number in range(6):
+            request = wire(plan, asked, rng)
+            frame = Codec(plan).seal(answer.name, rng.randbytes(answer.payload.most), request=request)
+            frame = damaged(frame, rng, b"\x00") if number % 3 else frame
+            said = driver.ask("decode", answer.name, frame.hex() or "-", request.hex()).split()
+            due = kind(plan, "response", frame, request)
+            assert (said[0] == "ok" and due == "intact") or said == ["error", due], (frame.hex(), due)
+
+
+def test_no_receiver_waits_for_the_byte_after_a_stuffed_end(
+    shared: Path, require_tool: Callable[..., str]
+) -> None:
+    """A frame comes with its last byte, and a fault with the first byte that shows it."""
+    shape = {key: next(iter(test_shapes.AXES[key])) for key in test_shapes.AXES}
+    shape |= {"start": "start", "length": "u8 length", "check": "sum", "stuffing": "stuffing"}
+    shape |= {"fields": "one byte", "traffic": "command"}
+    protocol = test_shapes.built(shape, "late")
+    assert protocol
+    plan = plan_of(protocol)
+    assert not isinstance(plan.frame.receiver, Hunt)
+    good, stuffed = bytes.fromhex("dc01010506"), bytes.fromhex("dc0101dbdc00")
+    early = ["4:message:set.request:-:db", "9:message:set.request:-:05"]
+    assert events(plan, "request", stuffed[:-1] + good) == early
+    streams = (good + good, stuffed + good, stuffed[:-1] + good, stuffed[:-1], b"\xdc\x01\xdc\x05" + good)
+    with Driver(build(protocol, shared / "shapes", require_tool("gcc", package="gcc"), SANITIZED)) as driver:
+        for stream in streams:
+            said = driver.ask("stream", "request", stream.hex()).split()[1:]
+            assert said == events(plan, "request", stream), stream.hex()
 
 
 @pytest.mark.parametrize(("name", "direction"), CASES)
@@ -101,7 +123,6 @@ def test_every_message_comes_back(name: str, direction: Direction, drivers: Call
 
 def test_packets_answer_over_their_request(drivers: Callable[[str], Driver]) -> None:
     driver = drivers("mc1231a")
-    assert isinstance(protocol_of("mc1231a").frame, PacketFrame)
     assert driver.ask("encode", "set_1.response", "01", 5) == "ok 0005 00050006"
     assert driver.ask("decode", "set_1.response", "00050006", "01") == "ok - 5"
     assert driver.ask("decode", "set_1.response", "00050007", "01") == "error crc"

@@ -17,7 +17,9 @@ from pathlib import Path
 import pytest
 
 from qlinkgen.backends import construct, python
+from qlinkgen.plan import plan_of
 from qlinkgen.schema import load, loads
+from tests.support.agreement import compare
 from tests.support.cdriver import Driver, build
 
 SCHEMA = """
@@ -147,5 +149,7 @@ def test_round_trip(frame: Stuffed, tmp_path: Path, require_tool: Callable[..., 
         heard = [each for at in range(len(stream)) for each in decoder.feed(stream[at : at + 1])]
         assert [each for each in heard if not isinstance(each, module.Fault)] == told
         heard_by_c = driver.ask("stream", "request", stream.hex()).split()[1:]
+        for direction in protocol.directions:
+            compare(plan_of(protocol), direction, driver, rng, 8)
         due = [each.to_bytes().hex() for each in told]
         assert [each.rsplit(":", 1)[1] for each in heard_by_c if ":message:" in each] == due

@@ -24,8 +24,9 @@ from benchmarks.firmware_measure import measure
 from benchmarks.firmware_page import PAGE, renewed, tables, written
 from benchmarks.firmware_size import buffers, core, messages
 from benchmarks.firmware_stack import CallGraph, UnknownDepth
+from qlinkgen.plan import plan_of
 from tests.c.conftest import PROTOCOLS, protocol_of
-from tests.c.test_receiver import wire_of
+from tests.support import agreement
 from tests.support.cdriver import Driver, build, raw_text
 from tests.support.random_raw import damaged, random_address, random_values
 
@@ -53,9 +54,9 @@ def test_big_endian_agrees(
             assert big.ask("decode", message.name, *words) == drivers(name).ask(
                 "decode", message.name, *words
             )
-        direction = protocol.directions[0]
+        direction, plan = protocol.directions[0], plan_of(protocol)
         for _ in range(20):
-            frames = [wire_of(big, protocol, rng.choice(protocol.received(direction)), rng) for _ in range(3)]
+            frames = [agreement.wire(plan, rng.choice(plan.received(direction)), rng) for _ in range(3)]
             stream = damaged(b"".join(frames), rng, b"\xa5\x00\xff")
             assert big.ask("stream", direction, stream.hex()) == drivers(name).ask(
                 "stream", direction, stream.hex()

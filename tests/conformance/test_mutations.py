@@ -58,8 +58,8 @@ MISTAKES = {
     ),
     "the end of another": Mistake(
         "trio",
-        "((byte ^ receiver->header) & 0x78U) != 0U",
-        "((byte ^ receiver->header) & 0x70U) != 0U",
+        "((end_byte ^ byte) & 0x78U) != 0U",
+        "((end_byte ^ byte) & 0x70U) != 0U",
         {"character_transfer", "direct_variable_transfer", "keypad_offset", "keypad_mode"},
         {"receive"},
     ),

@@ -28,12 +28,6 @@ PROTOCOLS = (*SHIPPED, *OTHERS)
 #: Wrong frames that C and construct, which do not print the plan of a frame yet, give another kind: the kind
 #: found and that of the plan, and how many there are. An entry goes as soon as they agree.
 UNLIKE: Mapping[tuple[str, str], Mapping[tuple[str, str], int]] = {
-    ("qlink", "c"): {("crc", "length"): 1},
-    ("mc1231a", "c"): {("crc", "length"): 1},
-    ("dynamixel", "c"): {("crc", "length"): 1},
-    ("kitchen_sink", "c"): {("crc", "length"): 3},
-    ("modbus_rtu", "c"): {("frame", "range"): 12, ("frame", "unknown"): 2, ("crc", "length"): 12},
-    ("wide", "c"): {("crc", "length"): 1, ("length", "truncated"): 1},
     ("mc1231a", "construct"): {
         ("length", "truncated"): 68,
         ("illegal", "truncated"): 41,

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qlinkgen.model.frame import DelimitedFrame
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.framing import Rescan
 from tests.proof import cases, recovery
 from tests.proof.conftest import Make
 from tests.proof.corruption import EVERY_KIND, corrupted
@@ -50,8 +51,7 @@ def python_events(name: str, direction: str, chunks: Sequence[bytes]) -> list[st
 
 def looks_back(name: str) -> bool:
     """Bytes wait in the receiver until it is clear what they are."""
-    frame = cases.protocol(name).frame
-    return isinstance(frame, DelimitedFrame) and not frame.unique_preamble
+    return isinstance(plan_of(cases.protocol(name)).frame.receiver, Rescan)
 
 
 def _shown(event: Any, address_name: str | None) -> str:

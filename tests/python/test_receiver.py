@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.receive import Event, receiver
 from tests.python.protocols import EVERY, directions, module, protocol, stream, wire_of
 from tests.support import strategies
-from tests.support.receiver_model import receiver
 
 STREAMS = [(name, direction) for name in EVERY for direction in directions(name)]
 
@@ -77,27 +78,29 @@ def described(events: Iterable[Any]) -> list[tuple[object, ...]]:
     ]
 
 
+def _shown(name: str, event: Event) -> tuple[object, ...]:
+    if event.decoded is None:
+        return "fault", event.kind, event.offset
+    which = event.decoded.message.name
+    again = module(name).MESSAGES[which].from_bytes(event.decoded.payload)
+    return "message", which, again.to_bytes().hex()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "direction"), STREAMS)
 @settings(max_examples=80)
 @given(data=st.data())
 def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObject) -> None:
     wire = data.draw(streams(name, direction))
-    decoder, machine = stream(name, direction), receiver(protocol(name), direction)
+    decoder, machine = stream(name, direction), receiver(plan_of(protocol(name)), direction)
     for at, byte in enumerate(wire):
-        expected: list[tuple[object, ...]] = []
-        for event in machine.feed(byte):
-            if event.kind == "message":
-                again = module(name).MESSAGES[event.name].from_bytes(event.payload)
-                expected.append(("message", event.name, again.to_bytes().hex()))
-            else:
-                expected.append(("fault", event.kind, event.offset))
+        expected = [_shown(name, event) for event in machine.feed(byte)]
         assert described(decoder.feed(bytes((byte,)))) == expected, f"byte {at} of {wire.hex(' ')}"
 
 
 def test_skipped_bytes_are_told_of_by_the_longest_frame_that_there_can_be() -> None:
     """Its payload may be longer than that of any message: C, and the model, count by the frame as well."""
-    machine = receiver(protocol("modbus_rtu"), "request")
+    machine = receiver(plan_of(protocol("modbus_rtu")), "request")
     decoder = module("modbus_rtu").StreamDecoder("request")
     noise = bytes((0xA5,)) * 600
     expected = [("fault", each.kind, each.offset) for byte in noise for each in machine.feed(byte)]

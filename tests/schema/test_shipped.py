@@ -14,6 +14,8 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.sizes import max_wire_size
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.framing import Hunt
 from qlinkgen.schema import find, lint, load, loads, shipped
 
 ROWS = list(csv.DictReader(Path(__file__).with_name("mc1231a.csv").read_text("utf-8").splitlines()))
@@ -193,7 +195,7 @@ def test_qlink_frame(qlink: Protocol) -> None:
     assert isinstance(frame, DelimitedFrame)
     assert [part.name for part in frame.parts] == ["preamble", "length", "command", "node", "data", "crc"]
     assert frame.preamble == b"\xa5\xa5"
-    assert frame.unique_preamble
+    assert isinstance(plan_of(qlink).frame.receiver, Hunt)
     assert (frame.length_bias, frame.payload.min_size, frame.payload.max_size) == (4, 0, 26)
     crc = frame.parts[-1].checksum
     assert crc

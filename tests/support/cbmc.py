@@ -13,10 +13,12 @@ from pathlib import Path
 from qlinkgen.backends import c
 from qlinkgen.backends.base import Options
 from qlinkgen.backends.c.names import Names
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.framing import FramePlan, Hunt, InStep, Marks
 
 PROOFS = Path(__file__).parents[1] / "c" / "proofs"
 CHECKS = (
@@ -97,8 +99,7 @@ def write_header(protocol: Protocol, folder: Path) -> Path:
 
 def write_receiver_proof(protocol: Protocol, folder: Path) -> Path:
     """The proofs of the protocol's receiver, beside its header."""
-    frame = protocol.frame
-    kind, store, places = _receiver_of(frame)
+    kind, store, places = _receiver_of(plan_of(protocol).frame)
     invariant = (PROOFS / f"invariant_{kind}.c").read_text("utf-8")
     text = (PROOFS / "receiver.c").read_text("utf-8")
     text = text.replace("@invariant@", invariant.rstrip()).replace("@store@", store)
@@ -109,13 +110,14 @@ def write_receiver_proof(protocol: Protocol, folder: Path) -> Path:
     return file
 
 
-def _receiver_of(frame: Frame) -> tuple[str, str, dict[str, str]]:
-    if isinstance(frame, PacketFrame):
+def _receiver_of(frame: FramePlan) -> tuple[str, str, dict[str, str]]:
+    if isinstance(frame.receiver, InStep):
         return "packet", "payload", {}
-    if isinstance(frame, MarkedFrame):
-        return "marked", "buffer", {"check": str(len(frame.checksum.chunks) if frame.checksum else 0)}
-    assert frame.unique_preamble
-    return "streamed", "body", {"bias": str(frame.length_bias)}
+    if isinstance(frame.receiver, Marks):
+        return "marked", "buffer", {}
+    assert isinstance(frame.receiver, Hunt)
+    assert frame.envelope.length is not None
+    return "streamed", "body", {"bias": str(frame.envelope.length.bias)}
 
 
 def write_message_proof(protocol: Protocol, folder: Path) -> Path:

@@ -89,6 +89,7 @@ static const char *kind_of_event(@p@_event_t event)
     case @P@_EVENT_UNKNOWN: return "unknown";
     case @P@_EVENT_TRUNCATED: return "truncated";
     case @P@_EVENT_FRAMING: return "frame";
+    case @P@_EVENT_RANGE: return "range";
     default: return "?";
     }
 }

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qlinkgen.backends.c.interface import count_member
-from qlinkgen.backends.c.names import Names
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
-from qlinkgen.model.message import Message, Value
+from qlinkgen.backends.c.interface import count_member, interface
+from qlinkgen.model.message import Direction, Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
 
@@ -24,8 +22,9 @@ class _Source:
 
     def __init__(self, protocol: Protocol) -> None:
         self.protocol = protocol
-        self.names = Names(protocol)
-        self.packet = isinstance(protocol.frame, PacketFrame)
+        self.header = interface(protocol)
+        self.names = self.header.names
+        self.packet = self.header.packets
         self.lines: list[str] = []
 
     def text(self) -> str:
@@ -94,15 +93,10 @@ class _Source:
         self._add("    put_hex(payload, (size_t)size);", "    put_hex(wire, (size_t)total);", "}")
 
     def _whom(self, message: Message) -> str:
-        frame = self.protocol.frame
         if self.packet:
-            has_sum = (
-                isinstance(frame, PacketFrame)
-                and frame.checksum is not None
-                and message.direction == "response"
-            )
+            has_sum = self.header.sum_bits and message.direction == "response"
             return self._filled("@p@_request_sum(bytes_a, from_hex(node, bytes_a)), ") if has_sum else ""
-        bits = _address_bits(self.protocol)
+        bits = self.header.address_bits
         return f"(uint{bits}_t)strtoul(node, NULL, 0), " if bits else ""
 
     def _decode(self, message: Message) -> None:
@@ -135,14 +129,12 @@ class _Source:
         self._decode_frame(message, call, shown)
 
     def _sum(self) -> str:
-        frame = self.protocol.frame
-        has_sum = isinstance(frame, PacketFrame) and frame.checksum is not None
-        return "@p@_request_sum(bytes_b, from_hex(word(), bytes_b)), " if has_sum else ""
+        return "@p@_request_sum(bytes_b, from_hex(word(), bytes_b)), " if self.header.sum_bits else ""
 
     def _decode_frame(self, message: Message, call: str, shown: str) -> None:
         function = self.names.function(message)
-        field = _id_name(self.protocol)
-        buffer = "bytes_b, " if _unpacks(self.protocol.frame) else ""
+        field = self.header.id
+        buffer = "bytes_b, " if self.header.unpacks else ""
         self._add("    @p@_frame_t frame;")
         self._add(f"    status = @p@_frame_decode({self._direction(message)}&frame, {buffer}bytes_a, size);")
         name = _check_of(self.protocol, message)
@@ -159,7 +151,7 @@ class _Source:
                 "    }",
             )
         self._add("    if (status != @P@_OK) { fail(status); return; }")
-        address = self.protocol.address_name
+        address = self.header.address
         self._add(
             f'    printf("ok %u", (unsigned)frame.{address});' if address else '    printf("ok -");',
             shown,
@@ -167,12 +159,12 @@ class _Source:
         )
 
     def _direction(self, message: Message) -> str:
-        return f"@P@_{_check_of(self.protocol, message).upper()}, " if _directed(self.protocol) else ""
+        return f"@P@_{_check_of(self.protocol, message).upper()}, " if self.header.directed else ""
 
     # Streams
 
     def _stream(self) -> None:
-        address, field = self.protocol.address_name, _id_name(self.protocol)
+        address, field = self.header.address, self.header.id
         node = f'printf("%u:", (unsigned)frame.{address});' if address else 'printf("-:");'
         self._add(
             "static void deliver(size_t at, @p@_event_t event, const @p@_receiver_t *rx,",
@@ -200,16 +192,12 @@ class _Source:
                 f"            status = @p@_{direction}_check(&frame);",
             )
             self._add(f"            switch (frame.{field}) {{")
-            for message in self.protocol.received(direction):  # type: ignore[arg-type]
+            for message in self.protocol.received(direction):
                 self._add(
                     f'            case {self.names.constant(message)}_ID: name = "{message.name}"; break;'
                 )
             self._add("            default: break;", "            }", "        }")
-        length = "frame" if isinstance(self.protocol.frame, MarkedFrame) else "length"
-        self._add(
-            "        if (status != @P@_OK) {",
-            f'            printf("%s", status == @P@_ERROR_LENGTH ? "{length}" : kind_of(status));',
-        )
+        self._add("        if (status != @P@_OK) {", '            printf("%s", kind_of(status));')
         self._add("        } else {", '            printf("message:%s:", name);', f"            {node}")
         self._add("            if (frame.size == 0u) { putchar('-'); }")
         self._add(
@@ -220,15 +208,14 @@ class _Source:
         )
         self._stream_loop()
 
-    def _directions(self) -> list[str]:
-        return ["request"] if self.packet else list(self.protocol.directions)
+    def _directions(self) -> list[Direction]:
+        directions = ("request",) if self.packet else self.protocol.directions
+        return [direction for direction in directions if self.protocol.received(direction)]
 
     def _stream_loop(self) -> None:
-        rescan = _rescans(self.protocol)
+        rescan = self.header.rescans
         chosen = (
-            ', strcmp(direction, "request") == 0 ? @P@_REQUEST : @P@_RESPONSE'
-            if _directed(self.protocol)
-            else ""
+            ', strcmp(direction, "request") == 0 ? @P@_REQUEST : @P@_RESPONSE' if self.header.directed else ""
         )
         self._add("static void stream(const char *direction)", "{", "    static @p@_receiver_t rx;")
         self._add(
@@ -266,7 +253,7 @@ class _Source:
 
     def _cuts(self) -> None:
         """Each front part of the bytes, at the end of memory of exactly its size; see cdriver_head.c."""
-        unpacks, directed = _unpacks(self.protocol.frame), _directed(self.protocol)
+        unpacks, directed = self.header.unpacks, self.header.directed
         self._add(
             "static void cuts(const char *direction)",
             "{",
@@ -304,30 +291,26 @@ class _Source:
         self._add("    }", "}")
 
     def _check(self) -> None:
-        frame = self.protocol.frame
-        part = frame.part("checksum") if isinstance(frame, DelimitedFrame) else frame
-        checksum = getattr(part, "checksum", None)
         self._add(
             "static void check(const char *text)",
             "{",
             "    const size_t size = from_hex(text, bytes_a);",
             "    (void)bytes_b;",
         )
-        if checksum is None:
-            self._add("    (void)size;", '    printf("usage");', "}")
-        elif self.packet:
+        if self.header.sum_bits:
             self._add(
                 '    printf("ok %llu", (unsigned long long)@p@_finish_sum_(@p@_sum_(0u, bytes_a, size)));',
                 "}",
             )
-        else:
-            width = next(w for w in (8, 16, 32, 64) if w >= checksum.algorithm.width)
+        elif width := self.header.check_bits:
             self._add(
                 f"    uint{width}_t value = @p@_check_start();",
                 "    for (size_t index = 0u; index < size; ++index) {",
             )
             self._add("        value = @p@_check_update(value, bytes_a[index]);", "    }")
             self._add('    printf("ok %llu", (unsigned long long)@p@_check_finish(value));', "}")
+        else:
+            self._add("    (void)size;", '    printf("usage");', "}")
 
 
 def _parsed(value: Value) -> list[str]:
@@ -391,39 +374,7 @@ def _printed(value: Value) -> list[str]:
     ]
 
 
-def _address_bits(protocol: Protocol) -> int:
-    frame = protocol.frame
-    if isinstance(frame, DelimitedFrame):
-        part = frame.part("address")
-        return part.scalar.bits if part and part.scalar else 0
-    return 8 if isinstance(frame, MarkedFrame) else 0
-
-
 def _check_of(protocol: Protocol, message: Message) -> str:
     if message.direction != "message" or protocol.directions == ("message",):
         return message.direction
     return "request"
-
-
-def _directed(protocol: Protocol) -> bool:
-    frame = protocol.frame
-    if len(protocol.directions) == 1:
-        return False
-    if isinstance(frame, DelimitedFrame):
-        return frame.part("length") is None or not frame.preamble
-    return isinstance(frame, MarkedFrame)
-
-
-def _unpacks(frame: object) -> bool:
-    return isinstance(frame, DelimitedFrame) and frame.stuffing is not None
-
-
-def _rescans(protocol: Protocol) -> bool:
-    frame = protocol.frame
-    return isinstance(frame, DelimitedFrame) and not frame.unique_preamble
-
-
-def _id_name(protocol: Protocol) -> str:
-    frame = protocol.frame
-    part = frame.part("message") if isinstance(frame, DelimitedFrame) else None
-    return part.name if part and protocol.address_name == "id" else "id"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan.framing import Hunt, Marks, Rescan
 from tests.support.cfuzz_dispatch import dispatch
 from tests.support.cfuzz_source import Harness
 
@@ -47,19 +47,16 @@ def compiled(compiler: str, folder: Path, name: str, *flags: str) -> subprocess.
 
 
 def _receiver(h: Harness) -> str:
-    frame = h.protocol.frame
-    resynchronises = isinstance(frame, MarkedFrame) or (
-        isinstance(frame, DelimitedFrame) and frame.unique_preamble
-    )
+    kind = h.frame.receiver
     return h.part(
         "receiver",
         init=h.filled(", answer ? @P@_RESPONSE : @P@_REQUEST" if h.c.directed else ""),
-        delivered=_made_of_it(h) if isinstance(frame, DelimitedFrame) else "",
+        delivered=_made_of_it(h) if isinstance(kind, Hunt | Rescan) else "",
         next=_events(h, "next") if h.c.rescans else "",
         finish=_finish(h),
         lawful=str(_lawful(h.protocol)),
         # Where the search goes on inside what looked like a frame, the last one may have to wait for the end.
-        promised="!answer" if h.c.packets else "true" if resynchronises else "false",
+        promised="!answer" if h.c.packets else "true" if isinstance(kind, Hunt | Marks) else "false",
     )
 
 
@@ -100,7 +97,7 @@ def _finish(h: Harness) -> str:
 
 def _decoders(h: Harness) -> str:
     parts, call = "", "break;"
-    if isinstance(h.protocol.frame, DelimitedFrame):
+    if isinstance(h.frame.receiver, Hunt | Rescan):
         parts, call = _any_frame(h), "@p@_parts_(input); break;"
     elif h.c.packets:
         parts, call = _any_answer(h), "@p@_parts_(input); break;"

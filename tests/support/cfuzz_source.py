@@ -10,10 +10,12 @@ from pathlib import Path
 
 from qlinkgen.backends.c.interface import Interface, interface
 from qlinkgen.backends.c.names import integer_type, scalar_literal, scalar_type
-from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Bits, Scalar
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.framing import Hunt, Rescan
+from qlinkgen.plan.transparency import FrameStuffing
 
 
 def _ignores_bits(message: Message) -> bool:
@@ -36,6 +38,7 @@ class Harness:
         """Describe the protocol's header."""
         self.protocol = protocol
         self.c: Interface = interface(protocol)
+        self.frame = plan_of(protocol).frame
         self.first, self.second = (*protocol.directions, *protocol.directions)[:2]
 
     def part(self, file: str, /, **places: str) -> str:
@@ -268,14 +271,14 @@ class Harness:
         return self.filled("\n".join(lines) + "\n")
 
     def _made_again(self) -> list[str]:
-        frame = self.protocol.frame
-        if not isinstance(frame, DelimitedFrame):
+        if not isinstance(self.frame.receiver, Hunt | Rescan):
             return []
         made = self.frame_encode("frame.payload", "frame.size", "again", "sizeof again")
         same = "made == (int)size"
-        if frame.stuffing is not None and not frame.stuffing.before_checksum:
-            # Behind the last byte of a frame an inserted one may be missing.
-            same = f"({same} || (made == (int)size + 1 && again[size] == {frame.stuffing.insert}u))"
+        stuffing = self.frame.transparency
+        if isinstance(stuffing, FrameStuffing):
+            # After the last byte of a frame an inserted one may be missing.
+            same = f"({same} || (made == (int)size + 1 && again[size] == {stuffing.rule.insert}u))"
         return [
             "    {",
             "        uint8_t again[2u * @P@_MAX_FRAME_SIZE];",

@@ -6,16 +6,17 @@ import functools
 
 import jinja2
 
-from qlinkgen.backends.base import Options, Outputs, environment
+from qlinkgen.backends.base import Outputs, environment
 from qlinkgen.backends.c.header import Header
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import Options, plan_of
 
 __all__ = ["generate"]
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The header of a protocol."""
-    return {f"c/{protocol.name}.h": Header(protocol, options, _templates()).text()}
+    return {f"c/{protocol.name}.h": Header(plan_of(protocol, options), _templates()).text()}
 
 
 @functools.cache

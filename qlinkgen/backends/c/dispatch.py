@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from qlinkgen.backends.c.framing import Address, checks
@@ -10,6 +11,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.naming import C_RESERVED, snake
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Allowance, Bus, Command, Repeat
+from qlinkgen.plan.tree import MessagePlan
 
 #: Members that a table has beside its functions.
 _TAKEN = frozenset({"node", "address", "broadcast", "context", "id"})
@@ -57,11 +59,11 @@ def _entry(names: Names, message: Message, answer: Message | None, command: Comm
     }
 
 
-def master_entries(names: Names, address: Address, kept: tuple[Message, ...]) -> list[dict[str, Any]]:
+def master_entries(names: Names, address: Address, kept: Sequence[MessagePlan]) -> list[dict[str, Any]]:
     """What a master can be told, in schema order."""
-    told = tuple(message for message in kept if message.direction != "request")
+    told = [message for message in kept if message.direction != "request"]
     return [
-        {**check, "name": told_name(names, message)}
+        {**check, "name": told_name(names, message.message)}
         for message, check in zip(told, checks(names, address, told), strict=True)
     ]
 

@@ -1,76 +1,93 @@
-"""The frame of a protocol as one object, whatever its kind: templates, values, calls."""
+"""The frame of a protocol as one object: templates, values, calls, chosen by its receiver."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 
-from qlinkgen.backends.c import crc, delimited_view, framing
-from qlinkgen.backends.c.delimited import DelimitedWriter
+from qlinkgen.backends.c import crc, framing
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.marked import marked_view, shapes
 from qlinkgen.backends.c.names import Names
-from qlinkgen.backends.c.packet import packet_from_frame, packet_view, sizes_by_value
-from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
-from qlinkgen.model.message import Direction, Message
+from qlinkgen.backends.c.packet import packet_from_frame, packet_to_frame, packet_view, sizes_by_value
+from qlinkgen.backends.c.views import judgement, parts_view
+from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.transparency import FrameStuffing
+from qlinkgen.plan.tree import MessagePlan, Plan
+
+Heard = Sequence[tuple[Direction, Sequence[MessagePlan]]]
 
 
 @dataclass
 class FrameSection:
     """What the header places for its frame."""
 
-    protocol: Protocol
+    plan: Plan
     view: dict[str, Any]
     check: dict[str, Any] | None
     templates: tuple[str, ...]
-    receivers: tuple[str, ...]
-    #: There is a receiver for slaves alone (packets: an answer cannot be told from the next one).
-    slave_only: bool = False
-    has_checks: bool = True
+    receiver: str
 
     @property
     def rescans(self) -> bool:
         """One byte can bring several events."""
-        return "receiver_rescan" in self.receivers
+        return self.receiver == "receiver_rescan"
+
+    @property
+    def slave_only(self) -> bool:
+        """There is a receiver for slaves alone: only its request tells an answer from the next one."""
+        return self.plan.frame.needs_request
 
     @property
     def needs_ids(self) -> bool:
-        """Receiving a frame needs to know the messages, so their ids stand in front of them."""
-        view = self.view
-        early = view["reports_runs"] or view["needs_extent"]
-        return early or not isinstance(self.protocol.frame, DelimitedFrame)
+        """Receiving a frame needs to know the messages, so their ids come before it."""
+        by_message = self.view["bare"] or self.view["needs_extent"]
+        return by_message or isinstance(self.plan.frame.receiver, Marks | InStep)
 
-    def groups(
-        self, names: Names, received: list[tuple[Direction, tuple[Message, ...]]]
-    ) -> list[dict[str, Any]]:
-        """What a receiver knows of the messages, for each direction."""
-        frame, upper = self.protocol.frame, names.upper
-        if isinstance(frame, PacketFrame):
-            return [group for d, m in received if d == "request" for group in sizes_by_value(names, m)]
-        if not isinstance(frame, MarkedFrame):
-            return []
-        return [
-            {"direction": f"{upper}_{d.upper()}", "messages": shapes(names, m, frame)} for d, m in received
-        ]
+    def heard(self) -> Heard:
+        """Messages that are decoded, for each direction that a receiver can wait for."""
+        directions = (d for d in self.plan.protocol.directions if d in self.plan.heard)
+        found = [(direction, self.plan.received(direction)) for direction in directions]
+        return [(direction, messages) for direction, messages in found if messages]
 
-    def to_frame(self, names: Names, address: framing.Address, message: Message) -> dict[str, Any]:
+    def known(self, names: Names) -> dict[str, Any]:
+        """What a receiver knows of the messages."""
+        heard, receiver = self.heard(), self.plan.frame.receiver
+        match receiver:
+            case Hunt():
+                return {}
+            case Rescan():
+                return {"judgement": judgement(self.plan, [direction for direction, _ in heard])}
+            case Marks():
+                return {
+                    "shapes": [
+                        {
+                            "direction": f"{names.upper}_{direction.upper()}",
+                            "messages": shapes(names, messages),
+                        }
+                        for direction, messages in heard
+                    ]
+                }
+            case InStep():
+                requests = [message for d, messages in heard if d == "request" for message in messages]
+                return {"shapes": sizes_by_value(names, requests)}
+            case _:
+                assert_never(receiver)
+
+    def to_frame(self, names: Names, address: framing.Address, message: MessagePlan) -> dict[str, Any]:
         """The function that makes a whole frame."""
-        found = framing.to_frame(self.protocol, names, address, message)
-        return {
-            **found,
-            "parameters": found["parameters"].replace("{sum_type}", self.view.get("sum_type", "")),
-        }
+        if self.slave_only:
+            return packet_to_frame(names, message, self.view)
+        return framing.to_frame(self.plan.frame, names, address, message)
 
-    def from_frame(self, names: Names, message: Message) -> dict[str, Any] | None:
+    def from_frame(self, names: Names, message: MessagePlan) -> dict[str, Any] | None:
         """The function that takes a whole frame apart, where the frame alone does not tell its message."""
         if not self.slave_only or message.direction != "response":
             return None
         return packet_from_frame(names, message, self.view)
-
-    def left_out(self, role: str) -> str:
-        """The direction that a role never receives."""
-        return {"slave": "response", "master": "request"}[role]
 
     def dispatch_view(self, protocol: Protocol, upper: str) -> dict[str, Any]:
         """What the dispatch template needs of the frame."""
@@ -120,24 +137,21 @@ class FrameSection:
         return [first, {**second, "writes": True, "otherwise": f"slave->broadcast ? {unknown} : {call}"}]
 
 
-def frame_section(protocol: Protocol, layouts: Layouts) -> FrameSection:
-    """Choose by the kind of frame."""
-    frame = protocol.frame
-    if isinstance(frame, DelimitedFrame):
-        return _delimited(protocol, frame, layouts)
-    check = crc.render(frame.checksum)
-    if isinstance(frame, MarkedFrame):
-        view = marked_view(protocol, frame)
-        return FrameSection(protocol, view, check, ("place", "marked", "seal"), ("receiver_marked",))
-    view = packet_view(protocol, frame)
-    return FrameSection(protocol, view, None, ("packet",), ("receiver_packet",), slave_only=True)
-
-
-def _delimited(protocol: Protocol, frame: DelimitedFrame, layouts: Layouts) -> FrameSection:
-    writer = DelimitedWriter(protocol, frame, layouts)
-    view = delimited_view.render(protocol, frame, writer)
-    part = frame.part("checksum")
-    check = crc.render(part.checksum if part else None)
-    own = "frame_stuffed" if writer.stuffed_whole else "frame_plain"
-    receiver = "receiver_streamed" if writer.streamed else "receiver_rescan"
-    return FrameSection(protocol, view, check, ("place", own, "seal", "frame_public"), (receiver,))
+def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
+    """Choose by the way frames are received."""
+    receiver, check = plan.frame.receiver, plan.frame.check
+    value = crc.render(check.value if check else None)
+    whole = isinstance(plan.frame.transparency, FrameStuffing)
+    parts = ("place", "frame_stuffed" if whole else "frame_plain", "seal", "frame_public")
+    match receiver:
+        case Hunt():
+            return FrameSection(plan, parts_view(plan, layouts), value, parts, "receiver_streamed")
+        case Rescan():
+            return FrameSection(plan, parts_view(plan, layouts), value, parts, "receiver_rescan")
+        case Marks():
+            templates = ("place", "marked", "seal")
+            return FrameSection(plan, marked_view(plan), value, templates, "receiver_marked")
+        case InStep():
+            return FrameSection(plan, packet_view(plan), None, ("packet",), "receiver_packet")
+        case _:
+            assert_never(receiver)

@@ -7,7 +7,7 @@ from typing import Any
 import jinja2
 
 from qlinkgen.backends import c_text
-from qlinkgen.backends.base import Options, banner
+from qlinkgen.backends.base import banner
 from qlinkgen.backends.c import dispatch, framing
 from qlinkgen.backends.c.constants import enum_views, limits
 from qlinkgen.backends.c.describe import WIDTH
@@ -20,31 +20,27 @@ from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Types
 from qlinkgen.model import sizes
-from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.transaction import Command
-from qlinkgen.plan import plan_of
 from qlinkgen.plan.payload import BytesStep
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 class Header:
     """Collects the sections of one header."""
 
-    def __init__(self, protocol: Protocol, options: Options, templates: jinja2.Environment) -> None:
-        """What is kept is decided once, here."""
-        self._protocol = protocol
-        self._plan = plan_of(protocol, options)
-        self._options = options
+    def __init__(self, plan: Plan, templates: jinja2.Environment) -> None:
+        """The plan has what is kept."""
+        self._plan = plan
+        self._protocol = plan.protocol
         self._templates = templates
-        self._names = Names(protocol)
-        self._layouts = Layouts(protocol.name)
-        self._types = Types(self._plan, self._names)
+        self._names = Names(plan.protocol)
+        self._layouts = Layouts(plan.protocol.name)
+        self._types = Types(plan, self._names)
         self._writer = MessageWriter(self._names, self._layouts, self._types)
-        self._kept = tuple(message for message in protocol.messages if self._wanted(message))
-        self._present = {message.name for message in self._kept}
-        self._section = frame_section(protocol, self._layouts)
-        self._address = framing.address_of(protocol, self._section.view["address"])
+        self._kept = tuple(each.message for each in plan.messages)
+        self._section = frame_section(plan, self._layouts)
+        self._address = framing.address_of(plan.frame, self._section.view["address"])
 
     def text(self) -> str:
         """The whole header."""
@@ -53,40 +49,12 @@ class Header:
             self._place("frame_common", f=self._section.view),
             *self._directions(),
             *[self._frame_part(name) for name in self._section.templates],
-            *[self._message(message) for message in self._kept],
+            *[self._message(message) for message in self._plan.messages],
             *self._checks(),
-            *[self._frame_part(name) for name in self._receivers()],
+            *self._receiver(),
             self._dispatch(),
         ]
         return tidy(self._place("header", **self._head(), body="".join(sections)))
-
-    # What is kept
-
-    def _wanted(self, message: Message) -> bool:
-        only, command = self._options.only, self._names.command_of(message)
-        return not only or message.name in only or (command is not None and command.name in only)
-
-    def _encoded(self, message: Message) -> bool:
-        return self._sent_by(message) in ("both", self._options.role) or self._options.role == "both"
-
-    def _decoded(self, message: Message) -> bool:
-        sender = self._sent_by(message)
-        return self._options.role == "both" or sender == "both" or sender != self._options.role
-
-    @staticmethod
-    def _sent_by(message: Message) -> str:
-        return {"request": "master", "response": "slave", "message": "both"}[message.direction]
-
-    def _received(self) -> list[tuple[Direction, tuple[Message, ...]]]:
-        """Messages that are decoded, for each direction that a receiver can wait for."""
-        found: list[tuple[Direction, tuple[Message, ...]]] = []
-        for direction in self._protocol.directions:
-            if self._options.role != "both" and direction == self._section.left_out(self._options.role):
-                continue
-            messages = tuple(m for m in self._protocol.received(direction) if m.name in self._present)
-            if messages:
-                found.append((direction, messages))
-        return found
 
     # Sections
 
@@ -96,17 +64,17 @@ class Header:
         )
 
     def _frame_part(self, template: str) -> str:
-        shapes = self._section.groups(self._names, self._received())
         view = {
             **self._section.view,
             "address_groups": self._address_groups(),
             "wide": any(map(framing.is_wide, self._kept)),
+            **self._section.known(self._names),
         }
-        return self._place(template, f=view, crc=self._section.check, shapes=shapes, unused=self._unheard())
+        return self._place(template, f=view, crc=self._section.check, unused=self._unheard())
 
     def _address_groups(self) -> list[framing.AddressGroup]:
         """Sets of addresses that the messages which are encoded may have."""
-        groups = (framing.address_group(m, self._address) for m in self._kept if self._encoded(m))
+        groups = (framing.address_group(m, self._address) for m in self._plan.messages if m.encoded)
         return list(dict.fromkeys(group for group in groups if group))
 
     def _check_value(self) -> str:
@@ -120,10 +88,10 @@ class Header:
         if not self._section.needs_ids:
             return []
         names, view = self._names, self._section.view
-        received = [(f"{names.upper}_{direction.upper()}", m) for direction, m in self._received()]
+        received = [(f"{names.upper}_{direction.upper()}", m) for direction, m in self._section.heard()]
         texts = ["\n", *(self._id_constant(message) for message in self._kept)]
         unheard = self._unheard()
-        if view["reports_runs"]:
+        if view["bare"]:
             address = self._address
             checks = [(d, framing.checks(names, address, messages)) for d, messages in received]
             admits = [{"direction": d, "messages": messages} for d, messages in checks]
@@ -131,10 +99,8 @@ class Header:
             unused = [*unheard, *([view["address"]] if view["address"] and not limited else [])]
             texts.append(self._place("admit", f=view, admits=admits, unused=unused))
         if view["needs_extent"]:
-            plans = self._plan.by_name
             sizes_known = [
-                {"direction": d, "messages": extents(names, [plans[m.name] for m in heard], self._layouts)}
-                for d, heard in received
+                {"direction": d, "messages": extents(names, heard, self._layouts)} for d, heard in received
             ]
             texts.append(self._place("extent", f=view, extents=sizes_known, unused=unheard))
         return texts
@@ -142,44 +108,41 @@ class Header:
     def _unheard(self) -> list[str]:
         """Parameters that tell one message from another, where none is received."""
         view = self._section.view
-        return [] if self._received() else [*(["direction"] if view["needs_direction"] else []), view["id"]]
+        return (
+            [] if self._section.heard() else [*(["direction"] if view["needs_direction"] else []), view["id"]]
+        )
 
     def _id_constant(self, message: Message) -> str:
         return f"#define {self._names.constant(message)}_ID 0x{message.id:02X}\n"
 
-    def _message(self, message: Message) -> str:
-        view = self._writer.render(self._plan.by_name[message.name])
+    def _message(self, message: MessagePlan) -> str:
+        view = self._writer.render(message)
         view["early_id"] = self._section.needs_ids
-        if self._encoded(message):
+        if message.encoded:
             view["to_frame"] = self._section.to_frame(self._names, self._address, message)
-        if self._decoded(message):
+        if message.decoded:
             view["from_frame"] = self._section.from_frame(self._names, message)
         return self._place("message", m=view)
 
     def _checks(self) -> list[str]:
-        if not self._section.has_checks:
-            return []
         checks = [
             {"direction": direction, "messages": framing.checks(self._names, self._address, messages)}
-            for direction, messages in self._received()
+            for direction, messages in self._section.heard()
         ]
         return [self._place("checks", checks=checks, f=self._section.view)]
 
-    def _receivers(self) -> tuple[str, ...]:
+    def _receiver(self) -> list[str]:
         """Packets have a receiver for slaves alone."""
-        return () if self._options.role == "master" and self._section.slave_only else self._section.receivers
+        if self._plan.role == "master" and self._section.slave_only:
+            return []
+        return [self._frame_part(self._section.receiver)]
 
     def _dispatch(self) -> str:
         ring = self._protocol.directions == ("message",)
-        commands: tuple[Command, ...] = tuple(
-            c for c in self._protocol.commands if c.request.name in self._present
-        )
-        slave = [] if ring or self._options.role == "master" else self._slave()
-        master = (
-            []
-            if self._options.role == "slave" and not ring
-            else dispatch.master_entries(self._names, self._address, self._kept)
-        )
+        commands, role = self._plan.commands, self._plan.role
+        slave = [] if ring or role == "master" else self._slave()
+        told = role != "slave" or ring
+        master = dispatch.master_entries(self._names, self._address, self._plan.messages) if told else []
         transactions = dispatch.transactions(self._protocol, self._names.upper, commands)
         view = {**self._section.view, **self._section.dispatch_view(self._protocol, self._names.upper)}
         answered = next((c for c in commands if c.response is not None), None)
@@ -202,9 +165,7 @@ class Header:
             "about": c_text.comment(protocol.doc, WIDTH),
             "options": option_lines(self._names.upper, self._section.check),
             "example": example_lines(self._plan, self._names, self._section),
-            "max_wire_size": max(
-                sizes.protocol_max_wire_size(protocol), self._section.view.get("max_wire", 0)
-            ),
+            "max_wire_size": max(sizes.protocol_max_wire_size(protocol), self._section.view["max_wire"]),
             "limits": limits(protocol, self._kept),
             "enums": enum_views(protocol, self._names),
             "helpers": self._layouts.helpers(),

@@ -9,7 +9,6 @@ from qlinkgen.backends.c.frames import frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
 from qlinkgen.backends.c.types import Types
-from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
@@ -108,18 +107,18 @@ def count_member(field: Field) -> str:
 
 def interface(protocol: Protocol) -> Interface:
     """Describe the header of a protocol."""
-    names = Names(protocol)
-    frame, section = protocol.frame, frame_section(protocol, Layouts(protocol.name))
+    plan, names = plan_of(protocol), Names(protocol)
+    section = frame_section(plan, Layouts(protocol.name))
     view = section.view
     return Interface(
         names=names,
-        types=Types(plan_of(protocol), names),
+        types=Types(plan, names),
         id=view["id"],
         id_bits=_bits(view["id_type"]),
-        address=view["address"] or "",
-        address_bits=_bits(view.get("address_type", "")) if view["address"] else 0,
+        address=view["address"],
+        address_bits=_bits(view["address_type"]),
         directed=view["needs_direction"],
-        unpacks=isinstance(frame, DelimitedFrame) and frame.stuffing is not None,
+        unpacks=bool(view["body_size"]),
         rescans=section.rescans,
         packets=section.slave_only,
         listener=""

@@ -1,100 +1,94 @@
-"""Packets: no frame at all, an answer is checked over the request it belongs to."""
+"""Packets: nothing marks one; an answer is checked over the request it belongs to."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
-from qlinkgen.backends.c.delimited import differs
 from qlinkgen.backends.c.framing import struct_parameter
-from qlinkgen.backends.c.names import Names, grouped, unsigned, unsigned_type
+from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
+from qlinkgen.backends.c.parts import differs, put_check, refusal
+from qlinkgen.backends.c.views import common_view
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Sum
-from qlinkgen.model.frame import Checksum, PacketFrame
-from qlinkgen.model.message import Message
-from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan.check import Check
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
-def packet_view(protocol: Protocol, frame: PacketFrame) -> dict[str, Any]:
+def packet_view(plan: Plan) -> dict[str, Any]:
     """What the templates of packets place."""
-    prefix = protocol.name
-    view: dict[str, Any] = {
-        "address": "",
-        "id": "id",
-        "id_type": "uint8_t",
-        "needs_direction": False,
-        "reports_runs": False,
-        "needs_extent": False,
-        "buffer_size": max(1, frame.payload_max),
-        "reject": f"{prefix}_reject_" if frame.rejected is not None and frame.checksum else "",
-        "has_check": frame.checksum is not None,
-        "slave_arguments": f"{prefix}_frame_sum(frame), " if frame.checksum else "",
+    prefix, check, most = plan.protocol.name, plan.frame.check, plan.frame.max_payload
+    view = common_view(plan) | {
+        "buffer_size": max(1, most),
+        "reject": f"{prefix}_reject_" if check and check.rejected is not None else "",
+        "has_check": check is not None,
+        "slave_arguments": f"{prefix}_frame_sum(frame), " if check else "",
         "check_name": "request_check",
-        "count_type": unsigned_type(max(8, frame.payload_max.bit_length())),
+        "count_type": unsigned_type(max(8, most.bit_length())),
     }
-    return view | (_check(frame, frame.checksum) if frame.checksum else {})
+    return view | (_check(check) if check else {})
 
 
-def _check(frame: PacketFrame, checksum: Checksum) -> dict[str, Any]:
-    algorithm, chunks = checksum.algorithm, checksum.chunks
+def _check(check: Check) -> dict[str, Any]:
+    algorithm = check.algorithm
     if not isinstance(algorithm, Sum):
         raise GenerationError(f"{algorithm.name}: the check value of a packet is a sum")
     kind = unsigned_type(algorithm.width)
-    rejected = frame.rejected
     return {
         "sum_type": kind,
-        "word_type": unsigned_type(max(algorithm.width, 8 * frame.word_size)),
-        "word_size": frame.word_size,
+        "word_type": unsigned_type(max(algorithm.width, 8 * check.word)),
+        "word_size": check.word,
         "finished": f"({kind})~sum" if algorithm.complement else "sum",
-        "check_size": len(chunks),
-        "put_check": [
-            f"{_byte(index)} = (uint8_t)({f'value >> {chunk.shift}' if chunk.shift else 'value'});"
-            for index, chunk in enumerate(chunks)
-        ],
-        "check_differs": differs(checksum, "end", 0, "value"),
-        "has_rejected": rejected is not None,
-        "rejected": unsigned(rejected or 0, algorithm.width),
-        "refused": differs(checksum, "end", 0, "refused"),
+        "check_size": check.size,
+        "put_check": put_check(check, "end", 0, "value"),
+        "check_differs": differs(check, "end", 0, "value"),
+        "has_rejected": check.rejected is not None,
+        "rejected": unsigned(check.rejected or 0, algorithm.width),
+        "refused": differs(check, "end", 0, "refused"),
     }
 
 
-def _byte(index: int) -> str:
-    return f"end[{index}]"
-
-
-def packet_from_frame(names: Names, message: Message, view: dict[str, Any]) -> dict[str, Any]:
-    """The function that takes an answer apart."""
-    struct = struct_parameter(names, message, const=False)
-    parameters = struct + (f"{view['sum_type']} request_sum, " if view["has_check"] else "")
-    lines = []
-    if view["has_check"]:
-        check = f"{names.prefix}_open_(request_sum, wire, size, {names.constant(message)}_MIN_SIZE)"
+def packet_to_frame(names: Names, message: MessagePlan, view: dict[str, Any]) -> dict[str, Any]:
+    """The function that makes a packet."""
+    stated, upper, check = message.message, names.upper, message.envelope.check
+    struct = struct_parameter(names, stated, const=True)
+    encode, call = f"{names.function(stated)}_encode", "message, " if struct else ""
+    if message.direction != "response":
+        lines = ["int size;", ""] if stated.fields else []
         lines += [
-            f"const int status = {check};",
-            f"if (status != {names.upper}_OK) {{",
-            "    return status;",
-            "}",
+            *refusal("capacity == 0U", f"{upper}_ERROR_CAPACITY"),
+            f"wire[0] = {names.constant(stated)}_ID;",
         ]
-        payload_size = f"size - {view['check_size']}U"
+        if stated.fields:
+            lines.append(f"size = {encode}({call}&wire[1], capacity - 1U);")
+        lines.append("return (size < 0) ? size : (size + 1);" if stated.fields else "return 1;")
+        return {"parameters": struct, "lines": lines}
+    size = "(size_t)size" if stated.fields else "0U"
+    whole = f"{names.prefix}_close_(request_sum, {size}, wire, capacity)" if check else "size"
+    if stated.fields:
+        lines = [f"const int size = {encode}({call}wire, capacity);", f"return (size < 0) ? size : {whole};"]
     else:
-        payload_size = "size"
-    if message.fields:
-        call = "message, " if struct else ""
-        lines.append(f"return {names.function(message)}_decode({call}wire, {payload_size});")
-    else:
-        lines += [] if view["has_check"] else ["(void)wire;"]
-        lines.append(
-            f"return ({grouped(payload_size)} == 0U) ? {names.upper}_OK : {names.upper}_ERROR_LENGTH;"
-        )
-    return {"parameters": parameters, "lines": lines}
+        lines = [f"return {whole};"] if check else ["(void)wire;", "(void)capacity;", "return 0;"]
+    return {"parameters": struct + (f"{view['sum_type']} request_sum, " if check else ""), "lines": lines}
 
 
-def sizes_by_value(names: Names, messages: tuple[Message, ...]) -> list[dict[str, Any]]:
+def packet_from_frame(names: Names, message: MessagePlan, view: dict[str, Any]) -> dict[str, Any]:
+    """The function that takes an answer apart; schemas allow answers of fixed size alone."""
+    stated, check = message.message, message.envelope.check
+    struct = struct_parameter(names, stated, const=False)
+    request = "request_sum, " if check else ""
+    opened = f"{names.prefix}_open_({request}wire, size, {names.constant(stated)}_MIN_SIZE)"
+    lines = [f"return {opened};"]
+    if stated.fields:
+        size = f"size - {check.size}U" if check else "size"
+        lines = [f"const int status = {opened};", *refusal(f"status != {names.upper}_OK", "status")]
+        lines.append(f"return {names.function(stated)}_decode({'message, ' if struct else ''}wire, {size});")
+    return {"parameters": struct + (f"{view['sum_type']} request_sum, " if check else ""), "lines": lines}
+
+
+def sizes_by_value(names: Names, messages: Sequence[MessagePlan]) -> list[dict[str, Any]]:
     """Requests grouped by the size of their payload."""
     groups: dict[int, list[str]] = {}
     for message in messages:
-        if not message.fixed:
-            raise GenerationError(
-                f"{message.name}: a packet of variable size has no end that a slave could find"
-            )
-        groups.setdefault(message.max_size, []).append(names.constant(message))
+        groups.setdefault(message.payload.most, []).append(names.constant(message.message))
     return [{"size": size, "constants": constants} for size, constants in sorted(groups.items())]

@@ -1,0 +1,307 @@
+"""Parts of a frame as the statements, conditions and loops that the templates place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import assert_never
+
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.names import grouped, unsigned, unsigned_type
+from qlinkgen.plan.check import Check
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    Envelope,
+    FramePlan,
+    IdPart,
+    LengthPart,
+    MarkPart,
+    Part,
+    PayloadPart,
+    Rescan,
+)
+from qlinkgen.plan.transparency import FrameStuffing
+
+#: Names that the generated functions use themselves.
+_LOCAL_NAMES = frozenset(
+    "size payload wire capacity message value from to end check since index sent status".split()  # noqa: SIM905
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Sender:
+    """What tells of whom a frame is: message number and address, their C names and types."""
+
+    id: str
+    id_type: str
+    address: str
+    address_type: str
+
+    @property
+    def parameters(self) -> str:
+        """Both as parameters."""
+        address = f", {self.address_type} {self.address}" if self.address else ""
+        return f"{self.id_type} {self.id}{address}"
+
+    @property
+    def arguments(self) -> str:
+        """Both as arguments."""
+        return f"{self.id}, {self.address}" if self.address else self.id
+
+
+def sender_of(frame: FramePlan) -> Sender:
+    """The names are "id", and that of the address; one that is taken gives way."""
+    id_part, address_part = frame.envelope.id, frame.envelope.address
+    address = f"{frame.address}_" if frame.address in _LOCAL_NAMES else frame.address
+    address_type = unsigned_type(address_part.integer.bits if address_part else 8)
+    return Sender(
+        frame.id_name if address == "id" else "id",
+        unsigned_type(id_part.integer.bits if id_part else 8),
+        address,
+        address_type if address else "",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class PartWriter:
+    """Prints the envelope of a frame.
+
+    A frame without its ``lead``, the constant at its front that is never stuffed, is called a body.
+    """
+
+    prefix: str
+    frame: FramePlan
+    sender: Sender
+    layouts: Layouts
+
+    @property
+    def envelope(self) -> Envelope:
+        """Its parts."""
+        return self.frame.envelope
+
+    @property
+    def stuffing(self) -> FrameStuffing | None:
+        """The stuffing of whole frames."""
+        found = self.frame.transparency
+        return found if isinstance(found, FrameStuffing) else None
+
+    @property
+    def lead(self) -> bytes:
+        """The constant in front of a body; a frame that is not stuffed is all body."""
+        preamble, stuffing = self.envelope.preamble, self.stuffing
+        return preamble if stuffing and len(preamble) <= stuffing.front else b""
+
+    @property
+    def head(self) -> int:
+        """Bytes of a body before its payload."""
+        return self.envelope.header_size - len(self.lead)
+
+    def parts(self) -> tuple[Part, ...]:
+        """Those of a body."""
+        return self.envelope.parts[1:] if self.lead else self.envelope.parts
+
+    # To the wire
+
+    def put_header(self, place: str, sent: str) -> list[str]:
+        """Statements that write what is before the payload; ``place`` is the body."""
+        return [line for part in self._front() for line in self._put(part, place, self._at(part), sent)]
+
+    def put_trailer(self, place: str) -> list[str]:
+        """Statements that write the constants after the payload, which ends at ``place``."""
+        return [line for part in self.envelope.back for line in self._put(part, place, self._at(part), "")]
+
+    def _put(self, part: Part, place: str, at: int, sent: str) -> list[str]:
+        match part:
+            case ConstantPart():
+                return [f"{place}[{at + index}] = {in_hex(byte)};" for index, byte in enumerate(part.data)]
+            case LengthPart():
+                total = f"({unsigned_type(part.integer.bits)})({sent} + {part.bias}U)"
+                return [self.layouts.put(part.integer, place, str(at), total)]
+            case IdPart():
+                return [self.layouts.put(part.integer, place, str(at), self.sender.id)]
+            case AddressPart():
+                return [self.layouts.put(part.integer, place, str(at), self.sender.address)]
+            case CheckPart() | PayloadPart() | MarkPart():
+                return []
+            case _:
+                assert_never(part)
+
+    def put_check(self, place: str, value: str) -> list[str]:
+        """Statements that write the check value; the payload ends at ``place``."""
+        part = self.envelope.check
+        return put_check(part.check, place, self._at(part), value) if part else []
+
+    # From the wire
+
+    def get(self, part: LengthPart | IdPart | AddressPart | None, place: str = "body") -> str:
+        """The expression for a number in a body, 0 where the frame has none."""
+        if part is None:
+            return "0U"
+        found, mask = self.layouts.get(part.integer, place, str(self._at(part))), part.integer.chunks[0].mask
+        return found if part.size > 1 or mask == 0xFF else f"({found} & {in_hex(mask)})"
+
+    def payload_size(self, length: LengthPart) -> str:
+        """The payload bytes that a length announces."""
+        return f"{self.get(length)} - {length.bias}U" if length.bias else self.get(length)
+
+    def head_checks(self, counted: str, directed: str, *, all_there: bool) -> Iterator[str]:
+        """Statements that refuse a header, part by part in wire order.
+
+        ``counted`` bytes of the body are there: any number of them, or one more at each pass.
+        """
+        reached = f"{counted} {'>=' if all_there else '=='} "
+        bare = isinstance(self.frame.receiver, Rescan) and self.frame.receiver.bare
+        before: set[type[Part]] = set()
+        for part in self._front():
+            end = self._at(part) + part.size
+            match part:
+                case ConstantPart():
+                    for index, byte in enumerate(part.data, end - part.size):
+                        test = f"({reached}{index + 1}U) && (body[{index}] != {in_hex(byte)})"
+                        yield from refusal(test, f"{self.prefix.upper()}_ERROR_FRAME")
+                case LengthPart():
+                    yield f"if ({reached}{end}U) {{"
+                    yield from (f"    {line}" for line in self._announced(part, all_there=all_there))
+                    yield "}"
+                case IdPart() | AddressPart() if bare:
+                    before.add(type(part))
+                    yield from self._admission(f"{reached}{end}U", before, directed)
+                case IdPart() | AddressPart():
+                    pass
+                case CheckPart() | PayloadPart() | MarkPart():
+                    raise AssertionError(f"{part.name} is not a part of a header")
+                case _:
+                    assert_never(part)
+
+    def _announced(self, length: LengthPart, *, all_there: bool) -> Iterator[str]:
+        if test := length_bounds(length, self.get(length)):
+            yield from refusal(test, f"{self.prefix.upper()}_ERROR_LENGTH")
+        yield f"payload = (size_t)({self.payload_size(length)});"
+        if not all_there:
+            yield f"total = payload + {self.head + self.envelope.trailer_size}U;"
+
+    def _admission(self, reached: str, before: set[type[Part]], directed: str) -> Iterator[str]:
+        """Number and address, as far as they are there, must be those of a message."""
+        if IdPart not in before:
+            return
+        found = self.get(self.envelope.id)
+        if self.envelope.address:
+            found += f", {self.get(self.envelope.address) if AddressPart in before else '0U'}"
+        yield f"if ({reached}) {{"
+        yield f"    status = {self.prefix}_admits_({directed}{found});"
+        wrong = f"!= {self.prefix.upper()}_OK"
+        if self.envelope.address and AddressPart not in before:
+            wrong = f"== {self.prefix.upper()}_ERROR_UNKNOWN"
+        yield from (f"    {line}" for line in refusal(f"status {wrong}", "status"))
+        yield "}"
+
+    def wrong_tail(self, place: str) -> str:
+        """A condition that holds where a constant after the payload, which ends at ``place``, is another."""
+        return any_of(
+            f"{place}[{self._at(part) + index}] != {in_hex(byte)}"
+            for part in self.envelope.back
+            if isinstance(part, ConstantPart)
+            for index, byte in enumerate(part.data)
+        )
+
+    def check_differs(self, place: str, value: str) -> str:
+        """A condition that holds where another check value than ``value`` was received."""
+        part = self.envelope.check
+        return differs(part.check, place, self._at(part), value) if part else ""
+
+    # The check value
+
+    @property
+    def lead_updates(self) -> list[str]:
+        """Statements that take the lead into the check value, none where it is not covered."""
+        covered = self.lead and self.envelope.covered(self.envelope.parts[0])
+        return [f"value = {self.prefix}_check_update(value, {in_hex(b)});" for b in self.lead if covered]
+
+    @property
+    def covers_body(self) -> bool:
+        """The check value covers all of a body before itself, so it can be computed byte by byte."""
+        check, parts = self.envelope.check, self.parts()
+        covered = tuple(part for part in parts if self.envelope.covered(part))
+        return check is not None and covered == parts[: parts.index(check)]
+
+    def covered_loops(self, array: str, start: str, payload_end: str) -> list[str]:
+        """Loops that take what is covered of the body into the check value; indices of the array."""
+        lines: list[str] = []
+        for run in self.envelope.coverage:
+            parts = [part for part in run if part in self.parts()]
+            if parts:
+                first = self._place(parts[0], start, payload_end)
+                end = self._place(parts[-1], start, payload_end, after=True)
+                lines += [
+                    f"for (size_t covered = {first}; covered < ({end}); ++covered) {{",
+                    f"    value = {self.prefix}_check_update(value, {array}[covered]);",
+                    "}",
+                ]
+        return lines
+
+    def _place(self, part: Part, start: str, payload_end: str, *, after: bool = False) -> str:
+        if after and part is self.envelope.payload:
+            return payload_end
+        base = payload_end if part in self.envelope.back else start
+        return _sum(base, self._at(part) + (part.size if after else 0))
+
+    # Places
+
+    def _front(self) -> tuple[Part, ...]:
+        return self.envelope.front[1:] if self.lead else self.envelope.front
+
+    def _at(self, part: Part) -> int:
+        """Bytes before a part: of the body, or after the payload."""
+        behind = part in self.envelope.back
+        return self.envelope.offset(part) - (self.envelope.header_size if behind else len(self.lead))
+
+
+def length_bounds(length: LengthPart, value: str) -> str:
+    """A condition that holds where no frame has such a length."""
+    bits = length.integer.bits
+    terms = [f"{value} < {unsigned(length.least, bits)}"] if length.least else []
+    terms += [f"{value} > {unsigned(length.most, bits)}"] if length.most < length.integer.maximum else []
+    return any_of(terms)
+
+
+def any_of(terms: Iterator[str] | list[str]) -> str:
+    """A condition that holds where one of several does, "" where there are none."""
+    found = list(terms)
+    return " || ".join(f"({term})" for term in found) if len(found) > 1 else "".join(found)
+
+
+def refusal(test: str, status: str) -> list[str]:
+    """A function ends here where a condition holds."""
+    return [f"if ({test}) {{", f"    return {status};", "}"]
+
+
+def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
+    """Statements that write a check value."""
+    return [
+        f"{place}[{at + index}] = (uint8_t)({_piece(value, chunk.shift, chunk.mask)});"
+        for index, chunk in enumerate(check.value.chunks)
+    ]
+
+
+def differs(check: Check, place: str, at: int, value: str) -> str:
+    """A condition that holds where received check bytes are not those of ``value``."""
+    return any_of(
+        f"{place}[{at + index}] != (uint8_t)({_piece(value, chunk.shift, chunk.mask)})"
+        for index, chunk in enumerate(check.value.chunks)
+    )
+
+
+def in_hex(byte: int) -> str:
+    """A byte as a constant."""
+    return unsigned(byte, 8, hexadecimal=True)
+
+
+def _piece(value: str, shift: int, mask: int) -> str:
+    shifted = f"{value} >> {shift}" if shift else value
+    return shifted if mask == 0xFF else f"{grouped(shifted)} & {in_hex(mask)}"
+
+
+def _sum(base: str, offset: int) -> str:
+    return f"{offset}U" if base == "0" else f"{base} + {offset}U" if offset else base
