@@ -220,7 +220,10 @@ class _Source:
         self._stream_loop()
 
     def _directions(self) -> list[str]:
-        return ["request"] if self.packet else list(self.protocol.directions)
+        """Directions in which something is sent; the header has no check of any other."""
+        if self.packet:
+            return ["request"]
+        return [each for each in self.protocol.directions if self.protocol.received(each)]
 
     def _stream_loop(self) -> None:
         rescan = _rescans(self.protocol)
