@@ -8126,7 +8126,7 @@ static inline int mc1231a_slave_set_1_(
         return mc1231a_reject_(MC1231A_SET_1_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_1(slave, &response);
+        const bool answers = (slave->set_1)(slave, &response);
         if (answers) {
             size = mc1231a_set_1_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8144,7 +8144,7 @@ static inline int mc1231a_slave_set_2_(
         return mc1231a_reject_(MC1231A_SET_2_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_2(slave, &response);
+        const bool answers = (slave->set_2)(slave, &response);
         if (answers) {
             size = mc1231a_set_2_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8162,7 +8162,7 @@ static inline int mc1231a_slave_set_i_(
         return mc1231a_reject_(MC1231A_SET_I_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_i(slave, &response);
+        const bool answers = (slave->set_i)(slave, &response);
         if (answers) {
             size = mc1231a_set_i_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8179,7 +8179,7 @@ static inline int mc1231a_slave_set_prfl_s_crv_(
         return mc1231a_reject_(MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_s_crv(slave);
+        const bool answers = (slave->set_prfl_s_crv)(slave);
         if (answers) {
             size = mc1231a_set_prfl_s_crv_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8196,7 +8196,7 @@ static inline int mc1231a_slave_set_prfl_trap_(
         return mc1231a_reject_(MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_trap(slave);
+        const bool answers = (slave->set_prfl_trap)(slave);
         if (answers) {
             size = mc1231a_set_prfl_trap_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8213,7 +8213,7 @@ static inline int mc1231a_slave_set_prfl_vel_(
         return mc1231a_reject_(MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_vel(slave);
+        const bool answers = (slave->set_prfl_vel)(slave);
         if (answers) {
             size = mc1231a_set_prfl_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8230,7 +8230,7 @@ static inline int mc1231a_slave_set_prfl_gear_(
         return mc1231a_reject_(MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_gear(slave);
+        const bool answers = (slave->set_prfl_gear)(slave);
         if (answers) {
             size = mc1231a_set_prfl_gear_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8248,7 +8248,7 @@ static inline int mc1231a_slave_set_pos_(
         return mc1231a_reject_(MC1231A_SET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_pos(slave, &request);
+        const bool answers = (slave->set_pos)(slave, &request);
         if (answers) {
             size = mc1231a_set_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8266,7 +8266,7 @@ static inline int mc1231a_slave_set_vel_(
         return mc1231a_reject_(MC1231A_SET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_vel_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_vel(slave, &request);
+        const bool answers = (slave->set_vel)(slave, &request);
         if (answers) {
             size = mc1231a_set_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8284,7 +8284,7 @@ static inline int mc1231a_slave_set_acc_(
         return mc1231a_reject_(MC1231A_SET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_acc(slave, &request);
+        const bool answers = (slave->set_acc)(slave, &request);
         if (answers) {
             size = mc1231a_set_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8302,7 +8302,7 @@ static inline int mc1231a_slave_set_max_acc_(
         return mc1231a_reject_(MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_max_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_max_acc(slave, &request);
+        const bool answers = (slave->set_max_acc)(slave, &request);
         if (answers) {
             size = mc1231a_set_max_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8320,7 +8320,7 @@ static inline int mc1231a_slave_set_jerk_(
         return mc1231a_reject_(MC1231A_SET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_jerk_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_jerk(slave, &request);
+        const bool answers = (slave->set_jerk)(slave, &request);
         if (answers) {
             size = mc1231a_set_jerk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8338,7 +8338,7 @@ static inline int mc1231a_slave_set_ratio_(
         return mc1231a_reject_(MC1231A_SET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_ratio_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_ratio(slave, &request);
+        const bool answers = (slave->set_ratio)(slave, &request);
         if (answers) {
             size = mc1231a_set_ratio_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8355,7 +8355,7 @@ static inline int mc1231a_slave_stop_(
         return mc1231a_reject_(MC1231A_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->stop(slave);
+        const bool answers = (slave->stop)(slave);
         if (answers) {
             size = mc1231a_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8372,7 +8372,7 @@ static inline int mc1231a_slave_smooth_stop_(
         return mc1231a_reject_(MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->smooth_stop(slave);
+        const bool answers = (slave->smooth_stop)(slave);
         if (answers) {
             size = mc1231a_smooth_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8389,7 +8389,7 @@ static inline int mc1231a_slave_synch_prfl_(
         return mc1231a_reject_(MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->synch_prfl(slave);
+        const bool answers = (slave->synch_prfl)(slave);
         if (answers) {
             size = mc1231a_synch_prfl_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8407,7 +8407,7 @@ static inline int mc1231a_slave_get_pos_(
         return mc1231a_reject_(MC1231A_GET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_pos(slave, &response);
+        const bool answers = (slave->get_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8425,7 +8425,7 @@ static inline int mc1231a_slave_get_vel_(
         return mc1231a_reject_(MC1231A_GET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_vel(slave, &response);
+        const bool answers = (slave->get_vel)(slave, &response);
         if (answers) {
             size = mc1231a_get_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8443,7 +8443,7 @@ static inline int mc1231a_slave_get_acc_(
         return mc1231a_reject_(MC1231A_GET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_acc(slave, &response);
+        const bool answers = (slave->get_acc)(slave, &response);
         if (answers) {
             size = mc1231a_get_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8461,7 +8461,7 @@ static inline int mc1231a_slave_get_max_acc_(
         return mc1231a_reject_(MC1231A_GET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_max_acc(slave, &response);
+        const bool answers = (slave->get_max_acc)(slave, &response);
         if (answers) {
             size = mc1231a_get_max_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8479,7 +8479,7 @@ static inline int mc1231a_slave_get_jerk_(
         return mc1231a_reject_(MC1231A_GET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_jerk(slave, &response);
+        const bool answers = (slave->get_jerk)(slave, &response);
         if (answers) {
             size = mc1231a_get_jerk_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8497,7 +8497,7 @@ static inline int mc1231a_slave_get_ratio_(
         return mc1231a_reject_(MC1231A_GET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_ratio(slave, &response);
+        const bool answers = (slave->get_ratio)(slave, &response);
         if (answers) {
             size = mc1231a_get_ratio_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8515,7 +8515,7 @@ static inline int mc1231a_slave_get_trgt_pos_(
         return mc1231a_reject_(MC1231A_GET_TRGT_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_trgt_pos(slave, &response);
+        const bool answers = (slave->get_trgt_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_trgt_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8533,7 +8533,7 @@ static inline int mc1231a_slave_get_trgt_vel_(
         return mc1231a_reject_(MC1231A_GET_TRGT_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_trgt_vel(slave, &response);
+        const bool answers = (slave->get_trgt_vel)(slave, &response);
         if (answers) {
             size = mc1231a_get_trgt_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8551,7 +8551,7 @@ static inline int mc1231a_slave_set_kp_(
         return mc1231a_reject_(MC1231A_SET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kp_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_kp(slave, &request);
+        const bool answers = (slave->set_kp)(slave, &request);
         if (answers) {
             size = mc1231a_set_kp_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8569,7 +8569,7 @@ static inline int mc1231a_slave_set_kd_(
         return mc1231a_reject_(MC1231A_SET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_kd(slave, &request);
+        const bool answers = (slave->set_kd)(slave, &request);
         if (answers) {
             size = mc1231a_set_kd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8587,7 +8587,7 @@ static inline int mc1231a_slave_set_ki_(
         return mc1231a_reject_(MC1231A_SET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_ki_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_ki(slave, &request);
+        const bool answers = (slave->set_ki)(slave, &request);
         if (answers) {
             size = mc1231a_set_ki_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8605,7 +8605,7 @@ static inline int mc1231a_slave_set_kvff_(
         return mc1231a_reject_(MC1231A_SET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kvff_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_kvff(slave, &request);
+        const bool answers = (slave->set_kvff)(slave, &request);
         if (answers) {
             size = mc1231a_set_kvff_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8623,7 +8623,7 @@ static inline int mc1231a_slave_set_i_lm_(
         return mc1231a_reject_(MC1231A_SET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_i_lm_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_i_lm(slave, &request);
+        const bool answers = (slave->set_i_lm)(slave, &request);
         if (answers) {
             size = mc1231a_set_i_lm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8641,7 +8641,7 @@ static inline int mc1231a_slave_set_mtr_lmt_(
         return mc1231a_reject_(MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_lmt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_mtr_lmt(slave, &request);
+        const bool answers = (slave->set_mtr_lmt)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_lmt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8659,7 +8659,7 @@ static inline int mc1231a_slave_set_mtr_bias_(
         return mc1231a_reject_(MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_bias_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_mtr_bias(slave, &request);
+        const bool answers = (slave->set_mtr_bias)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_bias_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8677,7 +8677,7 @@ static inline int mc1231a_slave_set_pos_err_(
         return mc1231a_reject_(MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_pos_err_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_pos_err(slave, &request);
+        const bool answers = (slave->set_pos_err)(slave, &request);
         if (answers) {
             size = mc1231a_set_pos_err_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8695,7 +8695,7 @@ static inline int mc1231a_slave_get_kp_(
         return mc1231a_reject_(MC1231A_GET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_kp(slave, &response);
+        const bool answers = (slave->get_kp)(slave, &response);
         if (answers) {
             size = mc1231a_get_kp_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8713,7 +8713,7 @@ static inline int mc1231a_slave_get_kd_(
         return mc1231a_reject_(MC1231A_GET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_kd(slave, &response);
+        const bool answers = (slave->get_kd)(slave, &response);
         if (answers) {
             size = mc1231a_get_kd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8731,7 +8731,7 @@ static inline int mc1231a_slave_get_ki_(
         return mc1231a_reject_(MC1231A_GET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_ki(slave, &response);
+        const bool answers = (slave->get_ki)(slave, &response);
         if (answers) {
             size = mc1231a_get_ki_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8749,7 +8749,7 @@ static inline int mc1231a_slave_get_kvff_(
         return mc1231a_reject_(MC1231A_GET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_kvff(slave, &response);
+        const bool answers = (slave->get_kvff)(slave, &response);
         if (answers) {
             size = mc1231a_get_kvff_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8767,7 +8767,7 @@ static inline int mc1231a_slave_get_i_lm_(
         return mc1231a_reject_(MC1231A_GET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_i_lm(slave, &response);
+        const bool answers = (slave->get_i_lm)(slave, &response);
         if (answers) {
             size = mc1231a_get_i_lm_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8785,7 +8785,7 @@ static inline int mc1231a_slave_get_mtr_lmt_(
         return mc1231a_reject_(MC1231A_GET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mtr_lmt(slave, &response);
+        const bool answers = (slave->get_mtr_lmt)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_lmt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8803,7 +8803,7 @@ static inline int mc1231a_slave_get_mtr_bias_(
         return mc1231a_reject_(MC1231A_GET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mtr_bias(slave, &response);
+        const bool answers = (slave->get_mtr_bias)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_bias_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8821,7 +8821,7 @@ static inline int mc1231a_slave_get_pos_err_(
         return mc1231a_reject_(MC1231A_GET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_pos_err(slave, &response);
+        const bool answers = (slave->get_pos_err)(slave, &response);
         if (answers) {
             size = mc1231a_get_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8839,7 +8839,7 @@ static inline int mc1231a_slave_get_intgr_(
         return mc1231a_reject_(MC1231A_GET_INTGR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_intgr(slave, &response);
+        const bool answers = (slave->get_intgr)(slave, &response);
         if (answers) {
             size = mc1231a_get_intgr_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8857,7 +8857,7 @@ static inline int mc1231a_slave_get_actl_pos_err_(
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_actl_pos_err(slave, &response);
+        const bool answers = (slave->get_actl_pos_err)(slave, &response);
         if (answers) {
             size = mc1231a_get_actl_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8874,7 +8874,7 @@ static inline int mc1231a_slave_set_auto_stop_on_(
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_stop_on(slave);
+        const bool answers = (slave->set_auto_stop_on)(slave);
         if (answers) {
             size = mc1231a_set_auto_stop_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8891,7 +8891,7 @@ static inline int mc1231a_slave_set_auto_stop_off_(
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_stop_off(slave);
+        const bool answers = (slave->set_auto_stop_off)(slave);
         if (answers) {
             size = mc1231a_set_auto_stop_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8908,7 +8908,7 @@ static inline int mc1231a_slave_set_time_brk_(
         return mc1231a_reject_(MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_time_brk(slave);
+        const bool answers = (slave->set_time_brk)(slave);
         if (answers) {
             size = mc1231a_set_time_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8925,7 +8925,7 @@ static inline int mc1231a_slave_set_pos_brk_(
         return mc1231a_reject_(MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_pos_brk(slave);
+        const bool answers = (slave->set_pos_brk)(slave);
         if (answers) {
             size = mc1231a_set_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8942,7 +8942,7 @@ static inline int mc1231a_slave_set_neg_brk_(
         return mc1231a_reject_(MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_neg_brk(slave);
+        const bool answers = (slave->set_neg_brk)(slave);
         if (answers) {
             size = mc1231a_set_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8959,7 +8959,7 @@ static inline int mc1231a_slave_set_actl_pos_brk_(
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_actl_pos_brk(slave);
+        const bool answers = (slave->set_actl_pos_brk)(slave);
         if (answers) {
             size = mc1231a_set_actl_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8976,7 +8976,7 @@ static inline int mc1231a_slave_set_actl_neg_brk_(
         return mc1231a_reject_(MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_actl_neg_brk(slave);
+        const bool answers = (slave->set_actl_neg_brk)(slave);
         if (answers) {
             size = mc1231a_set_actl_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8993,7 +8993,7 @@ static inline int mc1231a_slave_set_mtn_cmplt_brk_(
         return mc1231a_reject_(MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_mtn_cmplt_brk(slave);
+        const bool answers = (slave->set_mtn_cmplt_brk)(slave);
         if (answers) {
             size = mc1231a_set_mtn_cmplt_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9010,7 +9010,7 @@ static inline int mc1231a_slave_set_ext_brk_(
         return mc1231a_reject_(MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_ext_brk(slave);
+        const bool answers = (slave->set_ext_brk)(slave);
         if (answers) {
             size = mc1231a_set_ext_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9027,7 +9027,7 @@ static inline int mc1231a_slave_set_brk_off_(
         return mc1231a_reject_(MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_brk_off(slave);
+        const bool answers = (slave->set_brk_off)(slave);
         if (answers) {
             size = mc1231a_set_brk_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9045,7 +9045,7 @@ static inline int mc1231a_slave_set_brk_pnt_(
         return mc1231a_reject_(MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_brk_pnt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_brk_pnt(slave, &request);
+        const bool answers = (slave->set_brk_pnt)(slave, &request);
         if (answers) {
             size = mc1231a_set_brk_pnt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9062,7 +9062,7 @@ static inline int mc1231a_slave_update_(
         return mc1231a_reject_(MC1231A_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->update(slave);
+        const bool answers = (slave->update)(slave);
         if (answers) {
             size = mc1231a_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9080,7 +9080,7 @@ static inline int mc1231a_slave_multi_update_(
         return mc1231a_reject_(MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_multi_update_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->multi_update(slave, &request);
+        const bool answers = (slave->multi_update)(slave, &request);
         if (answers) {
             size = mc1231a_multi_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9097,7 +9097,7 @@ static inline int mc1231a_slave_set_auto_update_on_(
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_update_on(slave);
+        const bool answers = (slave->set_auto_update_on)(slave);
         if (answers) {
             size = mc1231a_set_auto_update_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9114,7 +9114,7 @@ static inline int mc1231a_slave_set_auto_update_off_(
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_update_off(slave);
+        const bool answers = (slave->set_auto_update_off)(slave);
         if (answers) {
             size = mc1231a_set_auto_update_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9132,7 +9132,7 @@ static inline int mc1231a_slave_get_brk_pnt_(
         return mc1231a_reject_(MC1231A_GET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_brk_pnt(slave, &response);
+        const bool answers = (slave->get_brk_pnt)(slave, &response);
         if (answers) {
             size = mc1231a_get_brk_pnt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9150,7 +9150,7 @@ static inline int mc1231a_slave_set_intrpt_mask_(
         return mc1231a_reject_(MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_intrpt_mask_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_intrpt_mask(slave, &request);
+        const bool answers = (slave->set_intrpt_mask)(slave, &request);
         if (answers) {
             size = mc1231a_set_intrpt_mask_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9168,7 +9168,7 @@ static inline int mc1231a_slave_get_intrpt_(
         return mc1231a_reject_(MC1231A_GET_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_intrpt(slave, &response);
+        const bool answers = (slave->get_intrpt)(slave, &response);
         if (answers) {
             size = mc1231a_get_intrpt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9186,7 +9186,7 @@ static inline int mc1231a_slave_rst_intrpt_(
         return mc1231a_reject_(MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_rst_intrpt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->rst_intrpt(slave, &request);
+        const bool answers = (slave->rst_intrpt)(slave, &request);
         if (answers) {
             size = mc1231a_rst_intrpt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9204,7 +9204,7 @@ static inline int mc1231a_slave_get_intrpt_mask_(
         return mc1231a_reject_(MC1231A_GET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_intrpt_mask(slave, &response);
+        const bool answers = (slave->get_intrpt_mask)(slave, &response);
         if (answers) {
             size = mc1231a_get_intrpt_mask_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9221,7 +9221,7 @@ static inline int mc1231a_slave_clr_status_(
         return mc1231a_reject_(MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->clr_status(slave);
+        const bool answers = (slave->clr_status)(slave);
         if (answers) {
             size = mc1231a_clr_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9239,7 +9239,7 @@ static inline int mc1231a_slave_rst_status_(
         return mc1231a_reject_(MC1231A_RST_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_rst_status_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->rst_status(slave, &request);
+        const bool answers = (slave->rst_status)(slave, &request);
         if (answers) {
             size = mc1231a_rst_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9257,7 +9257,7 @@ static inline int mc1231a_slave_get_status_(
         return mc1231a_reject_(MC1231A_GET_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_status(slave, &response);
+        const bool answers = (slave->get_status)(slave, &response);
         if (answers) {
             size = mc1231a_get_status_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9275,7 +9275,7 @@ static inline int mc1231a_slave_get_mode_(
         return mc1231a_reject_(MC1231A_GET_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mode(slave, &response);
+        const bool answers = (slave->get_mode)(slave, &response);
         if (answers) {
             size = mc1231a_get_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9292,7 +9292,7 @@ static inline int mc1231a_slave_set_capt_index_(
         return mc1231a_reject_(MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_capt_index(slave);
+        const bool answers = (slave->set_capt_index)(slave);
         if (answers) {
             size = mc1231a_set_capt_index_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9309,7 +9309,7 @@ static inline int mc1231a_slave_set_capt_home_(
         return mc1231a_reject_(MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_capt_home(slave);
+        const bool answers = (slave->set_capt_home)(slave);
         if (answers) {
             size = mc1231a_set_capt_home_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9327,7 +9327,7 @@ static inline int mc1231a_slave_get_capt_(
         return mc1231a_reject_(MC1231A_GET_CAPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_capt(slave, &response);
+        const bool answers = (slave->get_capt)(slave, &response);
         if (answers) {
             size = mc1231a_get_capt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9344,7 +9344,7 @@ static inline int mc1231a_slave_set_output_pwm_(
         return mc1231a_reject_(MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_output_pwm(slave);
+        const bool answers = (slave->set_output_pwm)(slave);
         if (answers) {
             size = mc1231a_set_output_pwm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9361,7 +9361,7 @@ static inline int mc1231a_slave_set_output_dac16_(
         return mc1231a_reject_(MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_output_dac16(slave);
+        const bool answers = (slave->set_output_dac16)(slave);
         if (answers) {
             size = mc1231a_set_output_dac16_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9378,7 +9378,7 @@ static inline int mc1231a_slave_mtr_on_(
         return mc1231a_reject_(MC1231A_MTR_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->mtr_on(slave);
+        const bool answers = (slave->mtr_on)(slave);
         if (answers) {
             size = mc1231a_mtr_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9395,7 +9395,7 @@ static inline int mc1231a_slave_mtr_off_(
         return mc1231a_reject_(MC1231A_MTR_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->mtr_off(slave);
+        const bool answers = (slave->mtr_off)(slave);
         if (answers) {
             size = mc1231a_mtr_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9413,7 +9413,7 @@ static inline int mc1231a_slave_set_mtr_cmd_(
         return mc1231a_reject_(MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_mtr_cmd(slave, &request);
+        const bool answers = (slave->set_mtr_cmd)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9431,7 +9431,7 @@ static inline int mc1231a_slave_get_mtr_cmd_(
         return mc1231a_reject_(MC1231A_GET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mtr_cmd(slave, &response);
+        const bool answers = (slave->get_mtr_cmd)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9449,7 +9449,7 @@ static inline int mc1231a_slave_set_buf_mtr_cmd_(
         return mc1231a_reject_(MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_buf_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_buf_mtr_cmd(slave, &request);
+        const bool answers = (slave->set_buf_mtr_cmd)(slave, &request);
         if (answers) {
             size = mc1231a_set_buf_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9467,7 +9467,7 @@ static inline int mc1231a_slave_get_buf_mtr_cmd_(
         return mc1231a_reject_(MC1231A_GET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_buf_mtr_cmd(slave, &response);
+        const bool answers = (slave->get_buf_mtr_cmd)(slave, &response);
         if (answers) {
             size = mc1231a_get_buf_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9485,7 +9485,7 @@ static inline int mc1231a_slave_get_output_mode_(
         return mc1231a_reject_(MC1231A_GET_OUTPUT_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_output_mode(slave, &response);
+        const bool answers = (slave->get_output_mode)(slave, &response);
         if (answers) {
             size = mc1231a_get_output_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9502,7 +9502,7 @@ static inline int mc1231a_slave_axis_on_(
         return mc1231a_reject_(MC1231A_AXIS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->axis_on(slave);
+        const bool answers = (slave->axis_on)(slave);
         if (answers) {
             size = mc1231a_axis_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9519,7 +9519,7 @@ static inline int mc1231a_slave_axis_off_(
         return mc1231a_reject_(MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->axis_off(slave);
+        const bool answers = (slave->axis_off)(slave);
         if (answers) {
             size = mc1231a_axis_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9537,7 +9537,7 @@ static inline int mc1231a_slave_set_actl_pos_(
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_actl_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_actl_pos(slave, &request);
+        const bool answers = (slave->set_actl_pos)(slave, &request);
         if (answers) {
             size = mc1231a_set_actl_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9555,7 +9555,7 @@ static inline int mc1231a_slave_get_actl_pos_(
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_actl_pos(slave, &response);
+        const bool answers = (slave->get_actl_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_actl_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9573,7 +9573,7 @@ static inline int mc1231a_slave_set_lmt_sense_(
         return mc1231a_reject_(MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_lmt_sense_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_lmt_sense(slave, &request);
+        const bool answers = (slave->set_lmt_sense)(slave, &request);
         if (answers) {
             size = mc1231a_set_lmt_sense_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9591,7 +9591,7 @@ static inline int mc1231a_slave_get_lmt_swtch_(
         return mc1231a_reject_(MC1231A_GET_LMT_SWTCH_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_lmt_swtch(slave, &response);
+        const bool answers = (slave->get_lmt_swtch)(slave, &response);
         if (answers) {
             size = mc1231a_get_lmt_swtch_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9608,7 +9608,7 @@ static inline int mc1231a_slave_lmts_on_(
         return mc1231a_reject_(MC1231A_LMTS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->lmts_on(slave);
+        const bool answers = (slave->lmts_on)(slave);
         if (answers) {
             size = mc1231a_lmts_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9625,7 +9625,7 @@ static inline int mc1231a_slave_lmts_off_(
         return mc1231a_reject_(MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->lmts_off(slave);
+        const bool answers = (slave->lmts_off)(slave);
         if (answers) {
             size = mc1231a_lmts_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9643,7 +9643,7 @@ static inline int mc1231a_slave_get_home_(
         return mc1231a_reject_(MC1231A_GET_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_home(slave, &response);
+        const bool answers = (slave->get_home)(slave, &response);
         if (answers) {
             size = mc1231a_get_home_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9661,7 +9661,7 @@ static inline int mc1231a_slave_set_smpl_time_(
         return mc1231a_reject_(MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_smpl_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_smpl_time(slave, &request);
+        const bool answers = (slave->set_smpl_time)(slave, &request);
         if (answers) {
             size = mc1231a_set_smpl_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9679,7 +9679,7 @@ static inline int mc1231a_slave_get_smpl_time_(
         return mc1231a_reject_(MC1231A_GET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_smpl_time(slave, &response);
+        const bool answers = (slave->get_smpl_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_smpl_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9696,7 +9696,7 @@ static inline int mc1231a_slave_reset_(
         return mc1231a_reject_(MC1231A_RESET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->reset(slave);
+        const bool answers = (slave->reset)(slave);
         if (answers) {
             size = mc1231a_reset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9714,7 +9714,7 @@ static inline int mc1231a_slave_get_vrsn_(
         return mc1231a_reject_(MC1231A_GET_VRSN_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_vrsn(slave, &response);
+        const bool answers = (slave->get_vrsn)(slave, &response);
         if (answers) {
             size = mc1231a_get_vrsn_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9732,7 +9732,7 @@ static inline int mc1231a_slave_get_time_(
         return mc1231a_reject_(MC1231A_GET_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_time(slave, &response);
+        const bool answers = (slave->get_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9750,7 +9750,7 @@ static inline int mc1231a_slave_set_phase_cnts_(
         return mc1231a_reject_(MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_cnts_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase_cnts(slave, &request);
+        const bool answers = (slave->set_phase_cnts)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_cnts_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9768,7 +9768,7 @@ static inline int mc1231a_slave_set_phase_offset_(
         return mc1231a_reject_(MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_offset_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase_offset(slave, &request);
+        const bool answers = (slave->set_phase_offset)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_offset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9786,7 +9786,7 @@ static inline int mc1231a_slave_set_phase_time_(
         return mc1231a_reject_(MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase_time(slave, &request);
+        const bool answers = (slave->set_phase_time)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9804,7 +9804,7 @@ static inline int mc1231a_slave_set_phase_(
         return mc1231a_reject_(MC1231A_SET_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase(slave, &request);
+        const bool answers = (slave->set_phase)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9821,7 +9821,7 @@ static inline int mc1231a_slave_init_phase_(
         return mc1231a_reject_(MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->init_phase(slave);
+        const bool answers = (slave->init_phase)(slave);
         if (answers) {
             size = mc1231a_init_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9839,7 +9839,7 @@ static inline int mc1231a_slave_get_phase_info_(
         return mc1231a_reject_(MC1231A_GET_PHASE_INFO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_info(slave, &response);
+        const bool answers = (slave->get_phase_info)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_info_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9857,7 +9857,7 @@ static inline int mc1231a_slave_get_phase_cnts_(
         return mc1231a_reject_(MC1231A_GET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_cnts(slave, &response);
+        const bool answers = (slave->get_phase_cnts)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_cnts_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9875,7 +9875,7 @@ static inline int mc1231a_slave_get_phase_time_(
         return mc1231a_reject_(MC1231A_GET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_time(slave, &response);
+        const bool answers = (slave->get_phase_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9893,7 +9893,7 @@ static inline int mc1231a_slave_get_phase_offset_(
         return mc1231a_reject_(MC1231A_GET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_offset(slave, &response);
+        const bool answers = (slave->get_phase_offset)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_offset_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }

@@ -2466,7 +2466,7 @@ static inline int qlink_slave_node_setup_(
         return 0;
     }
     if (qlink_node_setup_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->node_setup(slave, &request);
+        const bool answers = (slave->node_setup)(slave, &request);
         if (answers) {
             size = qlink_node_setup_response_to_frame(slave->node, wire, capacity);
         }
@@ -2484,7 +2484,7 @@ static inline int qlink_slave_node_info_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->node_info(slave, &response);
+        const bool answers = (slave->node_info)(slave, &response);
         if (answers) {
             size = qlink_node_info_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2498,7 +2498,7 @@ static inline int qlink_slave_node_start_(qlink_slave_t *slave, const qlink_fram
         return 0;
     }
     if (frame->size == 0U) {
-        slave->node_start(slave);
+        (slave->node_start)(slave);
     }
     return 0;
 }
@@ -2509,7 +2509,7 @@ static inline int qlink_slave_node_stop_(qlink_slave_t *slave, const qlink_frame
         return 0;
     }
     if (frame->size == 0U) {
-        slave->node_stop(slave);
+        (slave->node_stop)(slave);
     }
     return 0;
 }
@@ -2522,7 +2522,7 @@ static inline int qlink_slave_node_sync_(qlink_slave_t *slave, const qlink_frame
         return 0;
     }
     if (qlink_node_sync_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        slave->node_sync(slave, &request);
+        (slave->node_sync)(slave, &request);
     }
     return 0;
 }
@@ -2538,7 +2538,7 @@ static inline int qlink_slave_node_program_load_(
         return 0;
     }
     if (qlink_node_program_load_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->node_program_load(slave, &request, &response);
+        const bool answers = (slave->node_program_load)(slave, &request, &response);
         if (answers) {
             size = qlink_node_program_load_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2555,7 +2555,7 @@ static inline int qlink_slave_node_reset_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->node_reset(slave);
+        const bool answers = (slave->node_reset)(slave);
         if (answers) {
             size = qlink_node_reset_response_to_frame(slave->node, wire, capacity);
         }
@@ -2573,7 +2573,7 @@ static inline int qlink_slave_motor_response_poll_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->motor_response_poll(slave, &response);
+        const bool answers = (slave->motor_response_poll)(slave, &response);
         if (answers) {
             size = qlink_motor_response_poll_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2591,7 +2591,7 @@ static inline int qlink_slave_motor_request_(
         return 0;
     }
     if (qlink_motor_request_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->motor_request(slave, &request);
+        const bool answers = (slave->motor_request)(slave, &request);
         if (answers) {
             size = qlink_motor_request_response_to_frame(slave->node, wire, capacity);
         }
@@ -2609,7 +2609,7 @@ static inline int qlink_slave_motion_(qlink_slave_t *slave, const qlink_frame_t 
         return 0;
     }
     if (qlink_motion_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->motion(slave, &request, &response);
+        const bool answers = (slave->motion)(slave, &request, &response);
         if (answers) {
             size = qlink_motion_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2627,7 +2627,7 @@ static inline int qlink_slave_motor_position_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->motor_position(slave, &response);
+        const bool answers = (slave->motor_position)(slave, &response);
         if (answers) {
             size = qlink_motor_position_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2644,7 +2644,7 @@ static inline int qlink_slave_clear_fifo_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->clear_fifo(slave);
+        const bool answers = (slave->clear_fifo)(slave);
         if (answers) {
             size = qlink_clear_fifo_response_to_frame(slave->node, wire, capacity);
         }
@@ -2662,7 +2662,7 @@ static inline int qlink_slave_preset_motor_position_(
         return 0;
     }
     if (qlink_preset_motor_position_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->preset_motor_position(slave, &request);
+        const bool answers = (slave->preset_motor_position)(slave, &request);
         if (answers) {
             size = qlink_preset_motor_position_response_to_frame(slave->node, wire, capacity);
         }
@@ -2680,7 +2680,7 @@ static inline int qlink_slave_read_(qlink_slave_t *slave, const qlink_frame_t *f
         return 0;
     }
     if (qlink_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->read(slave, &request, &response);
+        const bool answers = (slave->read)(slave, &request, &response);
         if (answers) {
             size = qlink_read_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2697,7 +2697,7 @@ static inline int qlink_slave_write_(qlink_slave_t *slave, const qlink_frame_t *
         return 0;
     }
     if (qlink_write_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->write(slave, &request);
+        const bool answers = (slave->write)(slave, &request);
         if (answers) {
             size = qlink_write_response_to_frame(slave->node, wire, capacity);
         }
@@ -2716,7 +2716,7 @@ static inline int qlink_slave_write_read_(
         return 0;
     }
     if (qlink_write_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->write_read(slave, &request, &response);
+        const bool answers = (slave->write_read)(slave, &request, &response);
         if (answers) {
             size = qlink_write_read_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2734,7 +2734,7 @@ static inline int qlink_slave_set_outputs_(
         return 0;
     }
     if (qlink_set_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->set_outputs(slave, &request);
+        const bool answers = (slave->set_outputs)(slave, &request);
         if (answers) {
             size = qlink_set_outputs_response_to_frame(slave->node, wire, capacity);
         }
@@ -2752,7 +2752,7 @@ static inline int qlink_slave_clear_outputs_(
         return 0;
     }
     if (qlink_clear_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->clear_outputs(slave, &request);
+        const bool answers = (slave->clear_outputs)(slave, &request);
         if (answers) {
             size = qlink_clear_outputs_response_to_frame(slave->node, wire, capacity);
         }
@@ -2771,7 +2771,7 @@ static inline int qlink_slave_loop_back_(
         return 0;
     }
     if (qlink_loop_back_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->loop_back(slave, &request, &response);
+        const bool answers = (slave->loop_back)(slave, &request, &response);
         if (answers) {
             size = qlink_loop_back_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2886,7 +2886,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_setup != NULL)) {
-            master->node_setup(master, frame->node);
+            (master->node_setup)(master, frame->node);
         }
         break;
     }
@@ -2897,7 +2897,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_info != NULL)) {
-            master->node_info(master, frame->node, &message);
+            (master->node_info)(master, frame->node, &message);
         }
         break;
     }
@@ -2908,7 +2908,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_program_load != NULL)) {
-            master->node_program_load(master, frame->node, &message);
+            (master->node_program_load)(master, frame->node, &message);
         }
         break;
     }
@@ -2918,7 +2918,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_reset != NULL)) {
-            master->node_reset(master, frame->node);
+            (master->node_reset)(master, frame->node);
         }
         break;
     }
@@ -2929,7 +2929,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motor_response_poll != NULL)) {
-            master->motor_response_poll(master, frame->node, &message);
+            (master->motor_response_poll)(master, frame->node, &message);
         }
         break;
     }
@@ -2939,7 +2939,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motor_request != NULL)) {
-            master->motor_request(master, frame->node);
+            (master->motor_request)(master, frame->node);
         }
         break;
     }
@@ -2950,7 +2950,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motion != NULL)) {
-            master->motion(master, frame->node, &message);
+            (master->motion)(master, frame->node, &message);
         }
         break;
     }
@@ -2961,7 +2961,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motor_position != NULL)) {
-            master->motor_position(master, frame->node, &message);
+            (master->motor_position)(master, frame->node, &message);
         }
         break;
     }
@@ -2971,7 +2971,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->clear_fifo != NULL)) {
-            master->clear_fifo(master, frame->node);
+            (master->clear_fifo)(master, frame->node);
         }
         break;
     }
@@ -2981,7 +2981,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->preset_motor_position != NULL)) {
-            master->preset_motor_position(master, frame->node);
+            (master->preset_motor_position)(master, frame->node);
         }
         break;
     }
@@ -2992,7 +2992,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->read != NULL)) {
-            master->read(master, frame->node, &message);
+            (master->read)(master, frame->node, &message);
         }
         break;
     }
@@ -3002,7 +3002,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->write != NULL)) {
-            master->write(master, frame->node);
+            (master->write)(master, frame->node);
         }
         break;
     }
@@ -3013,7 +3013,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->write_read != NULL)) {
-            master->write_read(master, frame->node, &message);
+            (master->write_read)(master, frame->node, &message);
         }
         break;
     }
@@ -3023,7 +3023,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->set_outputs != NULL)) {
-            master->set_outputs(master, frame->node);
+            (master->set_outputs)(master, frame->node);
         }
         break;
     }
@@ -3033,7 +3033,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->clear_outputs != NULL)) {
-            master->clear_outputs(master, frame->node);
+            (master->clear_outputs)(master, frame->node);
         }
         break;
     }
@@ -3044,7 +3044,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->loop_back != NULL)) {
-            master->loop_back(master, frame->node, &message);
+            (master->loop_back)(master, frame->node, &message);
         }
         break;
     }

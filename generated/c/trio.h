@@ -1061,7 +1061,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->character_transfer != NULL)) {
-            listener->character_transfer(listener, frame->address, &message);
+            (listener->character_transfer)(listener, frame->address, &message);
         }
         break;
     }
@@ -1072,7 +1072,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->direct_variable_transfer != NULL)) {
-            listener->direct_variable_transfer(listener, frame->address, &message);
+            (listener->direct_variable_transfer)(listener, frame->address, &message);
         }
         break;
     }
@@ -1083,7 +1083,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->keypad_offset != NULL)) {
-            listener->keypad_offset(listener, frame->address, &message);
+            (listener->keypad_offset)(listener, frame->address, &message);
         }
         break;
     }
@@ -1094,7 +1094,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->keypad_mode_message != NULL)) {
-            listener->keypad_mode_message(listener, frame->address, &message);
+            (listener->keypad_mode_message)(listener, frame->address, &message);
         }
         break;
     }

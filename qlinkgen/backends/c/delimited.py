@@ -8,12 +8,8 @@ from dataclasses import dataclass
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.model.frame import Checksum, DelimitedFrame, Part
+from qlinkgen.model.naming import address_member
 from qlinkgen.model.protocol import Protocol
-
-#: Names that the generated functions use themselves.
-_LOCAL_NAMES = frozenset(
-    "size payload wire capacity message value from to end check since index sent status".split()  # noqa: SIM905
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,11 +219,9 @@ class DelimitedWriter:
 
 def frame_names(protocol: Protocol) -> tuple[str, str]:
     """What message id and address are called in C; an address that is itself called id keeps its name."""
-    address = protocol.address_name or ""
-    if address in _LOCAL_NAMES:
-        address += "_"
+    address = address_member(protocol.address_name or "")
     part = protocol.frame.part("message") if isinstance(protocol.frame, DelimitedFrame) else None
-    return (part.name if part and address == "id" else "id"), address
+    return (address_member(part.name) if part and address == "id" else "id"), address
 
 
 def differs(checksum: Checksum, place: str, base: int, value: str) -> str:

@@ -13,6 +13,7 @@ import jinja2
 from qlinkgen.backends.base import Options, Outputs, environment
 from qlinkgen.backends.conformance.kit import Kit
 from qlinkgen.backends.conformance.sources import Header, Heard, Listener, Sources
+from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 
 __all__ = ["Header", "Heard", "Listener", "Sources", "generate"]
@@ -21,7 +22,7 @@ __all__ = ["Header", "Heard", "Listener", "Sources", "generate"]
 def generate(protocol: Protocol, options: Options, sources: Sources) -> Outputs:
     """The kit of a protocol: path below the output folder to text."""
     text = _template().render(Kit(protocol, options, sources).view())
-    return {f"conformance/{protocol.name}_conformance.c": text}
+    return {f"conformance/{file_stem(protocol.name)}_conformance.c": text}
 
 
 @functools.cache

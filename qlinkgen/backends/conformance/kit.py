@@ -13,6 +13,7 @@ from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm
 from qlinkgen.model.frame import DelimitedFrame, MarkedFrame
+from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 
 #: Bits of a row's first byte that name kinds; the two above them say "by hand" and "refused".
@@ -43,6 +44,7 @@ class Kit:
         return {
             "about": [piece for line in banner(self._protocol) for piece in wrapped(line)],
             "p": header.prefix,
+            "header": file_stem(header.prefix),
             "P": header.upper,
             **{name: getattr(header, name) for name in _HABITS},
             "address_type": f"uint{header.address_bits}_t",
