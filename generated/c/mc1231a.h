@@ -7887,7 +7887,7 @@ static inline int mc1231a_slave_set_1_(
         return mc1231a_reject_(MC1231A_SET_1_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_1(slave, &response);
+        const bool answers = (slave->set_1)(slave, &response);
         if (answers) {
             size = mc1231a_set_1_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -7905,7 +7905,7 @@ static inline int mc1231a_slave_set_2_(
         return mc1231a_reject_(MC1231A_SET_2_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_2(slave, &response);
+        const bool answers = (slave->set_2)(slave, &response);
         if (answers) {
             size = mc1231a_set_2_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -7923,7 +7923,7 @@ static inline int mc1231a_slave_set_i_(
         return mc1231a_reject_(MC1231A_SET_I_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_i(slave, &response);
+        const bool answers = (slave->set_i)(slave, &response);
         if (answers) {
             size = mc1231a_set_i_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -7940,7 +7940,7 @@ static inline int mc1231a_slave_set_prfl_s_crv_(
         return mc1231a_reject_(MC1231A_SET_PRFL_S_CRV_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_s_crv(slave);
+        const bool answers = (slave->set_prfl_s_crv)(slave);
         if (answers) {
             size = mc1231a_set_prfl_s_crv_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -7957,7 +7957,7 @@ static inline int mc1231a_slave_set_prfl_trap_(
         return mc1231a_reject_(MC1231A_SET_PRFL_TRAP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_trap(slave);
+        const bool answers = (slave->set_prfl_trap)(slave);
         if (answers) {
             size = mc1231a_set_prfl_trap_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -7974,7 +7974,7 @@ static inline int mc1231a_slave_set_prfl_vel_(
         return mc1231a_reject_(MC1231A_SET_PRFL_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_vel(slave);
+        const bool answers = (slave->set_prfl_vel)(slave);
         if (answers) {
             size = mc1231a_set_prfl_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -7991,7 +7991,7 @@ static inline int mc1231a_slave_set_prfl_gear_(
         return mc1231a_reject_(MC1231A_SET_PRFL_GEAR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_prfl_gear(slave);
+        const bool answers = (slave->set_prfl_gear)(slave);
         if (answers) {
             size = mc1231a_set_prfl_gear_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8009,7 +8009,7 @@ static inline int mc1231a_slave_set_pos_(
         return mc1231a_reject_(MC1231A_SET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_pos(slave, &request);
+        const bool answers = (slave->set_pos)(slave, &request);
         if (answers) {
             size = mc1231a_set_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8027,7 +8027,7 @@ static inline int mc1231a_slave_set_vel_(
         return mc1231a_reject_(MC1231A_SET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_vel_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_vel(slave, &request);
+        const bool answers = (slave->set_vel)(slave, &request);
         if (answers) {
             size = mc1231a_set_vel_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8045,7 +8045,7 @@ static inline int mc1231a_slave_set_acc_(
         return mc1231a_reject_(MC1231A_SET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_acc(slave, &request);
+        const bool answers = (slave->set_acc)(slave, &request);
         if (answers) {
             size = mc1231a_set_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8063,7 +8063,7 @@ static inline int mc1231a_slave_set_max_acc_(
         return mc1231a_reject_(MC1231A_SET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_max_acc_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_max_acc(slave, &request);
+        const bool answers = (slave->set_max_acc)(slave, &request);
         if (answers) {
             size = mc1231a_set_max_acc_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8081,7 +8081,7 @@ static inline int mc1231a_slave_set_jerk_(
         return mc1231a_reject_(MC1231A_SET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_jerk_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_jerk(slave, &request);
+        const bool answers = (slave->set_jerk)(slave, &request);
         if (answers) {
             size = mc1231a_set_jerk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8099,7 +8099,7 @@ static inline int mc1231a_slave_set_ratio_(
         return mc1231a_reject_(MC1231A_SET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_ratio_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_ratio(slave, &request);
+        const bool answers = (slave->set_ratio)(slave, &request);
         if (answers) {
             size = mc1231a_set_ratio_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8116,7 +8116,7 @@ static inline int mc1231a_slave_stop_(
         return mc1231a_reject_(MC1231A_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->stop(slave);
+        const bool answers = (slave->stop)(slave);
         if (answers) {
             size = mc1231a_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8133,7 +8133,7 @@ static inline int mc1231a_slave_smooth_stop_(
         return mc1231a_reject_(MC1231A_SMOOTH_STOP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->smooth_stop(slave);
+        const bool answers = (slave->smooth_stop)(slave);
         if (answers) {
             size = mc1231a_smooth_stop_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8150,7 +8150,7 @@ static inline int mc1231a_slave_synch_prfl_(
         return mc1231a_reject_(MC1231A_SYNCH_PRFL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->synch_prfl(slave);
+        const bool answers = (slave->synch_prfl)(slave);
         if (answers) {
             size = mc1231a_synch_prfl_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8168,7 +8168,7 @@ static inline int mc1231a_slave_get_pos_(
         return mc1231a_reject_(MC1231A_GET_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_pos(slave, &response);
+        const bool answers = (slave->get_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8186,7 +8186,7 @@ static inline int mc1231a_slave_get_vel_(
         return mc1231a_reject_(MC1231A_GET_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_vel(slave, &response);
+        const bool answers = (slave->get_vel)(slave, &response);
         if (answers) {
             size = mc1231a_get_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8204,7 +8204,7 @@ static inline int mc1231a_slave_get_acc_(
         return mc1231a_reject_(MC1231A_GET_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_acc(slave, &response);
+        const bool answers = (slave->get_acc)(slave, &response);
         if (answers) {
             size = mc1231a_get_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8222,7 +8222,7 @@ static inline int mc1231a_slave_get_max_acc_(
         return mc1231a_reject_(MC1231A_GET_MAX_ACC_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_max_acc(slave, &response);
+        const bool answers = (slave->get_max_acc)(slave, &response);
         if (answers) {
             size = mc1231a_get_max_acc_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8240,7 +8240,7 @@ static inline int mc1231a_slave_get_jerk_(
         return mc1231a_reject_(MC1231A_GET_JERK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_jerk(slave, &response);
+        const bool answers = (slave->get_jerk)(slave, &response);
         if (answers) {
             size = mc1231a_get_jerk_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8258,7 +8258,7 @@ static inline int mc1231a_slave_get_ratio_(
         return mc1231a_reject_(MC1231A_GET_RATIO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_ratio(slave, &response);
+        const bool answers = (slave->get_ratio)(slave, &response);
         if (answers) {
             size = mc1231a_get_ratio_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8276,7 +8276,7 @@ static inline int mc1231a_slave_get_trgt_pos_(
         return mc1231a_reject_(MC1231A_GET_TRGT_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_trgt_pos(slave, &response);
+        const bool answers = (slave->get_trgt_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_trgt_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8294,7 +8294,7 @@ static inline int mc1231a_slave_get_trgt_vel_(
         return mc1231a_reject_(MC1231A_GET_TRGT_VEL_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_trgt_vel(slave, &response);
+        const bool answers = (slave->get_trgt_vel)(slave, &response);
         if (answers) {
             size = mc1231a_get_trgt_vel_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8312,7 +8312,7 @@ static inline int mc1231a_slave_set_kp_(
         return mc1231a_reject_(MC1231A_SET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kp_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_kp(slave, &request);
+        const bool answers = (slave->set_kp)(slave, &request);
         if (answers) {
             size = mc1231a_set_kp_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8330,7 +8330,7 @@ static inline int mc1231a_slave_set_kd_(
         return mc1231a_reject_(MC1231A_SET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_kd(slave, &request);
+        const bool answers = (slave->set_kd)(slave, &request);
         if (answers) {
             size = mc1231a_set_kd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8348,7 +8348,7 @@ static inline int mc1231a_slave_set_ki_(
         return mc1231a_reject_(MC1231A_SET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_ki_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_ki(slave, &request);
+        const bool answers = (slave->set_ki)(slave, &request);
         if (answers) {
             size = mc1231a_set_ki_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8366,7 +8366,7 @@ static inline int mc1231a_slave_set_kvff_(
         return mc1231a_reject_(MC1231A_SET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_kvff_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_kvff(slave, &request);
+        const bool answers = (slave->set_kvff)(slave, &request);
         if (answers) {
             size = mc1231a_set_kvff_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8384,7 +8384,7 @@ static inline int mc1231a_slave_set_i_lm_(
         return mc1231a_reject_(MC1231A_SET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_i_lm_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_i_lm(slave, &request);
+        const bool answers = (slave->set_i_lm)(slave, &request);
         if (answers) {
             size = mc1231a_set_i_lm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8402,7 +8402,7 @@ static inline int mc1231a_slave_set_mtr_lmt_(
         return mc1231a_reject_(MC1231A_SET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_lmt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_mtr_lmt(slave, &request);
+        const bool answers = (slave->set_mtr_lmt)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_lmt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8420,7 +8420,7 @@ static inline int mc1231a_slave_set_mtr_bias_(
         return mc1231a_reject_(MC1231A_SET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_bias_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_mtr_bias(slave, &request);
+        const bool answers = (slave->set_mtr_bias)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_bias_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8438,7 +8438,7 @@ static inline int mc1231a_slave_set_pos_err_(
         return mc1231a_reject_(MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_pos_err_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_pos_err(slave, &request);
+        const bool answers = (slave->set_pos_err)(slave, &request);
         if (answers) {
             size = mc1231a_set_pos_err_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8456,7 +8456,7 @@ static inline int mc1231a_slave_get_kp_(
         return mc1231a_reject_(MC1231A_GET_KP_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_kp(slave, &response);
+        const bool answers = (slave->get_kp)(slave, &response);
         if (answers) {
             size = mc1231a_get_kp_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8474,7 +8474,7 @@ static inline int mc1231a_slave_get_kd_(
         return mc1231a_reject_(MC1231A_GET_KD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_kd(slave, &response);
+        const bool answers = (slave->get_kd)(slave, &response);
         if (answers) {
             size = mc1231a_get_kd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8492,7 +8492,7 @@ static inline int mc1231a_slave_get_ki_(
         return mc1231a_reject_(MC1231A_GET_KI_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_ki(slave, &response);
+        const bool answers = (slave->get_ki)(slave, &response);
         if (answers) {
             size = mc1231a_get_ki_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8510,7 +8510,7 @@ static inline int mc1231a_slave_get_kvff_(
         return mc1231a_reject_(MC1231A_GET_KVFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_kvff(slave, &response);
+        const bool answers = (slave->get_kvff)(slave, &response);
         if (answers) {
             size = mc1231a_get_kvff_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8528,7 +8528,7 @@ static inline int mc1231a_slave_get_i_lm_(
         return mc1231a_reject_(MC1231A_GET_I_LM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_i_lm(slave, &response);
+        const bool answers = (slave->get_i_lm)(slave, &response);
         if (answers) {
             size = mc1231a_get_i_lm_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8546,7 +8546,7 @@ static inline int mc1231a_slave_get_mtr_lmt_(
         return mc1231a_reject_(MC1231A_GET_MTR_LMT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mtr_lmt(slave, &response);
+        const bool answers = (slave->get_mtr_lmt)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_lmt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8564,7 +8564,7 @@ static inline int mc1231a_slave_get_mtr_bias_(
         return mc1231a_reject_(MC1231A_GET_MTR_BIAS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mtr_bias(slave, &response);
+        const bool answers = (slave->get_mtr_bias)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_bias_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8582,7 +8582,7 @@ static inline int mc1231a_slave_get_pos_err_(
         return mc1231a_reject_(MC1231A_GET_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_pos_err(slave, &response);
+        const bool answers = (slave->get_pos_err)(slave, &response);
         if (answers) {
             size = mc1231a_get_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8600,7 +8600,7 @@ static inline int mc1231a_slave_get_intgr_(
         return mc1231a_reject_(MC1231A_GET_INTGR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_intgr(slave, &response);
+        const bool answers = (slave->get_intgr)(slave, &response);
         if (answers) {
             size = mc1231a_get_intgr_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8618,7 +8618,7 @@ static inline int mc1231a_slave_get_actl_pos_err_(
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_ERR_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_actl_pos_err(slave, &response);
+        const bool answers = (slave->get_actl_pos_err)(slave, &response);
         if (answers) {
             size = mc1231a_get_actl_pos_err_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8635,7 +8635,7 @@ static inline int mc1231a_slave_set_auto_stop_on_(
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_stop_on(slave);
+        const bool answers = (slave->set_auto_stop_on)(slave);
         if (answers) {
             size = mc1231a_set_auto_stop_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8652,7 +8652,7 @@ static inline int mc1231a_slave_set_auto_stop_off_(
         return mc1231a_reject_(MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_stop_off(slave);
+        const bool answers = (slave->set_auto_stop_off)(slave);
         if (answers) {
             size = mc1231a_set_auto_stop_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8669,7 +8669,7 @@ static inline int mc1231a_slave_set_time_brk_(
         return mc1231a_reject_(MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_time_brk(slave);
+        const bool answers = (slave->set_time_brk)(slave);
         if (answers) {
             size = mc1231a_set_time_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8686,7 +8686,7 @@ static inline int mc1231a_slave_set_pos_brk_(
         return mc1231a_reject_(MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_pos_brk(slave);
+        const bool answers = (slave->set_pos_brk)(slave);
         if (answers) {
             size = mc1231a_set_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8703,7 +8703,7 @@ static inline int mc1231a_slave_set_neg_brk_(
         return mc1231a_reject_(MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_neg_brk(slave);
+        const bool answers = (slave->set_neg_brk)(slave);
         if (answers) {
             size = mc1231a_set_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8720,7 +8720,7 @@ static inline int mc1231a_slave_set_actl_pos_brk_(
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_actl_pos_brk(slave);
+        const bool answers = (slave->set_actl_pos_brk)(slave);
         if (answers) {
             size = mc1231a_set_actl_pos_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8737,7 +8737,7 @@ static inline int mc1231a_slave_set_actl_neg_brk_(
         return mc1231a_reject_(MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_actl_neg_brk(slave);
+        const bool answers = (slave->set_actl_neg_brk)(slave);
         if (answers) {
             size = mc1231a_set_actl_neg_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8754,7 +8754,7 @@ static inline int mc1231a_slave_set_mtn_cmplt_brk_(
         return mc1231a_reject_(MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_mtn_cmplt_brk(slave);
+        const bool answers = (slave->set_mtn_cmplt_brk)(slave);
         if (answers) {
             size = mc1231a_set_mtn_cmplt_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8771,7 +8771,7 @@ static inline int mc1231a_slave_set_ext_brk_(
         return mc1231a_reject_(MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_ext_brk(slave);
+        const bool answers = (slave->set_ext_brk)(slave);
         if (answers) {
             size = mc1231a_set_ext_brk_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8788,7 +8788,7 @@ static inline int mc1231a_slave_set_brk_off_(
         return mc1231a_reject_(MC1231A_SET_BRK_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_brk_off(slave);
+        const bool answers = (slave->set_brk_off)(slave);
         if (answers) {
             size = mc1231a_set_brk_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8806,7 +8806,7 @@ static inline int mc1231a_slave_set_brk_pnt_(
         return mc1231a_reject_(MC1231A_SET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_brk_pnt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_brk_pnt(slave, &request);
+        const bool answers = (slave->set_brk_pnt)(slave, &request);
         if (answers) {
             size = mc1231a_set_brk_pnt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8823,7 +8823,7 @@ static inline int mc1231a_slave_update_(
         return mc1231a_reject_(MC1231A_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->update(slave);
+        const bool answers = (slave->update)(slave);
         if (answers) {
             size = mc1231a_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8841,7 +8841,7 @@ static inline int mc1231a_slave_multi_update_(
         return mc1231a_reject_(MC1231A_MULTI_UPDATE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_multi_update_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->multi_update(slave, &request);
+        const bool answers = (slave->multi_update)(slave, &request);
         if (answers) {
             size = mc1231a_multi_update_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8858,7 +8858,7 @@ static inline int mc1231a_slave_set_auto_update_on_(
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_update_on(slave);
+        const bool answers = (slave->set_auto_update_on)(slave);
         if (answers) {
             size = mc1231a_set_auto_update_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8875,7 +8875,7 @@ static inline int mc1231a_slave_set_auto_update_off_(
         return mc1231a_reject_(MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_auto_update_off(slave);
+        const bool answers = (slave->set_auto_update_off)(slave);
         if (answers) {
             size = mc1231a_set_auto_update_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8893,7 +8893,7 @@ static inline int mc1231a_slave_get_brk_pnt_(
         return mc1231a_reject_(MC1231A_GET_BRK_PNT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_brk_pnt(slave, &response);
+        const bool answers = (slave->get_brk_pnt)(slave, &response);
         if (answers) {
             size = mc1231a_get_brk_pnt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8911,7 +8911,7 @@ static inline int mc1231a_slave_set_intrpt_mask_(
         return mc1231a_reject_(MC1231A_SET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_intrpt_mask_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_intrpt_mask(slave, &request);
+        const bool answers = (slave->set_intrpt_mask)(slave, &request);
         if (answers) {
             size = mc1231a_set_intrpt_mask_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8929,7 +8929,7 @@ static inline int mc1231a_slave_get_intrpt_(
         return mc1231a_reject_(MC1231A_GET_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_intrpt(slave, &response);
+        const bool answers = (slave->get_intrpt)(slave, &response);
         if (answers) {
             size = mc1231a_get_intrpt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8947,7 +8947,7 @@ static inline int mc1231a_slave_rst_intrpt_(
         return mc1231a_reject_(MC1231A_RST_INTRPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_rst_intrpt_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->rst_intrpt(slave, &request);
+        const bool answers = (slave->rst_intrpt)(slave, &request);
         if (answers) {
             size = mc1231a_rst_intrpt_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8965,7 +8965,7 @@ static inline int mc1231a_slave_get_intrpt_mask_(
         return mc1231a_reject_(MC1231A_GET_INTRPT_MASK_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_intrpt_mask(slave, &response);
+        const bool answers = (slave->get_intrpt_mask)(slave, &response);
         if (answers) {
             size = mc1231a_get_intrpt_mask_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -8982,7 +8982,7 @@ static inline int mc1231a_slave_clr_status_(
         return mc1231a_reject_(MC1231A_CLR_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->clr_status(slave);
+        const bool answers = (slave->clr_status)(slave);
         if (answers) {
             size = mc1231a_clr_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9000,7 +9000,7 @@ static inline int mc1231a_slave_rst_status_(
         return mc1231a_reject_(MC1231A_RST_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_rst_status_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->rst_status(slave, &request);
+        const bool answers = (slave->rst_status)(slave, &request);
         if (answers) {
             size = mc1231a_rst_status_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9018,7 +9018,7 @@ static inline int mc1231a_slave_get_status_(
         return mc1231a_reject_(MC1231A_GET_STATUS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_status(slave, &response);
+        const bool answers = (slave->get_status)(slave, &response);
         if (answers) {
             size = mc1231a_get_status_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9036,7 +9036,7 @@ static inline int mc1231a_slave_get_mode_(
         return mc1231a_reject_(MC1231A_GET_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mode(slave, &response);
+        const bool answers = (slave->get_mode)(slave, &response);
         if (answers) {
             size = mc1231a_get_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9053,7 +9053,7 @@ static inline int mc1231a_slave_set_capt_index_(
         return mc1231a_reject_(MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_capt_index(slave);
+        const bool answers = (slave->set_capt_index)(slave);
         if (answers) {
             size = mc1231a_set_capt_index_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9070,7 +9070,7 @@ static inline int mc1231a_slave_set_capt_home_(
         return mc1231a_reject_(MC1231A_SET_CAPT_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_capt_home(slave);
+        const bool answers = (slave->set_capt_home)(slave);
         if (answers) {
             size = mc1231a_set_capt_home_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9088,7 +9088,7 @@ static inline int mc1231a_slave_get_capt_(
         return mc1231a_reject_(MC1231A_GET_CAPT_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_capt(slave, &response);
+        const bool answers = (slave->get_capt)(slave, &response);
         if (answers) {
             size = mc1231a_get_capt_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9105,7 +9105,7 @@ static inline int mc1231a_slave_set_output_pwm_(
         return mc1231a_reject_(MC1231A_SET_OUTPUT_PWM_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_output_pwm(slave);
+        const bool answers = (slave->set_output_pwm)(slave);
         if (answers) {
             size = mc1231a_set_output_pwm_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9122,7 +9122,7 @@ static inline int mc1231a_slave_set_output_dac16_(
         return mc1231a_reject_(MC1231A_SET_OUTPUT_DAC16_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->set_output_dac16(slave);
+        const bool answers = (slave->set_output_dac16)(slave);
         if (answers) {
             size = mc1231a_set_output_dac16_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9139,7 +9139,7 @@ static inline int mc1231a_slave_mtr_on_(
         return mc1231a_reject_(MC1231A_MTR_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->mtr_on(slave);
+        const bool answers = (slave->mtr_on)(slave);
         if (answers) {
             size = mc1231a_mtr_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9156,7 +9156,7 @@ static inline int mc1231a_slave_mtr_off_(
         return mc1231a_reject_(MC1231A_MTR_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->mtr_off(slave);
+        const bool answers = (slave->mtr_off)(slave);
         if (answers) {
             size = mc1231a_mtr_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9174,7 +9174,7 @@ static inline int mc1231a_slave_set_mtr_cmd_(
         return mc1231a_reject_(MC1231A_SET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_mtr_cmd(slave, &request);
+        const bool answers = (slave->set_mtr_cmd)(slave, &request);
         if (answers) {
             size = mc1231a_set_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9192,7 +9192,7 @@ static inline int mc1231a_slave_get_mtr_cmd_(
         return mc1231a_reject_(MC1231A_GET_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_mtr_cmd(slave, &response);
+        const bool answers = (slave->get_mtr_cmd)(slave, &response);
         if (answers) {
             size = mc1231a_get_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9210,7 +9210,7 @@ static inline int mc1231a_slave_set_buf_mtr_cmd_(
         return mc1231a_reject_(MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_buf_mtr_cmd_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_buf_mtr_cmd(slave, &request);
+        const bool answers = (slave->set_buf_mtr_cmd)(slave, &request);
         if (answers) {
             size = mc1231a_set_buf_mtr_cmd_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9228,7 +9228,7 @@ static inline int mc1231a_slave_get_buf_mtr_cmd_(
         return mc1231a_reject_(MC1231A_GET_BUF_MTR_CMD_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_buf_mtr_cmd(slave, &response);
+        const bool answers = (slave->get_buf_mtr_cmd)(slave, &response);
         if (answers) {
             size = mc1231a_get_buf_mtr_cmd_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9246,7 +9246,7 @@ static inline int mc1231a_slave_get_output_mode_(
         return mc1231a_reject_(MC1231A_GET_OUTPUT_MODE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_output_mode(slave, &response);
+        const bool answers = (slave->get_output_mode)(slave, &response);
         if (answers) {
             size = mc1231a_get_output_mode_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9263,7 +9263,7 @@ static inline int mc1231a_slave_axis_on_(
         return mc1231a_reject_(MC1231A_AXIS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->axis_on(slave);
+        const bool answers = (slave->axis_on)(slave);
         if (answers) {
             size = mc1231a_axis_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9280,7 +9280,7 @@ static inline int mc1231a_slave_axis_off_(
         return mc1231a_reject_(MC1231A_AXIS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->axis_off(slave);
+        const bool answers = (slave->axis_off)(slave);
         if (answers) {
             size = mc1231a_axis_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9298,7 +9298,7 @@ static inline int mc1231a_slave_set_actl_pos_(
         return mc1231a_reject_(MC1231A_SET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_actl_pos_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_actl_pos(slave, &request);
+        const bool answers = (slave->set_actl_pos)(slave, &request);
         if (answers) {
             size = mc1231a_set_actl_pos_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9316,7 +9316,7 @@ static inline int mc1231a_slave_get_actl_pos_(
         return mc1231a_reject_(MC1231A_GET_ACTL_POS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_actl_pos(slave, &response);
+        const bool answers = (slave->get_actl_pos)(slave, &response);
         if (answers) {
             size = mc1231a_get_actl_pos_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9334,7 +9334,7 @@ static inline int mc1231a_slave_set_lmt_sense_(
         return mc1231a_reject_(MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_lmt_sense_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_lmt_sense(slave, &request);
+        const bool answers = (slave->set_lmt_sense)(slave, &request);
         if (answers) {
             size = mc1231a_set_lmt_sense_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9352,7 +9352,7 @@ static inline int mc1231a_slave_get_lmt_swtch_(
         return mc1231a_reject_(MC1231A_GET_LMT_SWTCH_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_lmt_swtch(slave, &response);
+        const bool answers = (slave->get_lmt_swtch)(slave, &response);
         if (answers) {
             size = mc1231a_get_lmt_swtch_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9369,7 +9369,7 @@ static inline int mc1231a_slave_lmts_on_(
         return mc1231a_reject_(MC1231A_LMTS_ON_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->lmts_on(slave);
+        const bool answers = (slave->lmts_on)(slave);
         if (answers) {
             size = mc1231a_lmts_on_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9386,7 +9386,7 @@ static inline int mc1231a_slave_lmts_off_(
         return mc1231a_reject_(MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->lmts_off(slave);
+        const bool answers = (slave->lmts_off)(slave);
         if (answers) {
             size = mc1231a_lmts_off_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9404,7 +9404,7 @@ static inline int mc1231a_slave_get_home_(
         return mc1231a_reject_(MC1231A_GET_HOME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_home(slave, &response);
+        const bool answers = (slave->get_home)(slave, &response);
         if (answers) {
             size = mc1231a_get_home_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9422,7 +9422,7 @@ static inline int mc1231a_slave_set_smpl_time_(
         return mc1231a_reject_(MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_smpl_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_smpl_time(slave, &request);
+        const bool answers = (slave->set_smpl_time)(slave, &request);
         if (answers) {
             size = mc1231a_set_smpl_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9440,7 +9440,7 @@ static inline int mc1231a_slave_get_smpl_time_(
         return mc1231a_reject_(MC1231A_GET_SMPL_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_smpl_time(slave, &response);
+        const bool answers = (slave->get_smpl_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_smpl_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9457,7 +9457,7 @@ static inline int mc1231a_slave_reset_(
         return mc1231a_reject_(MC1231A_RESET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->reset(slave);
+        const bool answers = (slave->reset)(slave);
         if (answers) {
             size = mc1231a_reset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9475,7 +9475,7 @@ static inline int mc1231a_slave_get_vrsn_(
         return mc1231a_reject_(MC1231A_GET_VRSN_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_vrsn(slave, &response);
+        const bool answers = (slave->get_vrsn)(slave, &response);
         if (answers) {
             size = mc1231a_get_vrsn_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9493,7 +9493,7 @@ static inline int mc1231a_slave_get_time_(
         return mc1231a_reject_(MC1231A_GET_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_time(slave, &response);
+        const bool answers = (slave->get_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9511,7 +9511,7 @@ static inline int mc1231a_slave_set_phase_cnts_(
         return mc1231a_reject_(MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_cnts_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase_cnts(slave, &request);
+        const bool answers = (slave->set_phase_cnts)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_cnts_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9529,7 +9529,7 @@ static inline int mc1231a_slave_set_phase_offset_(
         return mc1231a_reject_(MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_offset_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase_offset(slave, &request);
+        const bool answers = (slave->set_phase_offset)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_offset_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9547,7 +9547,7 @@ static inline int mc1231a_slave_set_phase_time_(
         return mc1231a_reject_(MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_time_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase_time(slave, &request);
+        const bool answers = (slave->set_phase_time)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_time_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9565,7 +9565,7 @@ static inline int mc1231a_slave_set_phase_(
         return mc1231a_reject_(MC1231A_SET_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (mc1231a_set_phase_request_decode(&request, frame->payload, frame->size) == MC1231A_OK) {
-        const bool answers = slave->set_phase(slave, &request);
+        const bool answers = (slave->set_phase)(slave, &request);
         if (answers) {
             size = mc1231a_set_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9582,7 +9582,7 @@ static inline int mc1231a_slave_init_phase_(
         return mc1231a_reject_(MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->init_phase(slave);
+        const bool answers = (slave->init_phase)(slave);
         if (answers) {
             size = mc1231a_init_phase_response_to_frame(mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9600,7 +9600,7 @@ static inline int mc1231a_slave_get_phase_info_(
         return mc1231a_reject_(MC1231A_GET_PHASE_INFO_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_info(slave, &response);
+        const bool answers = (slave->get_phase_info)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_info_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9618,7 +9618,7 @@ static inline int mc1231a_slave_get_phase_cnts_(
         return mc1231a_reject_(MC1231A_GET_PHASE_CNTS_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_cnts(slave, &response);
+        const bool answers = (slave->get_phase_cnts)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_cnts_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9636,7 +9636,7 @@ static inline int mc1231a_slave_get_phase_time_(
         return mc1231a_reject_(MC1231A_GET_PHASE_TIME_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_time(slave, &response);
+        const bool answers = (slave->get_phase_time)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_time_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }
@@ -9654,7 +9654,7 @@ static inline int mc1231a_slave_get_phase_offset_(
         return mc1231a_reject_(MC1231A_GET_PHASE_OFFSET_RESPONSE_MIN_SIZE, wire, capacity);
     }
     if (frame->size == 0U) {
-        const bool answers = slave->get_phase_offset(slave, &response);
+        const bool answers = (slave->get_phase_offset)(slave, &response);
         if (answers) {
             size = mc1231a_get_phase_offset_response_to_frame(&response, mc1231a_frame_sum(frame), wire, capacity);
         }

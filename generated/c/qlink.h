@@ -2470,7 +2470,7 @@ static inline int qlink_slave_node_setup_(
         return 0;
     }
     if (qlink_node_setup_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->node_setup(slave, &request);
+        const bool answers = (slave->node_setup)(slave, &request);
         if (answers) {
             size = qlink_node_setup_response_to_frame(slave->node, wire, capacity);
         }
@@ -2488,7 +2488,7 @@ static inline int qlink_slave_node_info_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->node_info(slave, &response);
+        const bool answers = (slave->node_info)(slave, &response);
         if (answers) {
             size = qlink_node_info_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2502,7 +2502,7 @@ static inline int qlink_slave_node_start_(qlink_slave_t *slave, const qlink_fram
         return 0;
     }
     if (frame->size == 0U) {
-        slave->node_start(slave);
+        (slave->node_start)(slave);
     }
     return 0;
 }
@@ -2513,7 +2513,7 @@ static inline int qlink_slave_node_stop_(qlink_slave_t *slave, const qlink_frame
         return 0;
     }
     if (frame->size == 0U) {
-        slave->node_stop(slave);
+        (slave->node_stop)(slave);
     }
     return 0;
 }
@@ -2526,7 +2526,7 @@ static inline int qlink_slave_node_sync_(qlink_slave_t *slave, const qlink_frame
         return 0;
     }
     if (qlink_node_sync_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        slave->node_sync(slave, &request);
+        (slave->node_sync)(slave, &request);
     }
     return 0;
 }
@@ -2542,7 +2542,7 @@ static inline int qlink_slave_node_program_load_(
         return 0;
     }
     if (qlink_node_program_load_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->node_program_load(slave, &request, &response);
+        const bool answers = (slave->node_program_load)(slave, &request, &response);
         if (answers) {
             size = qlink_node_program_load_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2559,7 +2559,7 @@ static inline int qlink_slave_node_reset_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->node_reset(slave);
+        const bool answers = (slave->node_reset)(slave);
         if (answers) {
             size = qlink_node_reset_response_to_frame(slave->node, wire, capacity);
         }
@@ -2577,7 +2577,7 @@ static inline int qlink_slave_motor_response_poll_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->motor_response_poll(slave, &response);
+        const bool answers = (slave->motor_response_poll)(slave, &response);
         if (answers) {
             size = qlink_motor_response_poll_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2595,7 +2595,7 @@ static inline int qlink_slave_motor_request_(
         return 0;
     }
     if (qlink_motor_request_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->motor_request(slave, &request);
+        const bool answers = (slave->motor_request)(slave, &request);
         if (answers) {
             size = qlink_motor_request_response_to_frame(slave->node, wire, capacity);
         }
@@ -2613,7 +2613,7 @@ static inline int qlink_slave_motion_(qlink_slave_t *slave, const qlink_frame_t 
         return 0;
     }
     if (qlink_motion_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->motion(slave, &request, &response);
+        const bool answers = (slave->motion)(slave, &request, &response);
         if (answers) {
             size = qlink_motion_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2631,7 +2631,7 @@ static inline int qlink_slave_motor_position_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->motor_position(slave, &response);
+        const bool answers = (slave->motor_position)(slave, &response);
         if (answers) {
             size = qlink_motor_position_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2648,7 +2648,7 @@ static inline int qlink_slave_clear_fifo_(
         return 0;
     }
     if (frame->size == 0U) {
-        const bool answers = slave->clear_fifo(slave);
+        const bool answers = (slave->clear_fifo)(slave);
         if (answers) {
             size = qlink_clear_fifo_response_to_frame(slave->node, wire, capacity);
         }
@@ -2666,7 +2666,7 @@ static inline int qlink_slave_preset_motor_position_(
         return 0;
     }
     if (qlink_preset_motor_position_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->preset_motor_position(slave, &request);
+        const bool answers = (slave->preset_motor_position)(slave, &request);
         if (answers) {
             size = qlink_preset_motor_position_response_to_frame(slave->node, wire, capacity);
         }
@@ -2684,7 +2684,7 @@ static inline int qlink_slave_read_(qlink_slave_t *slave, const qlink_frame_t *f
         return 0;
     }
     if (qlink_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->read(slave, &request, &response);
+        const bool answers = (slave->read)(slave, &request, &response);
         if (answers) {
             size = qlink_read_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2701,7 +2701,7 @@ static inline int qlink_slave_write_(qlink_slave_t *slave, const qlink_frame_t *
         return 0;
     }
     if (qlink_write_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->write(slave, &request);
+        const bool answers = (slave->write)(slave, &request);
         if (answers) {
             size = qlink_write_response_to_frame(slave->node, wire, capacity);
         }
@@ -2720,7 +2720,7 @@ static inline int qlink_slave_write_read_(
         return 0;
     }
     if (qlink_write_read_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->write_read(slave, &request, &response);
+        const bool answers = (slave->write_read)(slave, &request, &response);
         if (answers) {
             size = qlink_write_read_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2738,7 +2738,7 @@ static inline int qlink_slave_set_outputs_(
         return 0;
     }
     if (qlink_set_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->set_outputs(slave, &request);
+        const bool answers = (slave->set_outputs)(slave, &request);
         if (answers) {
             size = qlink_set_outputs_response_to_frame(slave->node, wire, capacity);
         }
@@ -2756,7 +2756,7 @@ static inline int qlink_slave_clear_outputs_(
         return 0;
     }
     if (qlink_clear_outputs_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->clear_outputs(slave, &request);
+        const bool answers = (slave->clear_outputs)(slave, &request);
         if (answers) {
             size = qlink_clear_outputs_response_to_frame(slave->node, wire, capacity);
         }
@@ -2775,7 +2775,7 @@ static inline int qlink_slave_loop_back_(
         return 0;
     }
     if (qlink_loop_back_request_decode(&request, frame->payload, frame->size) == QLINK_OK) {
-        const bool answers = slave->loop_back(slave, &request, &response);
+        const bool answers = (slave->loop_back)(slave, &request, &response);
         if (answers) {
             size = qlink_loop_back_response_to_frame(&response, slave->node, wire, capacity);
         }
@@ -2890,7 +2890,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_setup != NULL)) {
-            master->node_setup(master, frame->node);
+            (master->node_setup)(master, frame->node);
         }
         break;
     }
@@ -2901,7 +2901,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_info != NULL)) {
-            master->node_info(master, frame->node, &message);
+            (master->node_info)(master, frame->node, &message);
         }
         break;
     }
@@ -2912,7 +2912,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_program_load != NULL)) {
-            master->node_program_load(master, frame->node, &message);
+            (master->node_program_load)(master, frame->node, &message);
         }
         break;
     }
@@ -2922,7 +2922,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->node_reset != NULL)) {
-            master->node_reset(master, frame->node);
+            (master->node_reset)(master, frame->node);
         }
         break;
     }
@@ -2933,7 +2933,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motor_response_poll != NULL)) {
-            master->motor_response_poll(master, frame->node, &message);
+            (master->motor_response_poll)(master, frame->node, &message);
         }
         break;
     }
@@ -2943,7 +2943,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motor_request != NULL)) {
-            master->motor_request(master, frame->node);
+            (master->motor_request)(master, frame->node);
         }
         break;
     }
@@ -2954,7 +2954,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motion != NULL)) {
-            master->motion(master, frame->node, &message);
+            (master->motion)(master, frame->node, &message);
         }
         break;
     }
@@ -2965,7 +2965,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->motor_position != NULL)) {
-            master->motor_position(master, frame->node, &message);
+            (master->motor_position)(master, frame->node, &message);
         }
         break;
     }
@@ -2975,7 +2975,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->clear_fifo != NULL)) {
-            master->clear_fifo(master, frame->node);
+            (master->clear_fifo)(master, frame->node);
         }
         break;
     }
@@ -2985,7 +2985,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->preset_motor_position != NULL)) {
-            master->preset_motor_position(master, frame->node);
+            (master->preset_motor_position)(master, frame->node);
         }
         break;
     }
@@ -2996,7 +2996,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->read != NULL)) {
-            master->read(master, frame->node, &message);
+            (master->read)(master, frame->node, &message);
         }
         break;
     }
@@ -3006,7 +3006,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->write != NULL)) {
-            master->write(master, frame->node);
+            (master->write)(master, frame->node);
         }
         break;
     }
@@ -3017,7 +3017,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->write_read != NULL)) {
-            master->write_read(master, frame->node, &message);
+            (master->write_read)(master, frame->node, &message);
         }
         break;
     }
@@ -3027,7 +3027,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->set_outputs != NULL)) {
-            master->set_outputs(master, frame->node);
+            (master->set_outputs)(master, frame->node);
         }
         break;
     }
@@ -3037,7 +3037,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->clear_outputs != NULL)) {
-            master->clear_outputs(master, frame->node);
+            (master->clear_outputs)(master, frame->node);
         }
         break;
     }
@@ -3048,7 +3048,7 @@ static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_fram
             status = QLINK_ERROR_RANGE;
         }
         if ((status == QLINK_OK) && (master->loop_back != NULL)) {
-            master->loop_back(master, frame->node, &message);
+            (master->loop_back)(master, frame->node, &message);
         }
         break;
     }

@@ -1026,7 +1026,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->character_transfer != NULL)) {
-            listener->character_transfer(listener, frame->address, &message);
+            (listener->character_transfer)(listener, frame->address, &message);
         }
         break;
     }
@@ -1037,7 +1037,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->direct_variable_transfer != NULL)) {
-            listener->direct_variable_transfer(listener, frame->address, &message);
+            (listener->direct_variable_transfer)(listener, frame->address, &message);
         }
         break;
     }
@@ -1048,7 +1048,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->keypad_offset != NULL)) {
-            listener->keypad_offset(listener, frame->address, &message);
+            (listener->keypad_offset)(listener, frame->address, &message);
         }
         break;
     }
@@ -1059,7 +1059,7 @@ static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_f
             status = TRIO_ERROR_RANGE;
         }
         if ((status == TRIO_OK) && (listener->keypad_mode_message != NULL)) {
-            listener->keypad_mode_message(listener, frame->address, &message);
+            (listener->keypad_mode_message)(listener, frame->address, &message);
         }
         break;
     }

@@ -1,37 +1,156 @@
-"""Names in the output: conversion, and the words that cannot be used."""
+"""Names in the output: how each language spells a name of a schema so that it cannot mean anything else.
+
+A word that a language, its library or the generated code uses gets an underscore at its end, or says what it
+is (`FaultEnum`, `error_flags`). Lint looks for clashes among the results, so it uses the same functions.
+"""
 
 from __future__ import annotations
 
+import builtins
 import keyword
 
-#: Words that cannot name an attribute in Python.
-PYTHON_RESERVED = frozenset(keyword.kwlist)
+# Python -----------------------------------------------------------------------------------------------------
 
-#: Words that cannot name a struct member in C99, C11 or C++17 (alternative operator names included).
-C_RESERVED = frozenset(
-    """
-    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t class compl
-    const const_cast constexpr continue decltype default delete do double dynamic_cast else enum explicit
-    export extern false float for friend goto if inline int long mutable namespace new noexcept not not_eq
-    nullptr operator or or_eq private protected public register reinterpret_cast restrict return short signed
-    sizeof static static_assert static_cast struct switch template this thread_local throw true try typedef
-    typeid typename typeof union unsigned using virtual void volatile wchar_t while xor xor_eq
-    """.split()  # noqa: SIM905 - reads better than sixty quoted words
+#: What every message has, and what its methods call it.
+_METHODS = frozenset({"to_frame", "to_bytes", "from_bytes", "from_checked", "measure_payload", "self", "cls"})
+#: What an address cannot hide: types and decorators in the body of its class.
+_IN_CLASS = frozenset({"int", "bytes", "classmethod"})
+#: The same in the functions that take it as an argument.
+_IN_FUNCTIONS = frozenset(
+    """as_bytes bytes cls data frame head illegal len message number payload struct_error
+    wrong_size""".split()  # noqa: SIM905 - reads better than quoted words
+)
+#: What a class of calls or handlers has itself, and types of arguments.
+_IN_CALLS = frozenset("ask tell handle number axis bool bytes float int list str type".split())  # noqa: SIM905
+#: Classes and constants of a codec, what it imports, and constants in the body of a message's class.
+_IN_MODULE = frozenset(
+    """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
+    Codec Bus OpenEnum BaseMessage Constant Count DecimalScale Items Mask Octets OutOfRange Rule
+    Scale Scaled Text Whole Marking Struct Decimal Self Any Callable BytesLike ClassVar Final
+    Literal LayoutError Checksum BUS COMMANDS MESSAGES MARKING REFUSALS UNREAD UNREADABLE NAME ID
+    FIELDS RULES ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
+) | frozenset(dir(builtins))
+
+
+def attribute(name: str) -> str:
+    """The attribute of a field, and the argument for it."""
+    return f"{name}_" if keyword.iskeyword(name) or name in _METHODS else name
+
+
+def address_attribute(name: str) -> str:
+    """The attribute of an address: its type is told in the body of the class."""
+    return f"{name}_" if name in _IN_CLASS else attribute(name)
+
+
+def address_argument(name: str) -> str:
+    """The argument of an address where a payload is decoded alone."""
+    return f"{name}_" if name in _IN_FUNCTIONS else address_attribute(name)
+
+
+def method(name: str) -> str:
+    """The method of a command in the classes of a bus module."""
+    return f"{name}_" if name in _IN_CALLS or keyword.iskeyword(name) else name
+
+
+def message_class(name: str) -> str:
+    """The class of a message."""
+    found = pascal(name)
+    return f"{found}_" if found in _IN_MODULE else found
+
+
+def constant_class(name: str, kind: str, messages: frozenset[str]) -> str:
+    """The class of an enum or of flags; one that a message has is told apart by what it is."""
+    found = pascal(name)
+    return f"{found}{pascal(kind)}" if found in messages or found in _IN_MODULE else found
+
+
+# C ----------------------------------------------------------------------------------------------------------
+
+#: Keywords of C and C++ up to C23 and C++23, those of compilers without -std, and macros without arguments:
+#: those of the C library, of GNU compilers and of Windows. Macros with arguments are expanded only before a
+#: parenthesis, and none follows a member.
+_C_WORDS = frozenset(
+    """alignas alignof and and_eq asm atomic_cancel atomic_commit atomic_noexcept auto bitand bitor bool
+    break case catch char char8_t char16_t char32_t class co_await co_return co_yield compl concept
+    const const_cast consteval constexpr constinit continue decltype default delete do double
+    dynamic_cast else enum explicit export extern false float for friend goto if import inline int
+    long module mutable namespace new noexcept not not_eq nullptr operator or or_eq private
+    protected public reflexpr register reinterpret_cast requires restrict return short signed sizeof
+    static static_assert static_cast struct switch synchronized template this thread_local throw
+    true try typedef typeid typename typeof typeof_unqual union unsigned using virtual void volatile
+    wchar_t while xor xor_eq alloca complex errno imaginary linux math_errhandling noreturn stderr
+    stdin stdout unix unreachable sa_handler sa_sigaction sigev_notify_attributes
+    sigev_notify_function si_addr si_addr_lsb si_arch si_band si_call_addr si_fd si_int si_lower
+    si_overrun si_pid si_pkey si_ptr si_status si_stime si_syscall si_timerid si_uid si_upper
+    si_utime si_value st_atime st_ctime st_mtime arm mips i386 vax far huge near interface small
+    hyper cdecl pascal interrupt""".split()  # noqa: SIM905
+)
+#: Variables, types and functions of the generated functions that have the address as a parameter.
+_C_LOCALS = frozenset(
+    """size payload wire capacity message value from to end check since index sent status id slave master
+    listener frame checked request response body buffer start count raw sum crc payload_size
+    payload_capacity bool uint8_t uint16_t uint32_t uint64_t int8_t size_t""".split()  # noqa: SIM905
+)
+#: What a table of handlers has beside its functions.
+_C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id"})
+#: What follows the protocol's name in the header's own names, and what their longer names begin with.
+_C_STEMS = frozenset(
+    """addressing async_master_calls async_node_calls bits bits_per bus check codec_error command crc
+    decode decode_buffer decode_error direction enable encode_error encode error event fault first
+    frame last listener master master_calls max max_frame max_payload max_wire message node_calls ok
+    receiver repeat repeat_by request response slave slave_handlers status stream_decoder""".split()  # noqa: SIM905
+)
+#: Types of the C library that begin like names of a protocol.
+_C_TYPES = frozenset(
+    {
+        f"{sign}int_{kind}{bits}_t"
+        for sign in ("", "u")
+        for kind in ("fast", "least")
+        for bits in (8, 16, 32, 64)
+    }
+    | {"max_align_t", "sig_atomic_t"}
 )
 
-#: Attributes that generated message classes have themselves, and what their methods call the message.
-GENERATED_ATTRIBUTES = frozenset(
-    {"to_bytes", "from_bytes", "to_frame", "to_dict", "from_dict", "from_checked", "measure_payload", "self"}
+
+def member(name: str) -> str:
+    """The member of a struct for a field."""
+    return f"{name}_" if name in _C_WORDS else name
+
+
+def address_member(name: str) -> str:
+    """The member and the parameter for an address."""
+    return f"{name}_" if name in _C_WORDS or name in _C_LOCALS else name
+
+
+def handler(name: str, address: str) -> str:
+    """The member of a table that handles a command or message; ``address`` is the table's own."""
+    return f"{name}_" if name in _C_WORDS or name in _C_HANDLERS or name == address else name
+
+
+def stem(protocol: str, name: str, kind: str) -> str:
+    """What the names of an enum, of flags, of a type or of a message begin with, after the protocol's."""
+    taken = name in _C_STEMS or name.startswith("crc_") or f"{protocol}_{name}_t" in _C_TYPES
+    return f"{name}_{kind}" if taken else name
+
+
+# Files ------------------------------------------------------------------------------------------------------
+
+#: Headers of C and POSIX, modules that generated ones import, and devices of Windows.
+_FILES = frozenset(
+    """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign
+    stdarg stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath
+    threads time uchar wchar wctype fcntl poll pthread sched semaphore strings termios unistd aux
+    con nul prn com1 com2 com3 com4 com5 com6 com7 com8 com9 lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 lpt8
+    lpt9""".split()  # noqa: SIM905
 )
 
 
-#: Names that generated modules and headers give to things of their own.
-GENERATED_NAMES = frozenset(
-    """
-    async_master_calls async_node_calls bus codec_error command decode_error encode_error error event fault
-    frame master master_calls message node_calls receiver slave slave_handlers status stream_decoder
-    """.split()  # noqa: SIM905 - as above
-)
+def file_stem(protocol: str) -> str:
+    """What files of a protocol are called: headers, modules, vectors."""
+    return f"{protocol}_" if protocol in _FILES or keyword.iskeyword(protocol) else protocol
+
+
+# Conversion -------------------------------------------------------------------------------------------------
 
 
 def pascal(name: str) -> str:

@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import builtins
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from qlinkgen.model import naming
 from qlinkgen.model.message import Message
-from qlinkgen.model.naming import (
-    C_RESERVED,
-    GENERATED_ATTRIBUTES,
-    GENERATED_NAMES,
-    PYTHON_RESERVED,
-    pascal,
-    upper,
-)
+from qlinkgen.model.naming import upper
 from qlinkgen.model.types import Array, Blob
 from qlinkgen.schema.file_model import Fields, SchemaFile
 from qlinkgen.schema.kinds import NAME_PATTERN
@@ -26,7 +19,8 @@ from qlinkgen.schema.source import Path
 #: after it, and compilers need to look at 63 characters only (C99, 5.2.4.1).
 MAX_NAME = 40
 _NAME = re.compile(NAME_PATTERN.removesuffix("$") + r"\Z")
-_BUILTIN = frozenset(dir(builtins))
+#: What a class of constants is where its name alone would mean something else.
+_KINDS = {"enums": "enum", "flags": "flags"}
 #: Macros that the C header defines for each message.
 _MESSAGE_MACROS = ("init", "id", "min_size", "max_size", "max_frame_size", "max_wire_size")
 #: The same for each scaled type.
@@ -38,23 +32,21 @@ def check_names(file: SchemaFile, messages: Sequence[Message], report: Reporter)
     """Check every name of a file: spelling, reserved words, clashes after conversion."""
     check = _Checker(report)
     check.spelling(file.protocol.name, ("protocol", "name"))
-    check.member(file.protocol.name, ("protocol", "name"))
     check.constants(file)
     for name in file.attributes:
         check.spelling(name, ("attributes", name))
     address = check.parts(file)
     for name in file.commands:
-        # Slave firmware has a function pointer of this name for each command.
-        if check.spelling(name, ("commands", name)):
-            check.member(name, ("commands", name))
+        check.spelling(name, ("commands", name))
     for name in file.messages:
-        if check.spelling(name, ("messages", name)):
-            check.type_name(name, ("messages", name))
+        check.spelling(name, ("messages", name))
     for fields, path in _field_groups(file):
         check.fields(fields, path)
     for message in messages:
-        check.clashes(_attributes(message, address))
+        for c in (False, True):
+            check.clashes(_attributes(message, address, c=c))
     check.clashes(_classes(file))
+    check.clashes(_methods(file))
     check.clashes(_macros(file))
 
 
@@ -79,24 +71,10 @@ class _Checker:
         self._error("bad-name", path, f"{shown(name)} is not a name", hint)
         return False
 
-    def member(self, name: str, path: Path) -> None:
-        """The name stands as it is in Python and C."""
-        if name in PYTHON_RESERVED or name in C_RESERVED:
-            language = "Python" if name in PYTHON_RESERVED else "C or C++"
-            self._error("reserved-word", path, f"'{name}' is a reserved word of {language}", f"use {name}_")
-
-    def type_name(self, name: str, path: Path) -> None:
-        """The name becomes one of a class and of a C type."""
-        if name in GENERATED_NAMES or pascal(name) in _BUILTIN or pascal(name) in PYTHON_RESERVED:
-            owner = "the generated code" if name in GENERATED_NAMES else "Python"
-            what = f"'{name}' becomes the name of something that {owner} has itself"
-            self._error("reserved-word", path, what, "use a name that says more")
-
     def constants(self, file: SchemaFile) -> None:
         for group in ("enums", "flags"):
             for name, spec in getattr(file, group).items():
-                if self.spelling(name, (group, name)):
-                    self.type_name(name, (group, name))
+                self.spelling(name, (group, name))
                 for member in spec.values:
                     self.spelling(member, (group, name, "values", member))
         for name in file.types:
@@ -110,24 +88,13 @@ class _Checker:
                 self.spelling(name, ("frame", group, name))
                 if part.role == "address":
                     address = name
-                    self.attribute(name, ("frame", group, name))
         return address
 
     def fields(self, fields: Fields, path: Path) -> None:
         for name, spec in fields.items():
-            if self.spelling(name, (*path, name)):
-                self.attribute(name, (*path, name))
+            self.spelling(name, (*path, name))
             for member in spec.bits or {}:
-                place = (*path, name, "bits", member)
-                if self.spelling(member, place):
-                    self.attribute(member, place)
-
-    def attribute(self, name: str, path: Path) -> None:
-        self.member(name, path)
-        if name in GENERATED_ATTRIBUTES:
-            self._error(
-                "reserved-word", path, f"'{name}' is a name that every message has itself", f"use {name}_"
-            )
+                self.spelling(member, (*path, name, "bits", member))
 
     def clashes(self, names: Iterable[tuple[str, str, Path]]) -> None:
         """Report names that become the same: (what it becomes, what it is called in a message, its place)."""
@@ -153,39 +120,56 @@ def _field_groups(file: SchemaFile) -> Iterator[tuple[Fields, Path]]:
     yield from ((fields, path) for fields, path in groups if isinstance(fields, dict))
 
 
-def _attributes(message: Message, address: str | None) -> Iterator[tuple[str, str, Path]]:
-    """Attributes of a message object and members of its C struct."""
+def _attributes(message: Message, address: str | None, *, c: bool) -> Iterator[tuple[str, str, Path]]:
+    """Attributes of a message object, or members of its C struct."""
     group, last = (
         ("commands", message.direction) if message.name != message.command else ("messages", "fields")
     )
     path: Path = (group, message.command, last)
-    if address is not None:
-        yield address, f"the frame's '{address}'", path
+    spelt = naming.member if c else naming.attribute
+    if address is not None and not c:
+        yield naming.address_attribute(address), f"the frame's '{address}'", path
     for value in message.values:
         inside = ("bits", value.name) if value.bits else ()
         place = (*path, value.field.name, *inside)
         called = f"'{value.name}' in {value.field.name}" if inside else f"'{value.name}'"
-        yield value.name, called, place
-        if isinstance(value.type, Array | Blob) and not value.field.fixed:
+        yield spelt(value.name), called, place
+        if c and isinstance(value.type, Array | Blob) and not value.field.fixed:
             suffix = value.type.quantity
             yield f"{value.name}_{suffix}", f"the {suffix} of '{value.name}'", place
 
 
 def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
     """Names that become classes: enums, flags and messages."""
+    messages = frozenset(map(naming.message_class, _messages(file)))
     for group in ("enums", "flags"):
         for name in getattr(file, group):
-            yield pascal(name), f"'{name}'", (group, name)
+            found = naming.constant_class(name, _KINDS[group], messages)
+            yield found, f"'{name}'", (group, name)
     for name in file.commands:
         for direction in ("request", "response"):
-            yield pascal(f"{name}_{direction}"), f"the {direction} of '{name}'", ("commands", name)
+            found = naming.message_class(f"{name}_{direction}")
+            yield found, f"the {direction} of '{name}'", ("commands", name)
     for name in file.messages:
-        yield pascal(_class_base(file, name)), f"the message '{name}'", ("messages", name)
+        yield naming.message_class(name), f"the message '{name}'", ("messages", name)
+
+
+def _messages(file: SchemaFile) -> Iterator[str]:
+    yield from (f"{name}_{direction}" for name in file.commands for direction in ("request", "response"))
+    yield from file.messages
+
+
+def _methods(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
+    """Methods of bus modules, and members of tables of handlers."""
+    for name in (*file.commands, *file.messages):
+        group = "commands" if name in file.commands else "messages"
+        yield naming.method(name), f"'{name}'", (group, name)
 
 
 def _class_base(file: SchemaFile, name: str) -> str:
     """A message may have the name of an enum: its class and type get a suffix then."""
-    return f"{name}_message" if name in file.enums or name in file.flags else name
+    found = naming.stem(file.protocol.name, name, "message")
+    return f"{found}_message" if found in file.enums or found in file.flags else found
 
 
 def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
@@ -196,7 +180,8 @@ def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
     for group in ("enums", "flags"):
         for name, spec in getattr(file, group).items():
             for member in spec.values:
-                result = f"{prefix}_{upper(name)}_{upper(member)}"
+                base = naming.stem(file.protocol.name, name, _KINDS[group])
+                result = f"{prefix}_{upper(base)}_{upper(member)}"
                 yield result, f"'{member}' of {name}", (group, name, "values", member)
     for stem, owner, macros, path in _macro_owners(file):
         for macro in macros:

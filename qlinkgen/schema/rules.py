@@ -238,11 +238,6 @@ _ALL = (
         "One of the two would be lost.",
     ),
     Rule(
-        "reserved-word",
-        "Names are no reserved words of Python, C or C++, and none that the generated code uses itself.",
-        "The generated code would not compile.",
-    ),
-    Rule(
         "empty-protocol",
         "A protocol has at least one command or message.",
         "There would be nothing to generate.",

@@ -422,13 +422,13 @@ class Response(Message):
 # Messages -------------------------------------------------------------------------------
 
 _new = object.__new__
-_VELOCITY = Scale(0, 4294967295, divisor=65536)
-_ACCELERATION_LIMIT = Scale(-1073741824, 1073741823, divisor=65536)
-_PEAK_ACCELERATION = Scale(0, 65535, divisor=65536)
-_JERK = Scale(0, 4294967295, divisor=4294967296)
-_GEAR_RATIO = Scale(-2147483648, 2147483647, divisor=65536)
-_ACCELERATION = Scale(-2147483648, 2147483647, divisor=65536)
-_SIGNED_VELOCITY = Scale(-2147483648, 2147483647, divisor=65536)
+_SCALE_VELOCITY = Scale(0, 4294967295, divisor=65536)
+_SCALE_ACCELERATION_LIMIT = Scale(-1073741824, 1073741823, divisor=65536)
+_SCALE_PEAK_ACCELERATION = Scale(0, 65535, divisor=65536)
+_SCALE_JERK = Scale(0, 4294967295, divisor=4294967296)
+_SCALE_GEAR_RATIO = Scale(-2147483648, 2147483647, divisor=65536)
+_SCALE_ACCELERATION = Scale(-2147483648, 2147483647, divisor=65536)
+_SCALE_SIGNED_VELOCITY = Scale(-2147483648, 2147483647, divisor=65536)
 
 
 class _EmptyRequest(Request):
@@ -835,7 +835,7 @@ class SetVelRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _VELOCITY, unit="counts/sample"),)
+    RULES = (Scaled("value", _SCALE_VELOCITY, unit="counts/sample"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -843,7 +843,7 @@ class SetVelRequest(Request):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _VELOCITY.raw(self.value)
+            value_raw = _SCALE_VELOCITY.raw(self.value)
             return _PACK_SET_VEL_REQUEST(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -886,7 +886,7 @@ class SetAccRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _ACCELERATION_LIMIT, unit="counts/sample^2"),)
+    RULES = (Scaled("value", _SCALE_ACCELERATION_LIMIT, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -894,7 +894,7 @@ class SetAccRequest(Request):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _ACCELERATION_LIMIT.raw(self.value)
+            value_raw = _SCALE_ACCELERATION_LIMIT.raw(self.value)
             return _PACK_SET_ACC_REQUEST(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -939,7 +939,7 @@ class SetMaxAccRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Scaled("value", _PEAK_ACCELERATION, unit="counts/sample^2"),)
+    RULES = (Scaled("value", _SCALE_PEAK_ACCELERATION, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -947,7 +947,7 @@ class SetMaxAccRequest(Request):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _PEAK_ACCELERATION.raw(self.value)
+            value_raw = _SCALE_PEAK_ACCELERATION.raw(self.value)
             return _PACK_SET_MAX_ACC_REQUEST(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -990,7 +990,7 @@ class SetJerkRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _JERK, unit="counts/sample^3"),)
+    RULES = (Scaled("value", _SCALE_JERK, unit="counts/sample^3"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -998,7 +998,7 @@ class SetJerkRequest(Request):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _JERK.raw(self.value)
+            value_raw = _SCALE_JERK.raw(self.value)
             return _PACK_SET_JERK_REQUEST(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -1042,7 +1042,7 @@ class SetRatioRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _GEAR_RATIO),)
+    RULES = (Scaled("value", _SCALE_GEAR_RATIO),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1050,7 +1050,7 @@ class SetRatioRequest(Request):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _GEAR_RATIO.raw(self.value)
+            value_raw = _SCALE_GEAR_RATIO.raw(self.value)
             return _PACK_SET_RATIO_REQUEST(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -1212,7 +1212,7 @@ class GetVelResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _VELOCITY, unit="counts/sample"),)
+    RULES = (Scaled("value", _SCALE_VELOCITY, unit="counts/sample"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1220,7 +1220,7 @@ class GetVelResponse(Response):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _VELOCITY.raw(self.value)
+            value_raw = _SCALE_VELOCITY.raw(self.value)
             return _PACK_GET_VEL_RESPONSE(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -1268,7 +1268,7 @@ class GetAccResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _ACCELERATION, unit="counts/sample^2"),)
+    RULES = (Scaled("value", _SCALE_ACCELERATION, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1276,7 +1276,7 @@ class GetAccResponse(Response):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _ACCELERATION.raw(self.value)
+            value_raw = _SCALE_ACCELERATION.raw(self.value)
             return _PACK_GET_ACC_RESPONSE(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -1319,7 +1319,7 @@ class GetMaxAccResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Scaled("value", _PEAK_ACCELERATION, unit="counts/sample^2"),)
+    RULES = (Scaled("value", _SCALE_PEAK_ACCELERATION, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1327,7 +1327,7 @@ class GetMaxAccResponse(Response):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _PEAK_ACCELERATION.raw(self.value)
+            value_raw = _SCALE_PEAK_ACCELERATION.raw(self.value)
             return _PACK_GET_MAX_ACC_RESPONSE(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -1370,7 +1370,7 @@ class GetJerkResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _JERK, unit="counts/sample^3"),)
+    RULES = (Scaled("value", _SCALE_JERK, unit="counts/sample^3"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1378,7 +1378,7 @@ class GetJerkResponse(Response):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _JERK.raw(self.value)
+            value_raw = _SCALE_JERK.raw(self.value)
             return _PACK_GET_JERK_RESPONSE(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -1420,7 +1420,7 @@ class GetRatioResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _GEAR_RATIO),)
+    RULES = (Scaled("value", _SCALE_GEAR_RATIO),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1428,7 +1428,7 @@ class GetRatioResponse(Response):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _GEAR_RATIO.raw(self.value)
+            value_raw = _SCALE_GEAR_RATIO.raw(self.value)
             return _PACK_GET_RATIO_RESPONSE(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()
@@ -1500,7 +1500,7 @@ class GetTrgtVelResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SIGNED_VELOCITY, unit="counts/sample"),)
+    RULES = (Scaled("value", _SCALE_SIGNED_VELOCITY, unit="counts/sample"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1508,7 +1508,7 @@ class GetTrgtVelResponse(Response):
     def to_bytes(self) -> bytes:
         """The payload alone. Raises EncodeError."""
         try:
-            value_raw = _SIGNED_VELOCITY.raw(self.value)
+            value_raw = _SCALE_SIGNED_VELOCITY.raw(self.value)
             return _PACK_GET_TRGT_VEL_RESPONSE(value_raw)
         except REFUSALS:
             return settled(self).to_bytes()

@@ -238,7 +238,7 @@ class Message(BaseMessage):
 # Messages -------------------------------------------------------------------------------
 
 _new = object.__new__
-_TENTHS = Scale(0, 255, divisor=10)
+_SCALE_TENTHS = Scale(0, 255, divisor=10)
 
 
 _PACK_EMPTY = Struct(">BBB").pack
@@ -273,12 +273,12 @@ class _Empty(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw = _UNPACK_EMPTY(body)
-        if length_raw != 4:
+        length_part, node_part = _UNPACK_EMPTY(body)
+        if length_part != 4:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -311,8 +311,8 @@ class NodeSetupRequest(Message):
     RULES = (
         Whole("node", 0, 16),
         Whole("node_number", 1, 16),
-        Scaled("t1_delay", _TENTHS, unit="s"),
-        Scaled("t2_delay", _TENTHS, unit="s"),
+        Scaled("t1_delay", _SCALE_TENTHS, unit="s"),
+        Scaled("t2_delay", _SCALE_TENTHS, unit="s"),
         Whole("position_type", 0, 255),
     )
 
@@ -334,8 +334,8 @@ class NodeSetupRequest(Message):
     def to_frame(self) -> bytes:
         """The whole frame as it is on the wire. Raises EncodeError."""
         try:
-            t1_delay_raw = _TENTHS.raw(self.t1_delay)
-            t2_delay_raw = _TENTHS.raw(self.t2_delay)
+            t1_delay_raw = _SCALE_TENTHS.raw(self.t1_delay)
+            t2_delay_raw = _SCALE_TENTHS.raw(self.t2_delay)
             if not (0 <= self.node <= 16 and 1 <= self.node_number <= 16):
                 raise OutOfRange
             body = _PACK_NODE_SETUP_REQUEST(
@@ -358,18 +358,18 @@ class NodeSetupRequest(Message):
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
-            length_raw,
-            node_raw,
+            length_part,
+            node_part,
             node_number_raw,
             t1_delay_raw,
             t2_delay_raw,
             position_type_raw,
         ) = _UNPACK_NODE_SETUP_REQUEST(body)
-        if length_raw != 8:
+        if length_part != 8:
             raise LayoutError
-        if not 0 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 0 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         if not 1 <= node_number_raw <= 16:
             raise illegal(cls, "node_number", node_number_raw, 0, _payload(body))
         message.node_number = node_number_raw
@@ -437,12 +437,12 @@ class NodeInfoRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw = _UNPACK_NODE_INFO_REQUEST(body)
-        if length_raw != 4:
+        length_part, node_part = _UNPACK_NODE_INFO_REQUEST(body)
+        if length_part != 4:
             raise LayoutError
-        if not 0 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 0 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -496,8 +496,8 @@ class NodeInfoResponse(Message):
         Whole("version_major", 0, 255),
         Whole("version_minor", 0, 255),
         Whole("product_id", 0, 65535),
-        Scaled("t1_delay", _TENTHS, unit="s"),
-        Scaled("t2_delay", _TENTHS, unit="s"),
+        Scaled("t1_delay", _SCALE_TENTHS, unit="s"),
+        Scaled("t2_delay", _SCALE_TENTHS, unit="s"),
         Whole("position_type", 0, 255),
         Whole("serial_number", 0, 4294967295),
     )
@@ -526,8 +526,8 @@ class NodeInfoResponse(Message):
     def to_frame(self) -> bytes:
         """The whole frame as it is on the wire. Raises EncodeError."""
         try:
-            t1_delay_raw = _TENTHS.raw(self.t1_delay)
-            t2_delay_raw = _TENTHS.raw(self.t2_delay)
+            t1_delay_raw = _SCALE_TENTHS.raw(self.t1_delay)
+            t2_delay_raw = _SCALE_TENTHS.raw(self.t2_delay)
             if not 1 <= self.node <= 16:
                 raise OutOfRange
             body = _PACK_NODE_INFO_RESPONSE(
@@ -553,8 +553,8 @@ class NodeInfoResponse(Message):
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
-            length_raw,
-            node_raw,
+            length_part,
+            node_part,
             message.version_major,
             message.version_minor,
             message.product_id,
@@ -563,11 +563,11 @@ class NodeInfoResponse(Message):
             position_type_raw,
             message.serial_number,
         ) = _UNPACK_NODE_INFO_RESPONSE(body)
-        if length_raw != 15:
+        if length_part != 15:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         message.t1_delay = t1_delay_raw / 10
         message.t2_delay = t2_delay_raw / 10
         message.position_type = PositionType.members.get(
@@ -616,12 +616,12 @@ class NodeStartRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw = _UNPACK_NODE_START_REQUEST(body)
-        if length_raw != 4:
+        length_part, node_part = _UNPACK_NODE_START_REQUEST(body)
+        if length_part != 4:
             raise LayoutError
-        if not 0 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 0 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -664,12 +664,12 @@ class NodeStopRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw = _UNPACK_NODE_STOP_REQUEST(body)
-        if length_raw != 4:
+        length_part, node_part = _UNPACK_NODE_STOP_REQUEST(body)
+        if length_part != 4:
             raise LayoutError
-        if not 0 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 0 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -717,12 +717,12 @@ class NodeSyncRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, message.counter = _UNPACK_NODE_SYNC_REQUEST(body)
-        if length_raw != 5:
+        length_part, node_part, message.counter = _UNPACK_NODE_SYNC_REQUEST(body)
+        if length_part != 5:
             raise LayoutError
-        if node_raw != 0:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if node_part != 0:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -792,25 +792,25 @@ class NodeProgramLoadRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         if len(body) == 5:
-            node_raw = body[2]
-            if not 1 <= node_raw <= 16:
-                raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-            return cls(node=node_raw)
+            node_part = body[2]
+            if not 1 <= node_part <= 16:
+                raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+            return cls(node=node_part)
         program_data_count = len(body) - 6
         if not 0 <= program_data_count <= 25:
             raise LayoutError
         message = _new(cls)
         (
-            length_raw,
-            node_raw,
+            length_part,
+            node_part,
             message.counter,
         ) = _UNPACK_NODE_PROGRAM_LOAD_REQUEST(body, 0)
-        if length_raw != len(body) - 1:
+        if length_part != len(body) - 1:
             raise LayoutError
         message.program_data = bytes(body[4 : 4 + program_data_count])
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -859,12 +859,16 @@ class NodeProgramLoadResponse(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, message.counter = _UNPACK_NODE_PROGRAM_LOAD_RESPONSE(body)
-        if length_raw != 5:
+        (
+            length_part,
+            node_part,
+            message.counter,
+        ) = _UNPACK_NODE_PROGRAM_LOAD_RESPONSE(body)
+        if length_part != 5:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -979,16 +983,16 @@ class MotorResponsePollResponse(Message):
             raise LayoutError
         message = _new(cls)
         (
-            length_raw,
-            node_raw,
+            length_part,
+            node_part,
             message.last_completion,
         ) = _UNPACK_MOTOR_RESPONSE_POLL_RESPONSE(body, 0)
-        if length_raw != len(body) - 1:
+        if length_part != len(body) - 1:
             raise LayoutError
         message.motor_data = bytes(body[4 : 4 + motor_data_count])
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1041,13 +1045,13 @@ class MotorRequestRequest(Message):
         if not 1 <= motor_data_count <= 26:
             raise LayoutError
         message = _new(cls)
-        length_raw, node_raw = _UNPACK_MOTOR_REQUEST_REQUEST(body, 0)
-        if length_raw != len(body) - 1:
+        length_part, node_part = _UNPACK_MOTOR_REQUEST_REQUEST(body, 0)
+        if length_part != len(body) - 1:
             raise LayoutError
         message.motor_data = bytes(body[3 : 3 + motor_data_count])
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1135,17 +1139,17 @@ class MotionRequest(Message):
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
-            length_raw,
-            node_raw,
+            length_part,
+            node_part,
             message.counter,
             message.outputs,
             *message.segments,
         ) = _UNPACK_MOTION_REQUEST[len(body)](body)
-        if length_raw != len(body) - 1:
+        if length_part != len(body) - 1:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1226,19 +1230,19 @@ class MotionResponse(Message):
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
-            length_raw,
-            node_raw,
+            length_part,
+            node_part,
             message.counter,
             message.inputs,
             message.position,
             message.motor_status,
             message.fifo_space,
         ) = _UNPACK_MOTION_RESPONSE(body)
-        if length_raw != 13:
+        if length_part != 13:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1301,12 +1305,12 @@ class MotorPositionResponse(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, message.position = _UNPACK_MOTOR_POSITION_RESPONSE(body)
-        if length_raw != 8:
+        length_part, node_part, message.position = _UNPACK_MOTOR_POSITION_RESPONSE(body)
+        if length_part != 8:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1391,15 +1395,15 @@ class PresetMotorPositionRequest(Message):
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
         (
-            length_raw,
-            node_raw,
+            length_part,
+            node_part,
             message.position,
         ) = _UNPACK_PRESET_MOTOR_POSITION_REQUEST(body)
-        if length_raw != 8:
+        if length_part != 8:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1462,12 +1466,12 @@ class ReadRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, size_raw, message.offset = _UNPACK_READ_REQUEST(body)
-        if length_raw != 6:
+        length_part, node_part, size_raw, message.offset = _UNPACK_READ_REQUEST(body)
+        if length_part != 6:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         if not 1 <= size_raw <= 26:
             raise illegal(cls, "size", size_raw, 0, _payload(body))
         message.size = size_raw
@@ -1522,13 +1526,13 @@ class ReadResponse(Message):
         if not 1 <= data_count <= 26:
             raise LayoutError
         message = _new(cls)
-        length_raw, node_raw = _UNPACK_READ_RESPONSE(body, 0)
-        if length_raw != len(body) - 1:
+        length_part, node_part = _UNPACK_READ_RESPONSE(body, 0)
+        if length_part != len(body) - 1:
             raise LayoutError
         message.data = bytes(body[3 : 3 + data_count])
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1582,13 +1586,13 @@ class WriteRequest(Message):
         if not 1 <= data_count <= 25:
             raise LayoutError
         message = _new(cls)
-        length_raw, node_raw, message.offset = _UNPACK_WRITE_REQUEST(body, 0)
-        if length_raw != len(body) - 1:
+        length_part, node_part, message.offset = _UNPACK_WRITE_REQUEST(body, 0)
+        if length_part != len(body) - 1:
             raise LayoutError
         message.data = bytes(body[4 : 4 + data_count])
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1654,12 +1658,12 @@ class WriteReadRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, outputs_raw = _UNPACK_WRITE_READ_REQUEST(body)
-        if length_raw != 7:
+        length_part, node_part, outputs_raw = _UNPACK_WRITE_READ_REQUEST(body)
+        if length_part != 7:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         outputs_raw = int.from_bytes(outputs_raw, "little")
         message.outputs = outputs_raw
         return message
@@ -1713,12 +1717,12 @@ class WriteReadResponse(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, inputs_raw = _UNPACK_WRITE_READ_RESPONSE(body)
-        if length_raw != 7:
+        length_part, node_part, inputs_raw = _UNPACK_WRITE_READ_RESPONSE(body)
+        if length_part != 7:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         inputs_raw = int.from_bytes(inputs_raw, "little")
         message.inputs = inputs_raw
         return message
@@ -1772,12 +1776,12 @@ class SetOutputsRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, mask_raw = _UNPACK_SET_OUTPUTS_REQUEST(body)
-        if length_raw != 7:
+        length_part, node_part, mask_raw = _UNPACK_SET_OUTPUTS_REQUEST(body)
+        if length_part != 7:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         mask_raw = int.from_bytes(mask_raw, "little")
         message.mask = mask_raw
         return message
@@ -1845,12 +1849,12 @@ class ClearOutputsRequest(Message):
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
         message = _new(cls)
-        length_raw, node_raw, mask_raw = _UNPACK_CLEAR_OUTPUTS_REQUEST(body)
-        if length_raw != 7:
+        length_part, node_part, mask_raw = _UNPACK_CLEAR_OUTPUTS_REQUEST(body)
+        if length_part != 7:
             raise LayoutError
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         mask_raw = int.from_bytes(mask_raw, "little")
         message.mask = mask_raw
         return message
@@ -1920,13 +1924,13 @@ class LoopBackRequest(Message):
         if not 1 <= data_count <= 25:
             raise LayoutError
         message = _new(cls)
-        length_raw, node_raw, message.offset = _UNPACK_LOOP_BACK_REQUEST(body, 0)
-        if length_raw != len(body) - 1:
+        length_part, node_part, message.offset = _UNPACK_LOOP_BACK_REQUEST(body, 0)
+        if length_part != len(body) - 1:
             raise LayoutError
         message.data = bytes(body[4 : 4 + data_count])
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 
@@ -1985,13 +1989,13 @@ class LoopBackResponse(Message):
         if not 1 <= data_count <= 25:
             raise LayoutError
         message = _new(cls)
-        length_raw, node_raw, message.offset = _UNPACK_LOOP_BACK_RESPONSE(body, 0)
-        if length_raw != len(body) - 1:
+        length_part, node_part, message.offset = _UNPACK_LOOP_BACK_RESPONSE(body, 0)
+        if length_part != len(body) - 1:
             raise LayoutError
         message.data = bytes(body[4 : 4 + data_count])
-        if not 1 <= node_raw <= 16:
-            raise illegal(cls, "node", node_raw, 4, _PREAMBLE + body)
-        message.node = node_raw
+        if not 1 <= node_part <= 16:
+            raise illegal(cls, "node", node_part, 4, _PREAMBLE + body)
+        message.node = node_part
         return message
 
 

@@ -177,7 +177,7 @@ class Message(BaseMessage):
 # Messages -------------------------------------------------------------------------------
 
 _new = object.__new__
-_VALUE = DecimalScale(-9223372036854775808, 9223372036854775807, divisor=4294967296)
+_SCALE_VALUE = DecimalScale(-9223372036854775808, 9223372036854775807, divisor=4294967296)
 
 
 class CharacterTransfer(Message):
@@ -254,7 +254,7 @@ class DirectVariableTransfer(Message):
     RULES = (
         Whole("address", 1, 15),
         Whole("number", 0, 16383),
-        Scaled("value", _VALUE),
+        Scaled("value", _SCALE_VALUE),
     )
 
     def __init__(
@@ -272,7 +272,7 @@ class DirectVariableTransfer(Message):
         """The payload alone. Raises EncodeError."""
         try:
             number_raw = index(self.number)
-            value_raw = _VALUE.raw(self.value)
+            value_raw = _SCALE_VALUE.raw(self.value)
             if not 0 <= number_raw <= 16383:
                 raise OutOfRange
             return _PACK_DIRECT_VARIABLE_TRANSFER(
@@ -342,7 +342,7 @@ class DirectVariableTransfer(Message):
             | value_raw_9 << 28
         )
         value_raw = (value_raw ^ 0x8000000000000000) - 0x8000000000000000
-        message.value = _VALUE.value(value_raw)
+        message.value = _SCALE_VALUE.value(value_raw)
         return message
 
 

@@ -8,6 +8,7 @@ import jinja2
 
 from qlinkgen.backends.base import Outputs, environment
 from qlinkgen.backends.c.header import Header
+from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import Options, plan_of
 
@@ -16,7 +17,7 @@ __all__ = ["generate"]
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The header of a protocol."""
-    return {f"c/{protocol.name}.h": Header(plan_of(protocol, options), _templates()).text()}
+    return {f"c/{file_stem(protocol.name)}.h": Header(plan_of(protocol, options), _templates()).text()}
 
 
 @functools.cache

@@ -48,14 +48,14 @@ def _view(each: Enum | Flags, names: Names) -> dict[str, Any]:
     section = f" (section {each.section})" if each.section else ""
     doc = f": {each.doc}" if each.doc else ""
     return {
-        "name": each.name,
+        "name": names.constants(each),
         "is_enum": is_enum,
         "type": constant_type(each),
         "title": c_text.comment_line(f"{kind} {each.name}{section}{doc}"),
         "members": [
             {
                 "name": member.name,
-                "constant": f"{names.upper}_{each.name.upper()}_{member.name.upper()}",
+                "constant": f"{names.upper}_{names.constants(each).upper()}_{member.name.upper()}",
                 "value": _number(member, each, signed=signed),
                 "doc": c_text.comment_line(member.doc),
             }

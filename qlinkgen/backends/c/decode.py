@@ -10,6 +10,7 @@ from qlinkgen.backends.c.encode import item_offset, loop
 from qlinkgen.backends.c.extents import Learner, index_of, local, size_text
 from qlinkgen.backends.c.layout import pointer
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
+from qlinkgen.model import naming
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Within
@@ -96,7 +97,7 @@ class Decoder(Learner):
     # Values
 
     def _read(self, step: Step) -> None:
-        target = f"message->{step.name}"
+        target = f"message->{naming.member(step.name)}"
         match step:
             case ValueStep():
                 self._assign(target, step.number, self._get(step.place, step.integer))
@@ -150,7 +151,7 @@ class Decoder(Learner):
         match member:
             case MemberValue():
                 kind = "" if member.number.meaning == "bool" else f"({unsigned_type(member.bits)})"
-                self._assign(f"message->{member.name}", member.number, f"{kind}{raw}")
+                self._assign(f"message->{naming.member(member.name)}", member.number, f"{kind}{raw}")
             case MemberConstant():
                 self.refuse([f"{raw} != {unsigned(member.value, bits, hexadecimal=True)}"], "RANGE")
             case MemberReserved():

@@ -8,24 +8,16 @@ from typing import Any
 from qlinkgen.backends.c.framing import Address, checks
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.message import Message
-from qlinkgen.model.naming import C_RESERVED, snake
+from qlinkgen.model.naming import handler, snake
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Allowance, Bus, Command, Repeat
 from qlinkgen.plan.tree import MessagePlan
-
-#: Members that a table has beside its functions.
-_TAKEN = frozenset({"node", "address", "broadcast", "context", "id"})
-
-
-def member_name(name: str) -> str:
-    """A command's name as a member of a table; a word of C, or one the table uses itself, gets a suffix."""
-    return f"{name}_" if name in C_RESERVED or name in _TAKEN else name
 
 
 def told_name(names: Names, message: Message) -> str:
     """The member for a message that a master or a listener is told of."""
     stem = names.stem(message)
-    return member_name(stem.removesuffix("_response") if message.direction == "response" else stem)
+    return handler(stem.removesuffix("_response") if message.direction == "response" else stem, names.address)
 
 
 def slave_entries(names: Names, kept: tuple[Message, ...]) -> list[dict[str, Any]]:
@@ -44,7 +36,7 @@ def slave_entries(names: Names, kept: tuple[Message, ...]) -> list[dict[str, Any
 def _entry(names: Names, message: Message, answer: Message | None, command: Command | None) -> dict[str, Any]:
     addressing = command.addressing if command else "none"
     return {
-        "name": member_name(snake(command.name) if command else names.stem(message)),
+        "name": handler(snake(command.name) if command else names.stem(message), names.address),
         "constant": names.constant(message),
         "function": names.function(message),
         "has_struct": bool(message.values),

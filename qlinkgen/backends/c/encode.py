@@ -10,6 +10,7 @@ from qlinkgen.backends.c.extents import index_of, local, local_size, size_text
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
 from qlinkgen.model.integer import Integer
+from qlinkgen.model.naming import member as member_of
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Within
 from qlinkgen.plan.payload import (
@@ -73,10 +74,11 @@ class Encoder:
                         self._check_value(member)
             case BytesStep():
                 if step.text:
-                    text = f"{self.layouts.prefix}_is_text_(message->{step.name}, {self._number_of(step)})"
+                    octets = f"message->{member_of(step.name)}"
+                    text = f"{self.layouts.prefix}_is_text_({octets}, {self._number_of(step)})"
                     self._refuse([f"!{text}"], "RANGE")
             case ItemsStep():
-                terms = checks.refused_before_sending(step.number, f"message->{step.name}[index]")
+                terms = checks.refused_before_sending(step.number, f"message->{member_of(step.name)}[index]")
                 refusal = checks.refusal(terms, f"{self.layouts.prefix.upper()}_ERROR_RANGE")
                 self.lines += self._loop(step, refusal) if refusal else []
             case ConstantStep() | ReservedStep() | CountStep():
@@ -85,14 +87,20 @@ class Encoder:
                 assert_never(step)
 
     def _check_value(self, value: ValueStep | MemberValue) -> None:
-        self._refuse(checks.refused_before_sending(value.number, f"message->{value.name}"), "RANGE")
+        self._refuse(
+            checks.refused_before_sending(value.number, f"message->{member_of(value.name)}"), "RANGE"
+        )
 
     # Bytes
 
     def _write(self, step: Step) -> None:
         match step:
             case ValueStep():
-                self._put(step.place, step.integer, checks.as_unsigned(step.number, f"message->{step.name}"))
+                self._put(
+                    step.place,
+                    step.integer,
+                    checks.as_unsigned(step.number, f"message->{member_of(step.name)}"),
+                )
             case ConstantStep() | ReservedStep():
                 pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
                 self._put(step.place, step.integer, pattern)
@@ -103,9 +111,11 @@ class Encoder:
                 self._put(step.place, step.integer, _whole(step))
             case BytesStep():
                 index = index_of(step.place, local_size, "index")
-                self.lines += self._loop(step, [f"payload[{index}] = message->{step.name}[index];"])
+                self.lines += self._loop(
+                    step, [f"payload[{index}] = message->{member_of(step.name)}[index];"]
+                )
             case ItemsStep():
-                item = checks.as_unsigned(step.number, f"message->{step.name}[index]")
+                item = checks.as_unsigned(step.number, f"message->{member_of(step.name)}[index]")
                 index = index_of(step.place, local_size, item_offset(step))
                 self.lines += self._loop(step, [self.layouts.put(step.item, "payload", index, item)])
             case _:
@@ -139,7 +149,9 @@ def _whole(step: BitsStep) -> str:
     for member in step.members:
         match member:
             case MemberValue():
-                terms.append(_in_place(member.number, member.shift, f"message->{member.name}", bits))
+                terms.append(
+                    _in_place(member.number, member.shift, f"message->{member_of(member.name)}", bits)
+                )
             case MemberConstant() | MemberReserved():
                 preset |= member.value << member.shift
             case _:

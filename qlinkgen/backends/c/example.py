@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from qlinkgen.backends.c.dispatch import member_name, told_name
+from qlinkgen.backends.c.dispatch import told_name
 from qlinkgen.backends.c.names import Names
-from qlinkgen.model.naming import snake
+from qlinkgen.model.naming import file_stem, handler, member, snake
 from qlinkgen.model.transaction import Command
 from qlinkgen.plan.payload import MemberValue, ValueStep
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -46,7 +46,7 @@ def example_lines(plan: Plan, names: Names, section: FrameSection) -> list[str]:
         return _slave(names, section, *max(pairs, key=lambda pair: _weight(*pair[1:])))
     responses = [m for m in plan.messages if m.direction != "request" and m.payload.settable]
     if section.slave_only or not responses:
-        return [f'#include "{names.prefix}.h"']
+        return [f'#include "{file_stem(names.prefix)}.h"']
     return _listener(names, section, max(responses, key=lambda m: len(m.payload.settable)), "master")
 
 
@@ -92,7 +92,7 @@ def _slave(
         "{",
         f"    {p}_receiver_init(&receiver{_direction(names, section, 'REQUEST')});",
         *([f"    slave.{address} = 1U;"] if address else []),
-        f"    slave.{member_name(name)} = on_{name};",
+        f"    slave.{handler(name, names.address)} = on_{name};",
         "}",
     ]
 
@@ -127,7 +127,7 @@ def _listener(names: Names, section: FrameSection, message: MessagePlan, role: s
 
 
 def _start(prefix: str) -> list[str]:
-    return [f'#include "{prefix}.h"', "", f"static {prefix}_receiver_t receiver;"]
+    return [f'#include "{file_stem(prefix)}.h"', "", f"static {prefix}_receiver_t receiver;"]
 
 
 def _direction(names: Names, section: FrameSection, direction: str) -> str:
@@ -138,9 +138,9 @@ def _echo(request: MessagePlan, response: MessagePlan) -> list[str]:
     """What both have is returned; that shows how fields are reached."""
     asked, told = _numbers(request), _numbers(response)
     if same := [name for name in told if name in asked]:
-        return [f"    response->{name} = request->{name};" for name in same]
+        return [f"    response->{member(name)} = request->{member(name)};" for name in same]
     if told:
-        return [f"    response->{told[0]} = 1;"]
+        return [f"    response->{member(told[0])} = 1;"]
     return ["    (void)response;"] if response.payload.settable else []
 
 

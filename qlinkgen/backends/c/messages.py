@@ -12,6 +12,7 @@ from qlinkgen.backends.c.framing import struct_parameter
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Types
+from qlinkgen.model import naming
 from qlinkgen.plan.payload import BytesStep, ItemsStep, MemberValue, RunStep, ValueStep
 from qlinkgen.plan.tree import MessagePlan
 
@@ -105,9 +106,8 @@ class MessageWriter:
         for each in plan.payload.settable:
             match each:
                 case ValueStep() | MemberValue():
-                    lines.append(
-                        f"message->{each.name} = {scalar_literal(each.number, each.number.default)};"
-                    )
+                    default = scalar_literal(each.number, each.number.default)
+                    lines.append(f"message->{naming.member(each.name)} = {default};")
                 case BytesStep() | ItemsStep() if each.fixed or each.default:
                     kind = self._names.function(plan.message)
                     return [f"const {kind}_t defaults = {kind.upper()}_INIT;", "*message = defaults;"]
@@ -127,7 +127,7 @@ class MessageWriter:
     def _members(self, each: Settable, note: str) -> list[Member]:
         match each:
             case ValueStep() | MemberValue():
-                return [Member(f"{self._types.of(each.number)} {each.name};", note)]
+                return [Member(f"{self._types.of(each.number)} {naming.member(each.name)};", note)]
             case BytesStep():
                 return _run_members(each, "uint8_t", "bytes", note)
             case ItemsStep():
@@ -139,7 +139,7 @@ class MessageWriter:
 def _run_members(run: RunStep, item: str, what: str, note: str) -> list[Member]:
     most = run.length.maximum
     number = Member(f"{count_type(most)} {run.name}_{run.quantity};", f"{what} in {run.name}")
-    return [*([] if run.fixed else [number]), Member(f"{item} {run.name}[{most}];", note)]
+    return [*([] if run.fixed else [number]), Member(f"{item} {naming.member(run.name)}[{most}];", note)]
 
 
 def _initialiser(each: Settable) -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from qlinkgen.model.message import Message
-from qlinkgen.model.naming import GENERATED_NAMES, snake
+from qlinkgen.model.naming import address_member, snake, stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Enum, Flags, Scalar
 
 _WIDTHS = (8, 16, 32, 64)
 
@@ -76,7 +76,11 @@ class Names:
         """Note which names are taken by enums and flags."""
         self.prefix = protocol.name
         self.upper = protocol.name.upper()
-        self._taken = {each.name for each in protocol.enums} | {each.name for each in protocol.flags}
+        self.address = address_member(protocol.address_name or "")
+        self._constants = {
+            **{each.name: stem(self.prefix, each.name, "enum") for each in protocol.enums},
+            **{each.name: stem(self.prefix, each.name, "flags") for each in protocol.flags},
+        }
         self._messages = protocol.messages
         self._commands = {
             message.name: command
@@ -87,10 +91,11 @@ class Names:
 
     def type_stem(self, name: str) -> str:
         """A named type as part of a name; one called like something else in the header gets a suffix."""
-        taken = {*GENERATED_NAMES, *self._taken, "direction", "listener"}
+        name = stem(self.prefix, name, "type")
+        taken = {*self._constants.values()}
         for message in self._messages:
-            stem = self.stem(message)
-            taken |= {stem, *(f"{stem}_{value.name}" for value in message.values)}
+            own = self.stem(message)
+            taken |= {own, *(f"{own}_{value.name}" for value in message.values)}
         while name in taken:
             name += "_type"
         return name
@@ -101,8 +106,12 @@ class Names:
 
     def stem(self, message: Message) -> str:
         """``motion.request`` as part of a name; a message called like an enum gets a suffix."""
-        name = snake(message.name)
-        return f"{name}_message" if name in self._taken else name
+        name = stem(self.prefix, snake(message.name), "message")
+        return f"{name}_message" if name in self._constants else name
+
+    def constants(self, each: Enum | Flags) -> str:
+        """An enum or flags as part of a name; one called like something else in the header gets a suffix."""
+        return self._constants[each.name]
 
     def function(self, message: Message) -> str:
         """What a message's functions and its struct begin with."""

@@ -8,6 +8,7 @@ from typing import assert_never
 
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import grouped, unsigned, unsigned_type
+from qlinkgen.model.naming import address_member
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -23,11 +24,6 @@ from qlinkgen.plan.framing import (
     Rescan,
 )
 from qlinkgen.plan.transparency import FrameStuffing
-
-#: Names that the generated functions use themselves.
-_LOCAL_NAMES = frozenset(
-    "size payload wire capacity message value from to end check since index sent status".split()  # noqa: SIM905
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +50,10 @@ class Sender:
 def sender_of(frame: FramePlan) -> Sender:
     """The names are "id", and that of the address; one that is taken gives way."""
     id_part, address_part = frame.envelope.id, frame.envelope.address
-    address = f"{frame.address}_" if frame.address in _LOCAL_NAMES else frame.address
+    address = address_member(frame.address)
     address_type = unsigned_type(address_part.integer.bits if address_part else 8)
     return Sender(
-        frame.id_name if address == "id" else "id",
+        address_member(frame.id_name) if address == "id" else "id",
         unsigned_type(id_part.integer.bits if id_part else 8),
         address,
         address_type if address else "",

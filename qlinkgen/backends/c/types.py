@@ -88,7 +88,11 @@ class Types:
         """The C type of a struct member."""
         plain, meaning = scalar_type(number), number.meaning
         if isinstance(meaning, Enum | Flags):
-            return f"{self._names.prefix}_{meaning.name}_t" if plain == constant_type(meaning) else plain
+            return (
+                f"{self._names.prefix}_{self._names.constants(meaning)}_t"
+                if plain == constant_type(meaning)
+                else plain
+            )
         kind = self.named.get(number.type_name)
         return kind.type if kind and kind.plain == plain else plain
 

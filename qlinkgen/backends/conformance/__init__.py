@@ -14,6 +14,7 @@ import jinja2
 from qlinkgen.backends.base import Options, Outputs, environment
 from qlinkgen.backends.conformance.kit import Kit
 from qlinkgen.backends.conformance.sources import Header, Sources
+from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
 
@@ -23,7 +24,7 @@ __all__ = ["Header", "Sources", "generate"]
 def generate(protocol: Protocol, options: Options, sources: Sources) -> Outputs:
     """The kit of a protocol: path below the output folder to text."""
     text = _template().render(Kit(plan_of(protocol, options), sources).view())
-    return {f"conformance/{protocol.name}_conformance.c": text}
+    return {f"conformance/{file_stem(protocol.name)}_conformance.c": text}
 
 
 @functools.cache

@@ -12,6 +12,7 @@ from qlinkgen.backends.conformance.rows import Right, kinds_in, most_values, row
 from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm
+from qlinkgen.model.naming import file_stem
 from qlinkgen.plan import Plan
 from qlinkgen.plan.framing import Marks, Rescan
 
@@ -39,6 +40,7 @@ class Kit:
         return {
             "about": [piece for line in banner(self._plan.protocol) for piece in wrapped(line)],
             "p": header.prefix,
+            "header": file_stem(header.prefix),
             "P": header.upper,
             **{name: getattr(header, name) for name in _HABITS},
             "address_type": f"uint{header.address_bits}_t",

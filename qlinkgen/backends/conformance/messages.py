@@ -11,6 +11,7 @@ from qlinkgen.backends.conformance.rows import Right, Row, Wrong
 from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.backends.conformance.streams import INTACT, Stream
 from qlinkgen.backends.conformance.unsent import Unsent, unsent
+from qlinkgen.model import naming
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan import MessagePlan, Plan
@@ -73,7 +74,7 @@ class Entries:
         view = {
             "number": self._numbers[message.name],
             "name": message.name,
-            "stem": header.stem(message),
+            "stem": naming.member(header.stem(message)),
             "function": header.function(message),
             "constant": header.constant(message),
             "has_struct": bool(message.values),
@@ -118,7 +119,7 @@ class Entries:
             if answer:
                 view["answer"] = {
                     "number": self._numbers[answer.name],
-                    "stem": header.stem(answer),
+                    "stem": naming.member(header.stem(answer)),
                     "function": header.function(answer),
                     "has_struct": bool(answer.values),
                 }
@@ -141,12 +142,13 @@ class Entries:
     def _members(self, message: Message, value: Value) -> list[str]:
         """Members of the struct in the order of the vectors' values."""
         kind, struct = value.type, f"{self._header.function(message)}_t"
+        name = naming.member(value.name)
         if isinstance(kind, Scalar):
-            return [f"NUMBER({struct}, {value.name}),"]
+            return [f"NUMBER({struct}, {name}),"]
         if kind.length.fixed:
-            return [f"ITEMS({struct}, {value.name}),"]
+            return [f"ITEMS({struct}, {name}),"]
         count = self._header.count_member(value.field)
-        return [f"NUMBER({struct}, {count}),", f"COUNTED({struct}, {value.name}),"]
+        return [f"NUMBER({struct}, {count}),", f"COUNTED({struct}, {name}),"]
 
     # Rows
 

@@ -14,6 +14,7 @@ from qlinkgen.backends.base import Options, Outputs, banner, copied
 from qlinkgen.backends.construct.live import Live, live
 from qlinkgen.backends.construct.module import definitions
 from qlinkgen.backends.construct.tree import WIDTH, Definition, printed, used
+from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
 
@@ -45,7 +46,7 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     shared = {name: folder.joinpath(f"{name}.py").read_text("utf-8") for name in _SUPPORT}
     shared["__init__"] = _PACKAGE_DOC
     beside = {f"{FOLDER}/{name}.py": copied(f"{name}.py", each) for name, each in shared.items()}
-    return {f"{FOLDER}/{protocol.name}.py": text, **beside}
+    return {f"{FOLDER}/{file_stem(protocol.name)}.py": text, **beside}
 
 
 def _head(protocol: Protocol) -> str:

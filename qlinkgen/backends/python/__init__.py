@@ -12,6 +12,7 @@ from qlinkgen.backends.base import Outputs, copied
 from qlinkgen.backends.python._support import BaseMessage, Rule
 from qlinkgen.backends.python.module import render
 from qlinkgen.model.message import Value
+from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Scalar
 from qlinkgen.plan import Options, plan_of
@@ -30,7 +31,7 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     """The module of a protocol and the package around it, by path."""
     support = importlib.resources.files(__package__).joinpath("_support.py").read_text("utf-8")
     return {
-        f"{options.package}/{protocol.name}.py": render(plan_of(protocol, options)),
+        f"{options.package}/{file_stem(protocol.name)}.py": render(plan_of(protocol, options)),
         f"{options.package}/_support.py": copied("_support.py", support),
         **package(options),
     }

@@ -6,7 +6,6 @@ how a request is sent; the module knows no port, clock or thread.
 
 from __future__ import annotations
 
-import keyword
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from qlinkgen.backends.python.layout import WIDTH, wrapped
 from qlinkgen.backends.python.module import templates
 from qlinkgen.backends.python.names import attribute, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
+from qlinkgen.model.naming import file_stem, method
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Command
@@ -27,8 +27,6 @@ from qlinkgen.plan.payload import MemberValue, ValueStep
 
 __all__ = ["generate", "render"]
 
-#: Names in the classes that no command can have: what they have themselves, and types of arguments.
-_TAKEN = ("ask", "tell", "handle", "number", "axis", "bytes", "list", "str")
 #: Attribute of the commands of a host that says on which axis they act, and those of its values for which the
 #: axis has to be chosen: where it is not known, a host is on the safe side with the one that it means.
 _AXIS = "axis"
@@ -103,8 +101,7 @@ class Transaction:
     @property
     def name(self) -> str:
         """Name of the method: the command's own, or with an underscore where that means something else."""
-        name = self.command.name
-        return f"{name}_" if name in _TAKEN or keyword.iskeyword(name) else name
+        return method(self.command.name)
 
 
 class BusModule:
@@ -133,7 +130,10 @@ class BusModule:
             "doc": python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines]),
             "table": [f'{self._class(t.request)}: "{t.name}"' for t in self._transactions],
             "imports": wrapped(
-                f"from .{self._protocol.name} import (", sorted(self._classes, key=imported), ")", 0
+                f"from .{file_stem(self._protocol.name)} import (",
+                sorted(self._classes, key=imported),
+                ")",
+                0,
             ),
             "decimals": "Decimal" in self._place.used,
             "public": sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),
@@ -254,8 +254,10 @@ class BusModule:
 
     def _host_callers(self, *, asynchronous: bool) -> list[Caller]:
         on_axis = [each for each in self._transactions if _axis_of(each.command) in _CHOSEN]
-        fields = {each.name for call in on_axis for each in call.request.payload.settable}
-        axis = ("axis_" if "axis" in fields else "axis") if on_axis else ""
+        fields = {attribute(each.name) for call in on_axis for each in call.request.payload.settable}
+        axis = "axis" if on_axis else ""
+        while axis in fields:
+            axis += "_"
         host = self._host_caller("HostCalls", self._transactions, axis, asynchronous=asynchronous, one=False)
         if not axis:
             return [host]

@@ -199,7 +199,7 @@ class ClassBuilder:
 
     def _scale(self, field_name: str, number: Scalar) -> str:
         call = values.scale_arguments(number, self._place)
-        base = f"_{(number.type_name or field_name).upper()}"
+        base = f"_SCALE_{(number.type_name or field_name).upper()}"
         name, count = base, 2
         while self._scales.get(name, call) != call:
             name, count = f"{base}_{count}", count + 1

@@ -132,7 +132,7 @@ class Decoder:
         test = f"len({place.data}) == {place.overhead}" if place.overhead else f"not {place.data}"
         lines: list[str] = []
         if place.envelope and (address := place.envelope.address):
-            raw = f"{address.name}_raw"
+            raw = f"{address.name}_part"
             at = place.envelope.offset(address) - place.skipped
             lines = [f"{raw} = {integers.read(address.integer, place.data, lambda more: str(at + more))}"]
             lines += self._address_check(address, raw, _INDENT + 4)
@@ -148,13 +148,13 @@ class Decoder:
     def _part(self, part: Part, at: Size) -> None:
         match part:
             case AddressPart():
-                number = self._get(part.integer, f"{part.name}_raw", at)
+                number = self._get(part.integer, f"{part.name}_part", at)
                 self._put_together(part.integer, number)
                 self._values += self._address_check(part, number, _INDENT)
                 self._values.append(f"message.{self.place.address} = {number}")
             case LengthPart() if self.place.unique:
                 # The receiver relies on it, so nothing but this compares the length with the size.
-                number = self._size(part.integer, f"{part.name}_raw", at)
+                number = self._size(part.integer, f"{part.name}_part", at)
                 self._sizes += [f"if {number} != {self._length(part)}:", self._bad_layout]
             case LengthPart() | IdPart() | ConstantPart():
                 self._row(at).codes.append(f"{part.size}x")

@@ -8,10 +8,11 @@ from typing import assert_never
 
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
-from qlinkgen.backends.python.names import attribute, class_name
+from qlinkgen.backends.python.names import class_name
 from qlinkgen.model.checksum import Algorithm, Sum
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.message import Direction
+from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -319,11 +320,10 @@ def _address_view(plan: Plan) -> AddressView | None:
     if not plan.frame.address:
         return None
     part = plan.frame.envelope.address
-    name = attribute(plan.frame.address)
     nodes = plan.protocol.bus.nodes
     return AddressView(
-        name=name,
-        parameter="address" if name in ("payload", "cls", "data", "head", "len", "bytes", "frame") else name,
+        name=address_attribute(plan.frame.address),
+        parameter=address_argument(plan.frame.address),
         bytes=integers.to_bytes(part.integer, "number") if part else "",
         default=nodes[0] if nodes else 0,
     )

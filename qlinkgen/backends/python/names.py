@@ -6,48 +6,31 @@ Whatever is private in a class begins with an underscore, which no name of a sch
 
 from __future__ import annotations
 
-import builtins
-import keyword
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
-from qlinkgen.model.naming import pascal
+from qlinkgen.model import naming
 from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.tree import MessagePlan, Plan
 
-#: Attributes of every message, and what its methods call it.
-_METHODS = frozenset({"to_frame", "to_bytes", "from_bytes", "from_checked", "measure_payload", "self", "cls"})
-#: Names that a module has for itself.
-_TAKEN = frozenset(
-    """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError Codec
-    Bus OpenEnum BaseMessage Constant Count DecimalScale Items Mask Octets OutOfRange Scale Text Whole Marking
-    Struct Decimal Self Any Callable BytesLike ClassVar Final Literal LayoutError Checksum""".split()  # noqa: SIM905
-)
-
-
-def attribute(name: str) -> str:
-    """The attribute of a field: its name, with an underscore where that has another meaning."""
-    return f"{name}_" if keyword.iskeyword(name) or name in _METHODS else name
+#: The attribute of a field.
+attribute = naming.attribute
 
 
 def class_name(message: MessagePlan) -> str:
     """Name of a message's class."""
-    name = pascal(message.name)
-    return f"{name}_" if name in _TAKEN or name in dir(builtins) else name
+    return naming.message_class(message.name)
 
 
 def constant_classes(plan: Plan) -> Mapping[str, str]:
     """Class of each enum and flags; one whose name a message has is told apart by what it is."""
-    messages = {class_name(message) for message in plan.messages}
+    messages = frozenset(class_name(message) for message in plan.messages)
     groups: list[Enum | Flags] = [*plan.protocol.enums, *plan.protocol.flags]
-    return {each.name: _constant_class(each, messages) for each in groups}
+    return {each.name: naming.constant_class(each.name, _kind(each), messages) for each in groups}
 
 
-def _constant_class(each: Enum | Flags, messages: Iterable[str]) -> str:
-    name = pascal(each.name)
-    if name in messages or name in _TAKEN or name in dir(builtins):
-        return f"{name}{'Enum' if isinstance(each, Enum) else 'Flags'}"
-    return name
+def _kind(each: Enum | Flags) -> str:
+    return "enum" if isinstance(each, Enum) else "flags"
 
 
 def constant_name(name: str) -> str:

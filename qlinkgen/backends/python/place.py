@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.backends.python.names import attribute, constant_classes
+from qlinkgen.backends.python.names import constant_classes
 from qlinkgen.model.integer import ByteOrder
+from qlinkgen.model.naming import address_attribute
 from qlinkgen.plan.framing import CheckPart, Envelope, Hunt, InStep, Marks, Part, Rescan
 from qlinkgen.plan.tree import Plan
 
@@ -102,7 +103,7 @@ def place_of(plan: Plan) -> Place:
         byteorder=plan.protocol.byteorder,
         classes=constant_classes(plan),
         envelope=envelope,
-        address=attribute(plan.frame.address) if plan.frame.address else "",
+        address=address_attribute(plan.frame.address) if plan.frame.address else "",
         unique=unique,
         texts=plan.protocol.texts,
     )
