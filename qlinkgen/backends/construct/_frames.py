@@ -222,6 +222,8 @@ class Frame(Construct):
         *,
         address: str = "",
         stuffing: Stuffing | None = None,
+        hunt: bool = False,
+        bare: bool = False,
     ) -> None:
         super().__init__()
         self.parts = parts
@@ -229,6 +231,8 @@ class Frame(Construct):
         self.by_id = {message.id: message for message in self.by_name.values()}
         self.address = address
         self.stuffing = stuffing
+        self.hunt = hunt
+        self.bare = bare
         self.payload = next(part for part in parts if isinstance(part, Payload))
         self.check = next((part for part in parts if isinstance(part, Check)), None)
 
@@ -294,20 +298,24 @@ class Frame(Construct):
     def _frame(self, wire: bytes, request: bytes) -> Any:
         raise NotImplementedError
 
+    def _known(self, number: int) -> Message:
+        if number not in self.by_id:
+            raise FrameError("unknown", f"no message has the id {number:#04x}")
+        return self.by_id[number]
+
     def _judged(
         self, cells: Mapping[str, bytes], number: int, payload: bytes, address: int = 0, request: bytes = b""
     ) -> Any:
         """The message of a frame in cells: check value, message, sizes, values, address."""
-        message = self.by_id.get(number)
-        if self.check and (message is None or message.checksum):
+        found = self.by_id.get(number)
+        if self.check and (found is None or found.checksum):
             sent, expected = cells[self.check.name], self.check.value(cells, request)
             if sent != expected:
                 rejected = self.check.rejected
                 refused = rejected is not None and sent == self.check.packed(rejected)
                 kind = "illegal" if refused else "crc"
                 raise FrameError(kind, f"{sent.hex()} was sent, {expected.hex()} expected")
-        if message is None:
-            raise FrameError("unknown", f"no message has the id {number:#04x}")
+        message = self._known(number)
         try:
             fields = message.parse(payload)
         except RangeError as error:
@@ -385,20 +393,6 @@ class DelimitedFrame(Frame):
     address that is not known shows first.
     """
 
-    def __init__(
-        self,
-        parts: Sequence[Part],
-        messages: Iterable[Message],
-        *,
-        address: str = "",
-        stuffing: Stuffing | None = None,
-        hunt: bool = False,
-        bare: bool = False,
-    ) -> None:
-        super().__init__(parts, messages, address=address, stuffing=stuffing)
-        self.hunt = hunt
-        self.bare = bare
-
     def _frame(self, wire: bytes, request: bytes) -> Any:
         source = _Wire(wire, self.stuffing, hunt=self.hunt)
         cells: dict[str, bytes] = {}
@@ -433,11 +427,6 @@ class DelimitedFrame(Frame):
             message = self._known(numbers[Id])
             if Address in numbers and not _allowed(message, numbers[Address]):
                 raise FrameError("range", f"{message.name} is never sent to {numbers[Address]}")
-
-    def _known(self, number: int) -> Message:
-        if number not in self.by_id:
-            raise FrameError("unknown", f"no message has the id {number:#04x}")
-        return self.by_id[number]
 
     def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
         numbers[Payload] = 0
@@ -496,9 +485,7 @@ class Packet(Frame):
         if not has_id and not request:
             raise FrameError("unknown", "an answer needs its request: pass request=packet to build and parse")
         first = (wire if has_id else request)[0]
-        message = self.by_id.get(first)
-        if message is None:
-            raise FrameError("unknown", f"no message has the id {first:#04x}")
+        message = self._known(first)
         beside = self.overhead(message)
         least = 0 if message.empty_is_default else message.least
         if len(wire) < least + beside:
