@@ -8,7 +8,7 @@ import sys
 from typing import Any
 
 import pytest
-from construct import ConstructError
+from construct import ConstructError, Enum, FlagsEnum
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -60,13 +60,15 @@ def test_source_is_made_without_construct() -> None:
 def test_named_constants_and_tables_are_there() -> None:
     names = cases.reference("qlink").names
     assert names["MESSAGES"]["motion.request"] is names["MOTION_REQUEST"]
-    assert names["POSITION_TYPE"] == {"none": 0, "jvl_mactalk": 1, "metronix": 2}
-    assert names["MOTOR_STATUS"] == {"running": 1, "position_valid": 2}
+    assert isinstance(names["POSITION_TYPE"], Enum)
+    assert names["POSITION_TYPE"].encmapping == {"none": 0, "jvl_mactalk": 1, "metronix": 2}
+    assert isinstance(names["MOTOR_STATUS"], FlagsEnum)
+    assert names["MOTOR_STATUS"].flags == {"running": 1, "position_valid": 2}
 
 
 def test_a_message_named_like_an_enum_gives_way() -> None:
     names = cases.reference("trio").names
-    assert names["KEYPAD_MODE"] == {"on_only": 0, "on_off": 127}
+    assert names["KEYPAD_MODE"].encmapping == {"on_only": 0, "on_off": 127}
     assert names["KEYPAD_MODE_MESSAGE"].name == "keypad_mode"
 
 

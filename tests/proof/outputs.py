@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from construct import ConstructError
+from construct import ConstructError, Container, EnumInteger, EnumIntegerString
 
 from qlinkgen.backends import construct
 from qlinkgen.backends.base import Options
@@ -64,6 +64,12 @@ class Output(typing.Protocol):
         ...
 
 
+def plain_numbers(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that construct gives, labels and flags as the numbers that other outputs have."""
+    named = EnumIntegerString | EnumInteger | Container
+    return {name: int(value) if isinstance(value, named) else value for name, value in fields.items()}
+
+
 class ConstructOutput:
     """Construct structures, live or from their source."""
 
@@ -88,11 +94,12 @@ class ConstructOutput:
             found = self._live.parse(self._direction(message.direction), wire, request)
         except ConstructError as error:
             raise Refused(getattr(error, "kind", ""), str(error)) from None
-        return Decoded(found["message"], found.get(self._address_name, 0), found["fields"])
+        fields = plain_numbers(found["fields"])
+        return Decoded(found["message"], found.get(self._address_name, 0), fields)
 
     def decode_payload(self, message: Message, payload: bytes) -> Mapping[str, Any]:
         try:
-            return self._live.messages[message.name].parse(payload)  # type: ignore[no-any-return]
+            return plain_numbers(self._live.messages[message.name].parse(payload))
         except ConstructError as error:
             raise Refused("", str(error)) from None
 

@@ -6,13 +6,13 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from decimal import Decimal
 
-from construct import Default
+from construct import Default, Enum
 
 from ._fields import Characters, Groups, Message, Ranged, Scaled
-from ._frames import CRC, Check, MarkedFrame, messages_of
+from ._frames import CRC, Check, Mark, MarkedFrame, Payload, messages_of
 
 # What a keypad sends for a key. (Message types)
-KEYPAD_MODE = {"on_only": 0, "on_off": 127}
+KEYPAD_MODE = Enum(Groups((0, 7)), on_only=0, on_off=127)
 
 # Characters for a node: printed text, or a key press of a keypad. (Message types)
 CHARACTER_TRANSFER = Message(
@@ -66,7 +66,7 @@ KEYPAD_OFFSET = Message(
 KEYPAD_MODE_MESSAGE = Message(
     "keypad_mode",
     0x04,
-    "mode" / Default(Groups((0, 7)), 0),  # keypad_mode: Key down alone or key down and up
+    "mode" / Default(KEYPAD_MODE, 0),  # Key down alone or key down and up
     addresses=[(1, 15)],
     checksum=False,
 )
@@ -74,14 +74,18 @@ KEYPAD_MODE_MESSAGE = Message(
 # crc-16/ibm-3740
 ALGORITHM = CRC(width=16, poly=0x1021, init=0xFFFF, refin=False, refout=False, xorout=0x0000)
 
+# (Message format)
+LAYOUT = [
+    Mark("header", marker=0x80, address=(3, 4), id=(0, 3)),
+    Payload("payload", 256),
+    Check("checksum", ALGORITHM, Groups((0, 7), (8, 7)), 0x7F7F, ["payload"]),
+    Mark("end", marker=0x80, address=(3, 4), id=(0, 3), end=0),
+]
+
 FRAME = MarkedFrame(
+    LAYOUT,
     [CHARACTER_TRANSFER, DIRECT_VARIABLE_TRANSFER, KEYPAD_OFFSET, KEYPAD_MODE_MESSAGE],
-    address_name="address",
-    marker=0x80,
-    address_bits=(3, 4),
-    id_bits=(0, 3),
-    end=0,
-    check=Check(ALGORITHM, Groups((0, 7), (8, 7)), 0x7F7F),
+    address="address",
 )
 
 # Payloads by full name.

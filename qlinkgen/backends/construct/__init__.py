@@ -10,13 +10,14 @@ import importlib.resources
 import re
 
 from qlinkgen.backends import python_text
-from qlinkgen.backends.base import Options, Outputs, banner, copied
+from qlinkgen.backends.base import Outputs, banner, copied
 from qlinkgen.backends.construct.live import Live, live
 from qlinkgen.backends.construct.module import definitions
 from qlinkgen.backends.construct.tree import WIDTH, Definition, printed, used
 from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.texts import one_line
+from qlinkgen.plan import Options, plan_of
 
 __all__ = ["Live", "generate", "live"]
 
@@ -29,9 +30,10 @@ _PACKAGE_DOC = '''\
 
 #: Modules that stand beside every generated one, and what a tree uses of them; all else is construct's own.
 _SUPPORT = {
-    "_fields": "BitFields Bits Boolean Characters Count Flagged Groups Items Message Octets Ranged Scaled",
-    "_frames": "CRC Check DelimitedFrame Layout MarkedFrame Part RequestPacket ResponsePacket Stuffing Sum "
-    "messages_of",
+    "_fields": "BitFields Bits Boolean Characters Clear Count Groups Items Member Message Octets Ranged "
+    "Scaled Whole like",
+    "_frames": "CRC Address Check Constant DelimitedFrame Id Length Mark MarkedFrame Packet Payload Stuffing "
+    "Sum messages_of",
 }
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
@@ -40,7 +42,7 @@ _ORIGINS = {"Decimal": "decimal"} | {
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The module of a protocol and those beside it: path below the output folder to text."""
-    everything = definitions(protocol, options)
+    everything = definitions(plan_of(protocol, options))
     text = "".join([_head(protocol), _imports(everything), *map(printed, everything)])
     folder = importlib.resources.files(__name__)
     shared = {name: folder.joinpath(f"{name}.py").read_text("utf-8") for name in _SUPPORT}

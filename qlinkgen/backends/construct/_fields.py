@@ -1,34 +1,30 @@
 """Payloads: what a described protocol needs beside construct's own classes.
 
-A Message is made of integers, which are construct's own or Groups, dressed in Ranged, Flagged, Boolean and
-Scaled; of BitFields, whose fields are Bits; of Items, Octets and Characters, whose number a Count may carry.
-Construct's Default, Const and Rebuild say what is sent when nothing is given. All errors are ConstructErrors.
+A Message consists of integers, which are construct's own or Groups, wrapped in Ranged, Clear, Boolean, Scaled
+and Whole; of BitFields, whose fields are Bits; of Items, Octets and Characters, counted by a Count or not.
+Construct's Enum and FlagsEnum name numbers and bits; its Default, Const and Rebuild say what is sent when
+nothing is given. All errors are ConstructErrors.
 """
 
 # ruff: noqa: ARG002, SLF001  # construct gives every method the same arguments, and calls its parts by _name
 
 from __future__ import annotations
 
-import io
-import math
-from collections.abc import Iterable, Mapping, Sequence
+import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 from construct import (
     Adapter,
-    Const,
     Construct,
     Container,
     Default,
     IntegerError,
     RangeError,
-    Rebuild,
-    StreamError,
     StringError,
-    Struct,
-    Terminated,
+    Subconstruct,
     ValidationError,
     stream_read,
     stream_read_entire,
@@ -50,13 +46,18 @@ class Groups(Construct):
         self.bits = max(shift + bits for shift, bits in chunks)
         self.signed = signed
 
+    def number(self, data: bytes) -> int:
+        """The integer in these bytes; bits outside of the groups are ignored."""
+        pairs = zip(data, self.chunks, strict=True)
+        value = sum((byte & (1 << bits) - 1) << shift for byte, (shift, bits) in pairs)
+        return _signed(value, self.bits) if self.signed else value
+
     def _parse(self, stream: Any, context: Any, path: Any) -> int:
-        value = 0
-        for byte, (shift, bits) in zip(stream_read(stream, len(self.chunks), path), self.chunks, strict=True):
+        data = stream_read(stream, len(self.chunks), path)
+        for byte, (_, bits) in zip(data, self.chunks, strict=True):
             if byte >> bits:
                 raise ValidationError(f"byte {byte:#04x} has more than {bits} bits set", path=path)
-            value |= byte << shift
-        return _signed(value, self.bits) if self.signed else value
+        return self.number(data)
 
     def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
         value = _unsigned(obj, self.bits, self.signed, path)
@@ -79,7 +80,7 @@ class Bits(Construct):
 
     def _parse(self, stream: Any, context: Any, path: Any) -> int:
         value = context.bits >> self.first & (1 << self.bits) - 1
-        return _signed(value, self.bits) if self.signed else int(value)
+        return int(_signed(value, self.bits) if self.signed else value)
 
     def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
         context.bits |= _unsigned(obj, self.bits, self.signed, path) << self.first
@@ -96,12 +97,13 @@ class BitFields(Construct):
 
     def _parse(self, stream: Any, context: Any, path: Any) -> Any:
         inner = Container(bits=self.integer._parsereport(stream, context, path))
-        return Container({field.name: field._parsereport(stream, inner, path) for field in self.fields})
+        found = [(field, field._parsereport(stream, inner, path)) for field in self.fields]
+        return Container({field.name: value for field, value in found if isinstance(field.subcon, Default)})
 
     def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
         inner = Container(bits=0)
         for field in self.fields:
-            field._build(obj[field.name], stream, inner, path)
+            field._build(obj.get(field.name), stream, inner, path)
         self.integer._build(inner.bits, stream, context, path)
         return obj
 
@@ -136,16 +138,16 @@ class Ranged(Adapter):
     _encode = _decode
 
 
-class Flagged(Adapter):
-    """Bits of which only those of the mask may be set."""
+class Clear(Adapter):
+    """Bits of which none of the mask may be set."""
 
     def __init__(self, subcon: Any, mask: int) -> None:
         super().__init__(subcon)
         self.mask = mask
 
     def _decode(self, obj: Any, context: Any, path: Any) -> Any:
-        if not isinstance(obj, int) or obj & ~self.mask:
-            raise ValidationError(f"{obj!r} has bits outside of {self.mask:#x}", path=path)
+        if not isinstance(obj, int) or obj & self.mask:
+            raise ValidationError(f"{obj!r} has bits of {self.mask:#x}", path=path)
         return obj
 
     _encode = _decode
@@ -157,8 +159,47 @@ class Boolean(Adapter):
     def _decode(self, obj: Any, context: Any, path: Any) -> bool:
         return bool(obj)
 
+    def _encode(self, obj: Any, context: Any, path: Any) -> Any:
+        return obj
+
+
+class Member(NamedTuple):
+    """A name of an Enum or FlagsEnum that cannot be a keyword argument."""
+
+    name: str
+    value: int
+
+
+def like(named: Any, subcon: Any) -> Any:
+    """The Enum or FlagsEnum with another integer."""
+    other = copy.copy(named)
+    other.subcon = subcon
+    return other
+
+
+class Flags(Container):
+    """Flags by name; `int` gives the whole number, with the bits that have no name."""
+
+    def __int__(self) -> int:
+        named = sum(bit for name, bit in self["_bits"].items() if self[name])
+        return int(self["_rest"] | named)
+
+
+class Whole(Adapter):
+    """A FlagsEnum that keeps bits without a name: it is parsed to Flags."""
+
+    def __init__(self, named: Any) -> None:
+        super().__init__(named.subcon)
+        self.named = named
+
+    def _decode(self, obj: int, context: Any, path: Any) -> Flags:
+        bits = self.named.flags
+        hidden = {"_flagsenum": True, "_bits": bits, "_rest": obj & ~sum(bits.values())}
+        return Flags({name: bool(obj & bit) for name, bit in bits.items()} | hidden)
+
     def _encode(self, obj: Any, context: Any, path: Any) -> int:
-        return int(obj)
+        rest = obj.get("_rest", 0) if isinstance(obj, Mapping) else 0
+        return int(self.named._encode(obj, context, path)) | int(rest)
 
 
 class Scaled(Adapter):
@@ -193,7 +234,7 @@ class Scaled(Adapter):
 # Items in a row
 
 
-class Count(Adapter):
+class Count(Subconstruct):
     """How many items the field ``of`` has; ``step`` is the size of an item where bytes are counted."""
 
     def __init__(self, subcon: Any, of: str, step: int = 1) -> None:
@@ -202,64 +243,36 @@ class Count(Adapter):
         self.step = step
         self.flagbuildnone = True
 
-    def _decode(self, obj: int, context: Any, path: Any) -> int:
-        items, rest = divmod(obj, self.step)
-        if rest:
-            raise RangeError(f"{obj} bytes are no whole number of {self.of}", path=path)
-        return items
+    def number(self, data: bytes) -> int:
+        """The integer in these bytes; whether each byte is one of it shows later."""
+        return int(self.subcon.number(data) if isinstance(self.subcon, Groups) else self.subcon.parse(data))
 
-    def _encode(self, obj: Any, context: Any, path: Any) -> int:
-        return len(context[self.of]) * self.step
+    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+        return self.subcon._build(len(context[self.of]) * self.step, stream, context, path)
 
 
 class Items(Construct):
-    """A list of minimum to maximum items.
+    """A list of minimum to maximum items. It takes all bytes: the Message knows how many these are."""
 
-    ``count`` names the field that says how many. A list of no fixed size without it takes the payload's rest,
-    all but the ``tail`` bytes of fixed size after it, and the fields after it that ``counted`` tells of: the
-    size of an item by the name of each count.
-    """
-
-    def __init__(
-        self,
-        item: Any,
-        minimum: int,
-        maximum: int,
-        *,
-        count: str = "",
-        tail: int = 0,
-        counted: Mapping[str, int] | None = None,
-    ) -> None:
+    def __init__(self, item: Any, minimum: int, maximum: int) -> None:
         super().__init__()
         self.item = item
+        self.size = int(item.sizeof())
         self.minimum = minimum
         self.maximum = maximum
-        self.count = count
-        self.tail = tail
-        self.counted = counted or {}
 
-    def _number(self, stream: Any, context: Any, path: Any) -> int:
-        if self.count:
-            number = int(context[self.count])
-        elif self.minimum == self.maximum:
-            number = self.minimum
-        else:
-            behind = self.tail + sum(context[name] * size for name, size in self.counted.items())
-            number = (len(stream.getbuffer()) - stream.tell() - behind) // int(self.item.sizeof())
-        return self._checked(number, path)
-
-    def _checked(self, number: int, path: Any) -> int:
+    def checked(self, number: int, path: Any) -> int:
+        """The number of items, if it is one that is allowed."""
         if not self.minimum <= number <= self.maximum:
             raise RangeError(f"{number} items are not {self.minimum}..{self.maximum}", path=path)
         return number
 
     def _parse(self, stream: Any, context: Any, path: Any) -> Any:
-        return [
-            self.item._parsereport(stream, context, path) for _ in range(self._number(stream, context, path))
-        ]
+        data = stream_read_entire(stream, path)
+        return [self.item.parse(data[at : at + self.size]) for at in range(0, len(data), self.size)]
 
     def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
-        self._checked(len(obj), path)
+        self.checked(len(obj), path)
         for item in obj:
             self.item._build(item, stream, context, path)
         return obj
@@ -268,22 +281,14 @@ class Items(Construct):
 class Octets(Items):
     """A byte string of minimum to maximum bytes, otherwise like Items."""
 
-    def __init__(
-        self,
-        minimum: int,
-        maximum: int,
-        *,
-        count: str = "",
-        tail: int = 0,
-        counted: Mapping[str, int] | None = None,
-    ) -> None:
-        super().__init__(_OCTET, minimum, maximum, count=count, tail=tail, counted=counted)
+    def __init__(self, minimum: int, maximum: int) -> None:
+        super().__init__(Groups((0, 8)), minimum, maximum)
 
     def _parse(self, stream: Any, context: Any, path: Any) -> Any:
-        return stream_read(stream, self._number(stream, context, path), path)
+        return stream_read_entire(stream, path)
 
     def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
-        stream_write(stream, obj, self._checked(len(obj), path), path)
+        stream_write(stream, obj, self.checked(len(obj), path), path)
         return obj
 
 
@@ -303,20 +308,17 @@ class Characters(Octets):
         return obj
 
 
-_OCTET = Groups((0, 8))
-#: What a payload carries beside the values: the codec sends and checks it itself.
-_HIDDEN = (Const, Count, Rebuild)
-
-
-def _inside(field: Any) -> Any:
-    """What a default is the default of."""
-    return field.subcon.subcon if isinstance(field.subcon, Default) else field.subcon
+def _run(field: Any) -> Items | None:
+    """The items of a field, None where it is of fixed size."""
+    inner = field.subcon.subcon if isinstance(field.subcon, Default) else field.subcon
+    return inner if isinstance(inner, Items) else None
 
 
 class Message(Construct):
     """One message: its name, its id on the wire, and the payload, which it takes whole.
 
-    Fields that are not given are sent with their defaults; those inside a BitFields stand beside the others.
+    Fields that are not given are sent with their defaults; those inside a BitFields are set and read beside
+    the others. Sizes are checked before values.
     """
 
     def __init__(
@@ -335,59 +337,103 @@ class Message(Construct):
         self.addresses = addresses
         self.checksum = checksum
         self.empty_is_default = empty_is_default
-        self.struct = Struct(*fields, Terminated)
         self.defaults = {field.name: field.subcon.value for field in self._settable()}
-        self._lists = [field.subcon.subcon for field in fields if isinstance(_inside(field), Items)]
-        self._fixed_size = sum(field.sizeof() for field in fields if not isinstance(_inside(field), Items))
+        self.runs = {field.name: run for field in fields if (run := _run(field))}
+        #: Numbers of items that are always the same.
+        self.known = {
+            name: run.minimum
+            for name, run in self.runs.items()
+            if run.minimum == run.maximum and name not in {each.subcon.of for each in self._counts()}
+        }
+        self.least = self.size({name: run.minimum for name, run in self.runs.items()})
+        self.most = self.size({name: run.maximum for name, run in self.runs.items()})
 
-    def _settable(self) -> Iterable[Any]:
+    def _settable(self) -> Iterator[Any]:
         for field in self.fields:
-            if isinstance(field.subcon, BitFields):
-                yield from field.subcon.fields
-            elif isinstance(field.subcon, Default):
-                yield field
+            inside = field.subcon.fields if isinstance(field.subcon, BitFields) else (field,)
+            yield from (each for each in inside if isinstance(each.subcon, Default))
+
+    def _counts(self) -> Iterator[Any]:
+        return (field for field in self.fields if isinstance(field.subcon, Count))
+
+    def fits(self, size: int) -> bool:
+        """A payload may have so many bytes, as far as they alone tell."""
+        return self.least <= size <= self.most or (size == 0 and self.empty_is_default)
+
+    def size(self, counts: Mapping[str, int]) -> int:
+        """Bytes of payload; a run that has no number of items yet is left out."""
+        return sum(self._size(field, counts) for field in self.fields)
+
+    def _size(self, field: Any, counts: Mapping[str, int]) -> int:
+        run = self.runs.get(field.name)
+        return run.size * counts.get(field.name, 0) if run else int(field.sizeof())
+
+    def measured(self, take: Callable[[int], bytes]) -> bytes:
+        """The payload from the bytes that ``take`` gives; its counts alone tell its size."""
+        data, at, counts = b"", 0, dict(self.known)
+        for field in self.fields:
+            size = self._size(field, counts)
+            if isinstance(field.subcon, Count) and field.subcon.of not in counts:
+                data += take(at + size - len(data))
+                counts[field.subcon.of] = self._learned(field, data[at:], "")
+            at += size
+        return data + take(at - len(data))
+
+    def _learned(self, field: Any, data: bytes, path: Any) -> int:
+        """How many items a count tells."""
+        cell, of = data[: field.sizeof()], field.subcon.of
+        if len(cell) < field.sizeof():
+            raise RangeError(f"{field.name} is missing", path=path)
+        number, rest = divmod(field.subcon.number(cell), field.subcon.step)
+        if rest:
+            raise RangeError(f"{field.name} is no whole number of {of}", path=path)
+        return self.runs[of].checked(number, path)
+
+    def _cells(self, data: bytes, path: Any) -> list[tuple[Any, bytes]]:
+        """The fields with their bytes. All sizes are right, or RangeError is raised."""
+        if not self.least <= len(data) <= self.most:
+            raise RangeError(f"{len(data)} bytes, {self.name} has {self.least}..{self.most}", path=path)
+        cells, at, counts = [], 0, dict(self.known)
+        for field in self.fields:
+            run = self.runs.get(field.name)
+            if isinstance(field.subcon, Count):
+                number = self._learned(field, data[at:], path)
+                if counts.setdefault(field.subcon.of, number) != number:
+                    raise RangeError(f"{field.name} does not agree with {field.subcon.of}", path=path)
+            elif run and field.name not in counts:
+                number, rest = divmod(len(data) - self.size(counts), run.size)
+                if rest:
+                    raise RangeError(f"{len(data)} bytes are no whole number of {field.name}", path=path)
+                counts[field.name] = run.checked(number, path)
+            size = self._size(field, counts)
+            cells.append((field, data[at : at + size]))
+            at += size
+        if at != len(data):
+            raise RangeError(f"{len(data)} bytes, the counts of {self.name} tell {at}", path=path)
+        return cells
 
     def _parse(self, stream: Any, context: Any, path: Any) -> Any:
         data = stream_read_entire(stream, path)
         if not data and self.empty_is_default:
-            return Container(self.defaults)
-        self._check_size(len(data), path)
-        parsed = self.struct.parse_stream(io.BytesIO(data))
+            data = self.build({})
         values = Container()
-        for field in self.fields:
+        for field, cell in self._cells(data, path):
+            found = field.parse(cell)
             if isinstance(field.subcon, BitFields):
-                values.update(parsed[field.name])
-            elif not isinstance(field.subcon, _HIDDEN):
-                values[field.name] = parsed[field.name]
-        self._check_counts(parsed, path)
+                values.update(found)
+            elif isinstance(field.subcon, Default):
+                values[field.name] = found
         return values
-
-    def _check_size(self, size: int, path: Any) -> None:
-        """Some numbers of bytes are wrong whatever the bytes are; that shows before any value does."""
-        least = self._fixed_size + sum(each.minimum * each.item.sizeof() for each in self._lists)
-        most = self._fixed_size + sum(each.maximum * each.item.sizeof() for each in self._lists)
-        step = math.gcd(*(each.item.sizeof() for each in self._lists)) or 1
-        if size < least:
-            raise StreamError(f"{size} bytes, {self.name} has {least} at least", path=path)
-        if size > most or (size - least) % step:
-            raise RangeError(f"{size} bytes, {self.name} has {least}..{most} in steps of {step}", path=path)
-
-    def _check_counts(self, parsed: Any, path: Any) -> None:
-        """A field may have several counts, of which only one was needed to read it."""
-        for field in self.fields:
-            if isinstance(field.subcon, Count) and parsed[field.name] != len(parsed[field.subcon.of]):
-                raise ValidationError(f"{field.name} does not agree with {field.subcon.of}", path=path)
 
     def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
         if unknown := sorted(set(obj) - set(self.defaults)):
             raise ValidationError(f"{self.name} has no field {', '.join(map(str, unknown))}", path=path)
-        values = {**self.defaults, **obj}
-        grouped = {}
-        for field in self.fields:
-            if isinstance(field.subcon, BitFields):
-                grouped[field.name] = {member.name: values[member.name] for member in field.subcon.fields}
-            elif field.name in values:
-                grouped[field.name] = values[field.name]
-        data = self.struct.build(grouped)
-        stream_write(stream, data, len(data), path)
+        values = Container(self.defaults)
+        values.update({name: value for name, value in obj.items() if value is not None})
+        try:
+            for field in self.fields:
+                whole = values if isinstance(field.subcon, BitFields) else values.get(field.name)
+                field._build(whole, stream, values, path)
+        except TypeError as error:
+            raise ValidationError(f"{self.name} has a value of a wrong type: {error}", path=path) from None
         return obj

@@ -1,8 +1,8 @@
 """Frames: from the bytes on the wire to a Container of message, address and fields, and back.
 
-The address stands under the name that the protocol gives it. A DelimitedFrame has a Layout of Parts, a
-MarkedFrame a marker bit; RequestPacket and ResponsePacket have nothing around the message at all. Nobody but
-this code fills in or checks a length, an inserted byte or a check value.
+The address has the name that the protocol gives it. A frame is a list of parts; a DelimitedFrame ends by its
+length or its message, a MarkedFrame by a byte with a marker bit, and a Packet has no bounds. This code alone
+fills in and checks lengths, inserted bytes and check values.
 """
 
 # ruff: noqa: ARG002, SLF001  # construct gives every method the same arguments, and calls its parts by _name
@@ -17,8 +17,6 @@ from construct import (
     ConstructError,
     Container,
     RangeError,
-    StreamError,
-    TerminatedError,
     ValidationError,
     stream_read_entire,
     stream_write,
@@ -28,7 +26,7 @@ from ._fields import Message
 
 
 class FrameError(ConstructError):
-    """Bytes that are no frame.
+    """Bytes that are not a frame.
 
     Attributes:
         kind: crc, stuffing, length, range, unknown, truncated, frame, or illegal for a refused command.
@@ -75,20 +73,140 @@ class Sum(NamedTuple):
         return (~total if self.complement else total) & (1 << self.width) - 1
 
 
-class Check(NamedTuple):
-    """How a check value is computed and sent; bits outside of ``mask`` are neither sent nor compared."""
+# Parts
 
+
+class Constant(NamedTuple):
+    """Bytes that are always the same."""
+
+    name: str
+    data: bytes
+
+
+class Length(NamedTuple):
+    """The payload's bytes as they are sent, plus ``bias``; from ``least`` to ``most``."""
+
+    name: str
+    integer: Any
+    bias: int
+    least: int
+    most: int
+
+
+class Id(NamedTuple):
+    """The message id."""
+
+    name: str
+    integer: Any
+
+
+class Address(NamedTuple):
+    """The address."""
+
+    name: str
+    integer: Any
+
+
+class Mark(NamedTuple):
+    """A byte with the marker bit, the address and the message id, or ``end`` in its place.
+
+    ``address`` and ``id`` are (first bit, number of bits).
+    """
+
+    name: str
+    marker: int
+    address: tuple[int, int]
+    id: tuple[int, int]
+    end: int | None = None
+
+    def byte(self, number: int, address: int) -> bytes:
+        """The byte for a message id and an address."""
+        shown = number if self.end is None else self.end
+        return bytes([self.marker | address << self.address[0] | shown << self.id[0]])
+
+    def split(self, byte: int) -> tuple[int, int]:
+        """The message id and the address in the byte."""
+        number, address = (byte >> first & (1 << bits) - 1 for first, bits in (self.id, self.address))
+        return number, address
+
+
+class Payload(NamedTuple):
+    """The payload, of ``most`` bytes at most."""
+
+    name: str
+    most: int
+
+
+class Check(NamedTuple):
+    """A check value over other parts; bits outside of ``mask`` are neither sent nor compared.
+
+    With ``word`` it is a sum over the answered packet too: its id, then words of so many bytes of both.
+    ``rejected`` is the value that refuses a command.
+    """
+
+    name: str
     algorithm: CRC | Sum
     integer: Any
     mask: int
+    over: Sequence[str]
+    word: int = 0
+    rejected: int | None = None
 
-    def value(self, data: Iterable[int]) -> bytes:
-        """The check value as it is sent."""
-        return bytes(self.integer.build(self.algorithm.compute(data) & self.mask))
+    def packed(self, value: int) -> bytes:
+        """A check value as it is sent."""
+        return bytes(self.integer.build(value & self.mask))
 
-    def sizeof(self) -> int:
-        """Bytes on the wire."""
-        return int(self.integer.sizeof())
+    def value(self, cells: Mapping[str, bytes], request: bytes) -> bytes:
+        """The check value of a frame in cells, as it is sent."""
+        runs = [cells[name] for name in self.over]
+        if not self.word:
+            return self.packed(self.algorithm.compute(b"".join(runs)))
+        if not request:
+            raise FrameError("unknown", "an answer needs its request: pass request=packet to build and parse")
+        words = [
+            run[at : at + self.word] for run in (request[1:], *runs) for at in range(0, len(run), self.word)
+        ]
+        return self.packed(
+            self.algorithm.compute([request[0], *(int.from_bytes(word, "big") for word in words)])
+        )
+
+
+Part = Constant | Length | Id | Address | Mark | Payload | Check
+
+
+def _size(part: Part) -> int:
+    """Bytes before stuffing, 0 for the payload."""
+    match part:
+        case Constant():
+            return len(part.data)
+        case Mark():
+            return 1
+        case Payload():
+            return 0
+        case _:
+            return int(part.integer.sizeof())
+
+
+class Stuffing(NamedTuple):
+    """A byte inserted after each occurrence of others, in the parts ``over``.
+
+    Without ``over`` it is inserted in the payload before length and check value are computed.
+    """
+
+    after: bytes
+    insert: bytes
+    over: Sequence[str] = ()
+
+    def add(self, data: bytes) -> bytes:
+        """With the inserted bytes."""
+        return data.replace(self.after, self.after + self.insert)
+
+    def remove(self, data: bytes) -> bytes:
+        """Without them."""
+        plain = data.replace(self.after + self.insert, self.after)
+        if self.add(plain) != data:
+            raise FrameError("stuffing", f"{self.insert.hex()} does not follow each {self.after.hex()}")
+        return plain
 
 
 # Frames
@@ -97,47 +215,116 @@ class Check(NamedTuple):
 class Frame(Construct):
     """Takes all bytes that it is given as one frame of one of its messages."""
 
-    address_name = ""
-
-    def __init__(self, messages: Iterable[Message]) -> None:
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        messages: Iterable[Message],
+        *,
+        address: str = "",
+        stuffing: Stuffing | None = None,
+        hunt: bool = False,
+        bare: bool = False,
+    ) -> None:
         super().__init__()
+        self.parts = parts
         self.by_name = {message.name: message for message in messages}
         self.by_id = {message.id: message for message in self.by_name.values()}
+        self.address = address
+        self.stuffing = stuffing
+        self.hunt = hunt
+        self.bare = bare
+        self.payload = next(part for part in parts if isinstance(part, Payload))
+        self.check = next((part for part in parts if isinstance(part, Check)), None)
 
-    def seal(self, number: int, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """The frame of a message id and a payload, whatever they are."""
-        raise NotImplementedError
+    def overhead(self, message: Message) -> int:
+        """Bytes beside the payload of a message."""
+        return sum(_size(part) for part in self.parts if message.checksum or part is not self.check)
+
+    def seal(
+        self,
+        message: Message,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
+        number: int | None = None,
+    ) -> bytes:
+        """The frame of a payload, whatever it is; ``number`` replaces the id of the message."""
+        stuffing, shown = self.stuffing, message.id if number is None else number
+        sent = stuffing.add(payload) if stuffing and not stuffing.over else payload
+        cells = {part.name: self._cell(part, shown, sent, address) for part in self.parts}
+        if self.check and message.checksum:
+            cells[self.check.name] = self.check.value(cells, request)
+        inner = [part.name for part in self.parts if stuffing and part.name in stuffing.over]
+        if stuffing and inner:
+            data = b"".join(cells[name] for name in inner)
+            cells |= dict.fromkeys(inner, b"") | {inner[0]: stuffing.add(data)}
+        return b"".join(cells.values())
+
+    def _cell(self, part: Part, number: int, payload: bytes, address: int) -> bytes:
+        match part:
+            case Constant():
+                return part.data
+            case Length():
+                return bytes(part.integer.build(len(payload) + part.bias))
+            case Id():
+                return bytes(part.integer.build(number))
+            case Address():
+                return bytes(part.integer.build(address))
+            case Mark():
+                return part.byte(number, address)
+            case Payload():
+                return payload
+            case Check():
+                return b""
 
     def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
         message = self.by_name.get(obj["message"])
         if message is None:
             raise ValidationError(f"there is no message {obj['message']!r} in this direction", path=path)
-        address = obj[self.address_name] if self.address_name else 0
+        address = obj[self.address] if self.address else 0
         if not _allowed(message, address):
-            raise ValidationError(
-                f"{message.name} cannot be sent to {self.address_name} {address!r}", path=path
-            )
+            raise ValidationError(f"{message.name} cannot be sent to {self.address} {address!r}", path=path)
         payload = message.build(obj.get("fields") or {})
-        wire = self.seal(message.id, payload, address, context._params.get("request", b""))
+        wire = self.seal(message, payload, address, context._params.get("request", b""))
         stream_write(stream, wire, len(wire), path)
         return obj
+
+    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
+        wire = stream_read_entire(stream, path)
+        if not wire:
+            raise FrameError("truncated", "there are no bytes")
+        return self._frame(wire, context._params.get("request", b""))
+
+    def _frame(self, wire: bytes, request: bytes) -> Any:
+        raise NotImplementedError
 
     def _known(self, number: int) -> Message:
         if number not in self.by_id:
             raise FrameError("unknown", f"no message has the id {number:#04x}")
         return self.by_id[number]
 
-    def _result(self, message: Message, payload: bytes, address: int = 0) -> Any:
-        """The last step of parsing: what remains are the values."""
-        if not _allowed(message, address):
-            raise FrameError("range", f"{message.name} is never sent to {self.address_name} {address}")
+    def _judged(
+        self, cells: Mapping[str, bytes], number: int, payload: bytes, address: int = 0, request: bytes = b""
+    ) -> Any:
+        """The message of a frame in cells: check value, message, sizes, values, address."""
+        found = self.by_id.get(number)
+        if self.check and (found is None or found.checksum):
+            sent, expected = cells[self.check.name], self.check.value(cells, request)
+            if sent != expected:
+                rejected = self.check.rejected
+                refused = rejected is not None and sent == self.check.packed(rejected)
+                kind = "illegal" if refused else "crc"
+                raise FrameError(kind, f"{sent.hex()} was sent, {expected.hex()} expected")
+        message = self._known(number)
         try:
             fields = message.parse(payload)
-        except (RangeError, StreamError, TerminatedError) as error:
-            raise FrameError("length", f"{len(payload)} bytes are no payload; {error}") from None
+        except RangeError as error:
+            raise FrameError("length", f"{len(payload)} bytes are not a payload; {error}") from None
         except ConstructError as error:
             raise FrameError("range", f"{message.name}; {error}") from None
-        place = {self.address_name: address} if self.address_name else {}
+        if not _allowed(message, address):
+            raise FrameError("range", f"{message.name} is never sent to {self.address} {address}")
+        place = {self.address: address} if self.address else {}
         return Container(message=message.name, **place, fields=fields)
 
 
@@ -152,316 +339,164 @@ def _allowed(message: Message, address: Any) -> bool:
     return isinstance(address, int) and any(first <= address <= last for first, last in message.addresses)
 
 
-class Part(NamedTuple):
-    """A run of bytes of a frame: of one of the roles constant, length, id, address, payload and check.
+class _Wire:
+    """Takes the bytes of parts off the wire, without the inserted ones."""
 
-    The content is a constant's bytes, an integer, the payload's (fewest, most) bytes, or a Check;
-    ``over`` names the parts that a length counts or a check value covers.
-    """
+    def __init__(self, data: bytes, stuffing: Stuffing | None, *, hunt: bool) -> None:
+        self.data = data
+        self.stuffing = stuffing if stuffing and stuffing.over else None
+        self.hunt = hunt
+        self.at = 0
+        self.due = False
+        self.recent = b""
 
-    name: str
-    role: str
-    content: Any
-    over: Sequence[str] = ()
-
-    @property
-    def size(self) -> int:
-        """Bytes before stuffing, 0 for the payload."""
-        if self.role == "payload":
-            return 0
-        return len(self.content) if self.role == "constant" else int(self.content.sizeof())
-
-
-class Stuffing(NamedTuple):
-    """A byte inserted after each occurrence of others.
-
-    ``exempt`` parts, at the frame's front or end, are not stuffed. With ``payload_only`` only the payload is,
-    before length and check value are computed.
-    """
-
-    after: bytes
-    insert: bytes
-    exempt: Sequence[str] = ()
-    payload_only: bool = False
-
-    def add(self, data: bytes) -> bytes:
-        """With the inserted bytes."""
-        return data.replace(self.after, self.after + self.insert)
-
-    def remove(self, data: bytes) -> bytes:
-        """Without them. The last may be missing: it says nothing that the frame's size does not say."""
-        runs, at = [], 0
-        while (found := data.find(self.after, at)) >= 0:
-            end = found + len(self.after)
-            if data[end : end + 1] not in (self.insert, b""):
-                raise FrameError(
-                    "stuffing", f"{data[end]:#04x} follows {self.after.hex()}, not {self.insert.hex()}"
-                )
-            runs.append(data[at:end])
-            at = end + 1
-        return b"".join([*runs, data[at:]])
-
-
-class Layout:
-    """Parts of a frame in wire order, and its stuffing."""
-
-    def __init__(self, *parts: Part, stuffing: Stuffing | None = None) -> None:
-        self.parts = parts
-        self.stuffing = stuffing
-        self.roles = {part.role: part for part in parts}
-        self.bounds: tuple[int, int] = self.roles["payload"].content
-        self.overhead = sum(part.size for part in parts)
-
-    def counted(self) -> int:
-        """What the length says of an empty payload."""
-        return sum(part.size for part in self.parts if part.name in self.roles["length"].over)
-
-    def assemble(self, payload: bytes, **integers: int) -> bytes:
-        """The frame of a payload as it is on the wire; ``integers`` are the id and the address."""
-        if self.stuffing and self.stuffing.payload_only:
-            payload = self.stuffing.add(payload)
-        if "length" in self.roles:
-            integers["length"] = self.counted() + len(payload)
-        pieces: dict[str, bytes] = {}
-        for part in self.parts:
-            if part.role in integers:
-                pieces[part.name] = part.content.build(integers[part.role])
+    def take(self, part: Part, size: int) -> bytes:
+        """The next bytes, which belong to a part."""
+        taken = b""
+        while len(taken) < size:
+            if self.due and self.stuffing:
+                self._inserted(self.stuffing)
+            taken += self._byte()
+            if self.stuffing and part.name in self.stuffing.over:
+                self.recent = (self.recent + taken[-1:])[-len(self.stuffing.after) :]
+                self.due = self.recent == self.stuffing.after
             else:
-                pieces[part.name] = {"constant": part.content, "payload": payload}.get(part.role, b"")
-        if "check" in self.roles:
-            pieces[self.roles["check"].name] = self.check(pieces)
-        return self.stuffed(pieces)
+                self.recent = b""
+        return taken
 
-    def check(self, pieces: Mapping[str, bytes]) -> bytes:
-        """The check value of a frame in pieces."""
-        part = self.roles["check"]
-        return bytes(part.content.value(b"".join(data for name, data in pieces.items() if name in part.over)))
+    def _byte(self) -> bytes:
+        if self.at == len(self.data):
+            raise FrameError("truncated", f"{self.at} bytes are not a whole frame")
+        self.at += 1
+        return self.data[self.at - 1 : self.at]
 
-    def stuffed(self, pieces: Mapping[str, bytes]) -> bytes:
-        """A frame in pieces as it is on the wire."""
-        data = b"".join(pieces.values())
-        if self.stuffing is None or self.stuffing.payload_only:
-            return data
-        front, back = self.exempt()
-        return data[:front] + self.stuffing.add(data[front : len(data) - back]) + data[len(data) - back :]
+    def _inserted(self, stuffing: Stuffing) -> None:
+        byte = self._byte()
+        if byte != stuffing.insert:
+            kind = "truncated" if self.hunt and byte == stuffing.after else "stuffing"
+            raise FrameError(
+                kind, f"{byte.hex()} follows {stuffing.after.hex()}, not {stuffing.insert.hex()}"
+            )
+        self.due, self.recent = False, b""
 
-    def unstuffed(self, wire: bytes) -> bytes:
-        """Bytes on the wire without the inserted ones, unless only the payload is stuffed."""
-        if self.stuffing is None or self.stuffing.payload_only:
-            return wire
-        front, back = self.exempt()
-        end = max(len(wire) - back, front)
-        return wire[:front] + self.stuffing.remove(wire[front:end]) + wire[end:]
-
-    def exempt(self) -> tuple[int, int]:
-        """Bytes at the front and at the end that are never stuffed."""
-        names = self.stuffing.exempt if self.stuffing else ()
-        stuffed = [index for index, part in enumerate(self.parts) if part.name not in names]
-        front = sum(part.size for part in self.parts[: stuffed[0]])
-        return front, sum(part.size for part in self.parts[stuffed[-1] + 1 :])
-
-    def split(self, data: bytes) -> dict[str, bytes]:
-        """An unstuffed frame in pieces."""
-        pieces, at = {}, 0
-        for part in self.parts:
-            size = len(data) - self.overhead if part.role == "payload" else part.size
-            pieces[part.name] = data[at : at + size]
-            at += size
-        return pieces
+    def end(self) -> None:
+        """Only an inserted byte may follow."""
+        due = self.stuffing.insert if self.stuffing and self.due else b""
+        if self.data[self.at :] not in (b"", due):
+            raise FrameError("length", f"{len(self.data) - self.at} bytes follow the frame")
 
 
 class DelimitedFrame(Frame):
-    """A frame whose end follows from its length, or from what is inside."""
+    """A frame whose end follows from its length, or from its message.
 
-    def __init__(self, layout: Layout, messages: Iterable[Message]) -> None:
-        super().__init__(messages)
-        self.layout = layout
-        self.address_name = layout.roles["address"].name if "address" in layout.roles else ""
+    With ``hunt`` its first bytes are found nowhere else; with ``bare`` no constant begins it, so an id or an
+    address that is not known shows first.
+    """
 
-    def seal(self, number: int, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """The frame of a message id and a payload, whatever they are."""
-        return self.layout.assemble(payload, id=number, address=address)
+    def _frame(self, wire: bytes, request: bytes) -> Any:
+        source = _Wire(wire, self.stuffing, hunt=self.hunt)
+        cells: dict[str, bytes] = {}
+        numbers: dict[type, int] = {}
+        for part in self.parts:
+            if isinstance(part, Payload):
+                cells[part.name] = self._sent(source, part, numbers)
+            elif isinstance(part, Constant) and Payload not in numbers:
+                cells[part.name] = self._constant(source, part)
+            else:
+                cells[part.name] = source.take(part, _size(part))
+                self._number(part, cells[part.name], numbers)
+        payload = self._plain(cells)
+        source.end()
+        return self._judged(cells, numbers[Id], payload, numbers.get(Address, 0))
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
-        layout, wire = self.layout, stream_read_entire(stream, path)
-        if layout.stuffing is None or layout.exempt()[0]:
-            self._check_front(wire)
-        data = layout.unstuffed(wire)
-        self._check_front(data)  # what is stuffed itself can be told only now
-        if len(data) < layout.overhead:
-            raise FrameError("truncated", f"{len(data)} bytes, and a frame has {layout.overhead} at least")
-        self._check_length(data)
-        pieces = layout.split(data)
-        self._check_pieces(pieces)
-        payload = pieces[layout.roles["payload"].name]
-        if layout.stuffing and layout.stuffing.payload_only:
-            payload = layout.stuffing.remove(payload)
-        integers = {
-            role: part.content.parse(pieces[part.name])
-            for role, part in layout.roles.items()
-            if role in ("id", "address")
-        }
-        return self._result(self._known(integers["id"]), payload, integers.get("address", 0))
+    def _constant(self, source: _Wire, part: Constant) -> bytes:
+        for index in range(len(part.data)):
+            if source.take(part, 1) != part.data[index : index + 1]:
+                raise FrameError("frame", f"{part.name} is not {part.data.hex()}")
+        return part.data
 
-    def _check_front(self, wire: bytes) -> None:
-        """What stands there before anything else tells whether this is a frame at all."""
-        first = self.layout.parts[0]
-        if first.role == "constant" and not wire.startswith(first.content):
-            kind = "truncated" if first.content.startswith(wire) else "frame"
-            raise FrameError(kind, f"does not begin with {first.content.hex()}")
-
-    def _check_length(self, data: bytes) -> None:
-        layout = self.layout
-        if "length" not in layout.roles:
+    def _number(self, part: Part, cell: bytes, numbers: dict[type, int]) -> None:
+        if not isinstance(part, Length | Id | Address):
             return
-        part = layout.roles["length"]
-        at = sum(each.size for each in layout.parts[: layout.parts.index(part)])
-        claimed = part.content.parse(data[at : at + part.size]) - layout.counted()
-        found, (fewest, most) = len(data) - layout.overhead, layout.bounds
-        if not fewest <= claimed <= most or claimed < found:
-            raise FrameError(
-                "length", f"claims {claimed} payload bytes of {fewest}..{most}, {found} are here"
-            )
-        if claimed > found:
-            raise FrameError("truncated", f"claims {claimed} payload bytes, {found} are here")
+        number = numbers[type(part)] = part.integer.parse(cell)
+        if isinstance(part, Length):
+            if not part.least <= number <= part.most:
+                raise FrameError("length", f"{part.name} is {number}, not {part.least}..{part.most}")
+            numbers[Length] -= part.bias
+        elif self.bare and Id in numbers:
+            message = self._known(numbers[Id])
+            if Address in numbers and not _allowed(message, numbers[Address]):
+                raise FrameError("range", f"{message.name} is never sent to {numbers[Address]}")
 
-    def _check_pieces(self, pieces: Mapping[str, bytes]) -> None:
-        for part in self.layout.parts:
-            if part.role == "constant" and pieces[part.name] != part.content:
-                raise FrameError(
-                    "frame", f"{part.name} is {pieces[part.name].hex()}, not {part.content.hex()}"
-                )
-        if "check" in self.layout.roles:
-            sent, expected = pieces[self.layout.roles["check"].name], self.layout.check(pieces)
-            if sent != expected:
-                raise FrameError("crc", f"{sent.hex()} was sent, {expected.hex()} expected")
+    def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
+        numbers[Payload] = 0
+        if Length in numbers:
+            return source.take(part, numbers[Length])
+        try:
+            return self._known(numbers[Id]).measured(lambda size: source.take(part, size))
+        except RangeError as error:
+            raise FrameError("length", str(error)) from None
+
+    def _plain(self, cells: Mapping[str, bytes]) -> bytes:
+        for part in self.parts:
+            if isinstance(part, Constant) and cells[part.name] != part.data:
+                raise FrameError("frame", f"{part.name} is {cells[part.name].hex()}, not {part.data.hex()}")
+        payload = cells[self.payload.name]
+        if self.stuffing and not self.stuffing.over:
+            payload = self.stuffing.remove(payload)
+        if len(payload) > self.payload.most:
+            raise FrameError("length", f"{len(payload)} bytes of payload, at most {self.payload.most} are")
+        return payload
 
 
 class MarkedFrame(Frame):
-    """A frame between a header and an end byte that carry a marker bit, which no other byte has.
+    """A frame between a header and an end byte that carry a marker bit, which no other byte has."""
 
-    ``address_bits`` and ``id_bits`` are (first bit, number of bits) in both bytes, ``end`` is the end's id.
-    """
-
-    def __init__(
-        self,
-        messages: Iterable[Message],
-        *,
-        marker: int,
-        address_bits: tuple[int, int],
-        id_bits: tuple[int, int],
-        end: int,
-        address_name: str,
-        check: Check | None = None,
-    ) -> None:
-        super().__init__(messages)
-        self.marker = marker
-        self.address_bits, self.id_bits = address_bits, id_bits
-        self.end = end
-        self.address_name = address_name
-        self.check = check
-
-    def _edge(self, address: int, number: int) -> bytes:
-        return bytes([self.marker | address << self.address_bits[0] | number << self.id_bits[0]])
-
-    def seal(self, number: int, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """The frame of a message id and a payload, whatever they are."""
+    def _frame(self, wire: bytes, request: bytes) -> Any:
+        header, end = self.parts[0], self.parts[-1]
+        assert isinstance(header, Mark)
+        assert isinstance(end, Mark)
+        number, address = header.split(wire[0])
+        marks = [at for at, byte in enumerate(wire) if byte & header.marker]
+        if marks == [0] and number != end.end:
+            raise FrameError("truncated", f"{wire[-1]:#04x} is not an end")
+        if marks != [0, len(wire) - 1] or end.end == number or wire[-1:] != end.byte(0, address):
+            raise FrameError("frame", f"{wire[0]:#04x} to {wire[-1]:#04x} are not header, payload and end")
         message = self.by_id.get(number)
-        check = self.check.value(payload) if self.check and message and message.checksum else b""
-        return self._edge(address, number) + payload + check + self._edge(address, self.end)
-
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
-        data = stream_read_entire(stream, path)
-        if len(data) < 2:
-            raise FrameError("truncated", f"{len(data)} bytes, and a frame has 2 at least")
-        address, id_ = (
-            data[0] >> first & (1 << bits) - 1 for first, bits in (self.address_bits, self.id_bits)
-        )
-        marked = [index for index, byte in enumerate(data) if byte & self.marker]
-        if marked == [0]:
-            raise FrameError("truncated", f"{data[-1]:#04x} is no end")
-        if marked != [0, len(data) - 1] or data[-1:] != self._edge(address, self.end):
-            raise FrameError("frame", f"{data[0]:#04x} to {data[-1]:#04x} are no header, payload and end")
-        if id_ not in self.by_id or not _allowed(self.by_id[id_], address):
-            raise FrameError("frame", f"no message has the id {id_} and the {self.address_name} {address}")
-        return self._checked(self.by_id[id_], data[1:-1], address)
-
-    def _checked(self, message: Message, body: bytes, address: int) -> Any:
-        """A size that the message cannot have shows first: then the marks are wrong, not the bytes."""
-        size = self.check.sizeof() if self.check and message.checksum else 0
-        payload, sent = body[: len(body) - size], body[len(body) - size :]
-        expected = self.check.value(payload) if self.check and size else b""
-        try:
-            result = self._result(message, payload, address)
-        except FrameError as error:
-            if error.kind == "range" and sent == expected:
-                raise
-            kind = "frame" if error.kind == "length" else "crc"
-            raise FrameError(kind, f"{sent.hex()} was sent, {expected.hex()} expected; {error}") from None
-        if sent != expected:
-            raise FrameError("crc", f"{sent.hex()} was sent, {expected.hex()} expected")
-        return result
+        if message is None or address == 0 or not message.fits(len(wire) - self.overhead(message)):
+            raise FrameError(
+                "frame", f"no message has the id {number}, {self.address} {address}, {len(wire)} bytes"
+            )
+        size = len(wire) - self.overhead(message)
+        cells = {self.payload.name: wire[1 : 1 + size]}
+        if self.check:
+            cells[self.check.name] = wire[1 + size : -1]
+        return self._judged(cells, number, wire[1 : 1 + size], address)
 
 
-class RequestPacket(Frame):
-    """A message id and a payload, and nothing around them."""
+class Packet(Frame):
+    """A message id and a payload, or a payload and a check value over both packets.
 
-    def seal(self, number: int, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """The packet of a message id and a payload, whatever they are."""
-        return bytes([number]) + payload
-
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
-        data = stream_read_entire(stream, path)
-        if not data:
-            raise FrameError("truncated", "there are no bytes")
-        return self._result(self._known(data[0]), data[1:])
-
-
-class ResponsePacket(Frame):
-    """A payload and a check value over both packets; parse and build are given ``request``, its bytes.
-
-    The check value ``rejected`` says that the command is not known, unless it is the one expected.
+    Without an id it is an answer: parse and build are given ``request``, the packet that is answered.
     """
 
-    def __init__(
-        self,
-        messages: Iterable[Message],
-        *,
-        check: Check | None = None,
-        word: int = 2,
-        rejected: int | None = None,
-    ) -> None:
-        super().__init__(messages)
-        self.check = check
-        self.word = word
-        self.rejected = rejected
-
-    def seal(self, number: int, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """The packet of a payload, whatever it is; the id is in the request."""
-        return payload + self._sum(request, payload)
-
-    def _sum(self, request: bytes, payload: bytes) -> bytes:
-        if self.check is None:
-            return b""
-        words = request[1:] + payload
-        units = (words[at : at + self.word] for at in range(0, len(words), self.word))
-        return self.check.value([request[0], *(int.from_bytes(unit, "big") for unit in units)])
-
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
-        data, request = stream_read_entire(stream, path), context._params.get("request")
-        if not request:
+    def _frame(self, wire: bytes, request: bytes) -> Any:
+        has_id = isinstance(self.parts[0], Id)
+        if not has_id and not request:
+            raise FrameError("unknown", "an answer needs its request: pass request=packet to build and parse")
+        first = (wire if has_id else request)[0]
+        message = self._known(first)
+        beside = self.overhead(message)
+        least = 0 if message.empty_is_default else message.least
+        if len(wire) < least + beside:
+            raise FrameError("truncated", f"{len(wire)} bytes, {message.name} has {least + beside} at least")
+        if len(wire) > message.most + beside:
             raise FrameError(
-                "frame", "an answer means nothing without its request; call parse(data, request=packet)"
+                "length", f"{len(wire)} bytes, {message.name} has {message.most + beside} at most"
             )
-        message = self._known(request[0])
-        size = self.check.sizeof() if self.check else 0
-        payload, sent = data[: len(data) - size], data[len(data) - size :]
-        if len(sent) < size:
-            raise FrameError("truncated", f"{len(data)} bytes hold no check value of {size}")
-        expected = self._sum(request, payload)
-        if sent != expected:
-            refused = self.rejected is not None and int.from_bytes(sent, "big") == self.rejected
-            raise FrameError(
-                "illegal" if refused else "crc", f"{sent.hex()} was sent, {expected.hex()} expected"
-            )
-        return self._result(message, payload)
+        cells, at = {}, 0
+        for part in self.parts:
+            size = len(wire) - beside if isinstance(part, Payload) else _size(part)
+            cells[part.name] = wire[at : at + size]
+            at += size
+        return self._judged(cells, first, cells[self.payload.name], request=request)

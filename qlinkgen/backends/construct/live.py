@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
-from qlinkgen.backends.base import Options
 from qlinkgen.backends.construct.module import definitions
 from qlinkgen.backends.construct.tree import evaluate
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import Options, plan_of
 
 
 class Live:
@@ -37,9 +37,7 @@ class Live:
     ) -> bytes:
         """The frame around a payload, whatever the payload is; ``number`` replaces the message id."""
         frame = next(each for each in self.frames.values() if message in each.by_name)
-        return bytes(
-            frame.seal(self.messages[message].id if number is None else number, payload, address, request)
-        )
+        return bytes(frame.seal(self.messages[message], payload, address, request, number))
 
     def parse(self, direction: str, wire: bytes, request: bytes = b"") -> Any:
         """Message, address and fields of exactly one frame. Raises construct's ConstructError."""
@@ -52,4 +50,4 @@ def live(protocol: Protocol, options: Options | None = None) -> Live:
     names: dict[str, Any] = {"Decimal": Decimal}
     for module in modules:
         names |= vars(importlib.import_module(module))
-    return Live(evaluate(definitions(protocol, options or Options()), names))
+    return Live(evaluate(definitions(plan_of(protocol, options)), names))

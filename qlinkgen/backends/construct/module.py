@@ -1,101 +1,91 @@
-"""From a protocol to the definitions of a module: one for each message, then the frames."""
+"""From a plan to the definitions of a module: types, one for each message, then the frames."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import assert_never
 
-from qlinkgen.backends.base import Options
-from qlinkgen.backends.construct import payload
-from qlinkgen.backends.construct.tree import Call, Definition, Hex, Node, Ref, Sequence, Table
+from qlinkgen.backends.construct.payload import Names, Types, comment, fields, integer
+from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
-from qlinkgen.model import naming
-from qlinkgen.model.frame import Checksum, DelimitedFrame, MarkedFrame, PacketFrame, Part, Stuffing
-from qlinkgen.model.message import Direction, Message
-from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Chunk, Scalar
+from qlinkgen.model.integer import Integer
+from qlinkgen.plan.framing import (
+    AddressPart,
+    CheckPart,
+    ConstantPart,
+    Envelope,
+    FramePlan,
+    Hunt,
+    IdPart,
+    InStep,
+    LengthPart,
+    MarkPart,
+    Marks,
+    Part,
+    PayloadPart,
+    Rescan,
+)
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.tree import MessagePlan, Plan
 
-#: Names of what is defined beside messages, enums and flags.
-_OWN_NAMES = frozenset({"ALGORITHM", "LAYOUT", "MESSAGES", "REQUEST_FRAME", "RESPONSE_FRAME", "FRAME", "CRC"})
+#: Names of what is defined beside messages and types.
+_OWN_NAMES = ("ALGORITHM", "LAYOUT", "MESSAGES", "REQUEST_FRAME", "RESPONSE_FRAME", "FRAME", "CRC")
 
 
-def definitions(protocol: Protocol, options: Options) -> tuple[Definition, ...]:
+def definitions(plan: Plan) -> tuple[Definition, ...]:
     """Everything that the module of a protocol defines."""
-    return tuple(_definitions(protocol, options))
+    return tuple(_definitions(plan))
 
 
-def _definitions(protocol: Protocol, options: Options) -> Iterator[Definition]:
-    for group in protocol.enums:
-        values = tuple((member.name, member.value) for member in group.members)
-        yield Definition(naming.upper(group.name), Table(values), _comment(group.doc, group.section))
-    for flags in protocol.flags:
-        digits = (flags.bits + 3) // 4
-        masks = tuple((member.name, Hex(1 << member.value, digits)) for member in flags.members)
-        yield Definition(naming.upper(flags.name), Table(masks), _comment(flags.doc, flags.section))
-    names = _message_names(protocol)
-    kept = [
-        each
-        for each in protocol.messages
-        if not options.only or {each.name, each.command} & set(options.only)
-    ]
-    for before, message in zip([None, *kept], kept, strict=False):
-        again = before is not None and before.command == message.command
-        comment = _comment(message.doc, message.section, confirmed=message.confirmed)
-        yield Definition(names[message.name], _message(message), "" if again else comment, again)
-    yield from _frames(protocol, [(names[each.name], each) for each in kept])
+def _definitions(plan: Plan) -> Iterator[Definition]:
+    names = Names(_OWN_NAMES)
+    stated = plan.protocol
+    labelled = [each.name for each in stated.enums] + [each.name for each in stated.flags]
+    groups = {name: names.of(name, "TYPE") for name in labelled}
+    messages = {each.name: names.of(each.name, "MESSAGE") for each in stated.messages}
+    types = Types(plan, groups, names)
+    yield from types.definitions()
+    command = ""
+    for each in plan.messages:
+        message = each.message
+        said = comment(message.doc, message.section, confirmed=message.confirmed)
+        again = message.command == command
+        yield Definition(messages[each.name], _message(each, types), "" if again else said, again)
+        command = message.command
+    yield from _frames(plan, messages)
 
 
-def _message_names(protocol: Protocol) -> dict[str, str]:
-    """Constants of the messages; one that is taken gets a suffix."""
-    types = [group.name for group in protocol.enums] + [flags.name for flags in protocol.flags]
-    taken = _OWN_NAMES | set(map(naming.upper, types))
-    names = {message.name: naming.upper(message.name) for message in protocol.messages}
-    return {name: f"{upper}_MESSAGE" if upper in taken else upper for name, upper in names.items()}
-
-
-def _message(message: Message) -> Call:
+def _message(message: MessagePlan, types: Types) -> Call:
     settings: dict[str, Node] = {}
-    if message.addresses:
-        settings["addresses"] = Sequence(message.addresses)
-    if not message.checksum:
+    if message.allowed is not None:
+        settings["addresses"] = Sequence(tuple((each.low, each.high) for each in message.allowed.ranges))
+    if not message.message.checksum:
         settings["checksum"] = False
-    if message.empty_is_default:
+    if message.payload.empty_is_default:
         settings["empty_is_default"] = True
-    return Call("Message", (message.name, Hex(message.id), *payload.fields(message)), tuple(settings.items()))
-
-
-def _comment(doc: str, section: str, *, confirmed: bool = True) -> str:
-    """Purpose and section; what is not confirmed says so."""
-    words = [doc.strip()] if doc else []
-    words += [f"({section})"] if section else []
-    words += [] if confirmed else ["NOT CONFIRMED by a second source."]
-    return " ".join(words)
+    return Call(
+        "Message", (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
+    )
 
 
 # Frames
 
 
-def _frames(protocol: Protocol, messages: list[tuple[str, Message]]) -> Iterator[Definition]:
-    frame = protocol.frame
-    check = _checksum(frame)
-    if check is not None:
-        yield Definition("ALGORITHM", _algorithm(check.algorithm), check.algorithm.name)
-    if isinstance(frame, DelimitedFrame):
-        yield Definition("LAYOUT", _layout(frame), _comment(frame.doc, frame.section))
+def _frames(plan: Plan, messages: Mapping[str, str]) -> Iterator[Definition]:
+    frame = plan.frame
+    if frame.check is not None:
+        yield Definition("ALGORITHM", _algorithm(frame.check.algorithm), frame.check.algorithm.name)
+    stated = plan.protocol.frame
+    if not frame.needs_request:
+        yield Definition("LAYOUT", _layout(frame.envelope), comment(stated.doc, stated.section))
     frames = []
-    for direction in protocol.directions:
+    for direction in plan.protocol.directions:
         name = "FRAME" if direction == "message" else f"{direction.upper()}_FRAME"
-        chosen = Sequence(
-            tuple(Ref(name) for name, each in messages if each.direction in (direction, "message"))
-        )
+        layout = _layout(frame.envelopes[direction]) if frame.needs_request else Ref("LAYOUT")
+        chosen = Sequence(tuple(Ref(messages[each.name]) for each in plan.received(direction)))
         frames.append(Ref(name))
-        yield Definition(name, _frame(protocol, direction, chosen))
+        yield Definition(name, _frame(frame, layout, chosen))
     yield Definition("MESSAGES", Call("messages_of", tuple(frames)), "Payloads by full name.")
-
-
-def _checksum(frame: DelimitedFrame | MarkedFrame | PacketFrame) -> Checksum | None:
-    if isinstance(frame, DelimitedFrame):
-        return part.checksum if (part := frame.part("checksum")) else None
-    return frame.checksum
 
 
 def _algorithm(algorithm: catalogue.Algorithm | catalogue.Sum) -> Call:
@@ -107,72 +97,83 @@ def _algorithm(algorithm: catalogue.Algorithm | catalogue.Sum) -> Call:
         (),
         (
             ("width", algorithm.width),
-            ("poly", Hex(algorithm.poly, digits)),
-            ("init", Hex(algorithm.init, digits)),
+            ("poly", hexadecimal(algorithm.poly, digits)),
+            ("init", hexadecimal(algorithm.init, digits)),
             ("refin", algorithm.refin),
             ("refout", algorithm.refout),
-            ("xorout", Hex(algorithm.xorout, digits)),
+            ("xorout", hexadecimal(algorithm.xorout, digits)),
         ),
     )
 
 
-def _check(checksum: Checksum) -> Call:
-    digits = (checksum.algorithm.width + 3) // 4
-    return Call("Check", (Ref("ALGORITHM"), payload.integer(checksum.chunks), Hex(checksum.mask, digits)))
+def _layout(envelope: Envelope) -> Sequence:
+    return Sequence(tuple(_part(part, envelope) for part in envelope.parts))
 
 
-def _layout(frame: DelimitedFrame) -> Call:
-    stuffing = (("stuffing", _stuffing(frame.stuffing)),) if frame.stuffing else ()
-    return Call("Layout", tuple(_part(frame, part) for part in frame.parts), stuffing)
+def _part(part: Part, envelope: Envelope) -> Call:
+    match part:
+        case ConstantPart():
+            return Call("Constant", (part.name, part.data))
+        case LengthPart():
+            bounds = (("bias", part.bias), ("least", part.least), ("most", part.most))
+            return Call("Length", (part.name, integer(part.integer)), bounds)
+        case IdPart():
+            return Call("Id", (part.name, integer(part.integer)))
+        case AddressPart():
+            return Call("Address", (part.name, integer(part.integer)))
+        case MarkPart():
+            return _mark(part)
+        case PayloadPart():
+            return Call("Payload", (part.name, part.most))
+        case CheckPart():
+            return _check(part, envelope)
+        case _:
+            assert_never(part)
 
 
-def _stuffing(stuffing: Stuffing) -> Call:
-    exempt = (
-        (("exempt", Sequence(stuffing.exempt)),) if stuffing.exempt and not stuffing.before_checksum else ()
-    )
-    only = (("payload_only", True),) if stuffing.before_checksum else ()
-    return Call("Stuffing", (stuffing.after, bytes([stuffing.insert])), (*exempt, *only))
+def _mark(part: MarkPart) -> Call:
+    bits = tuple((key, (bits.shift, bits.bits)) for key, bits in (("address", part.address), ("id", part.id)))
+    end = (("end", part.end_id),) if part.end_id is not None else ()
+    return Call("Mark", (part.name,), (("marker", hexadecimal(part.marker)), *bits, *end))
 
 
-def _part(frame: DelimitedFrame, part: Part) -> Call:
-    role = {"message": "id", "checksum": "check"}.get(part.role, part.role)
-    over: tuple[str, ...] = part.checksum.over if part.checksum else part.counts
-    return Call("Part", (part.name, role, _content(frame, part), *((Sequence(over),) if over else ())))
+def _check(part: CheckPart, envelope: Envelope) -> Call:
+    check = part.check
+    kind = Integer(8 * check.size, signed=False, chunks=check.value.chunks)
+    over = Sequence((envelope.payload.name,) if check.chained else check.over)
+    word = (("word", check.word),) if check.chained else ()
+    rejected = (("rejected", check.rejected),) if check.rejected is not None else ()
+    mask = hexadecimal(check.mask, (check.algorithm.width + 3) // 4)
+    return Call("Check", (part.name, Ref("ALGORITHM"), integer(kind), mask, over), (*word, *rejected))
 
 
-def _content(frame: DelimitedFrame, part: Part) -> Node:
-    if part.role == "constant":
-        return part.constant
-    if part.role == "payload":
-        most = part.max_size
-        if frame.stuffing and frame.stuffing.before_checksum:
-            most += most // len(frame.stuffing.after)  # the length counts what is inserted
-        return (part.min_size, most)
-    if part.checksum is not None:
-        return _check(part.checksum)
-    assert isinstance(part.scalar, Scalar)
-    return payload.integer(part.scalar.chunks)
+def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
+    address = (("address", frame.address),) if frame.address else ()
+    settings = (*address, *_stuffing(frame))
+    match frame.receiver:
+        case Hunt():
+            return Call("DelimitedFrame", (layout, messages), (*settings, ("hunt", True)))
+        case Rescan():
+            bare = (("bare", True),) if frame.receiver.bare else ()
+            return Call("DelimitedFrame", (layout, messages), (*settings, *bare))
+        case Marks():
+            return Call("MarkedFrame", (layout, messages), settings)
+        case InStep():
+            return Call("Packet", (layout, messages), settings)
+        case _:
+            assert_never(frame.receiver)
 
 
-def _frame(protocol: Protocol, direction: Direction, messages: Sequence) -> Call:
-    frame = protocol.frame
-    if isinstance(frame, DelimitedFrame):
-        return Call("DelimitedFrame", (Ref("LAYOUT"), messages))
-    check = (("check", _check(frame.checksum)),) if frame.checksum else ()
-    if isinstance(frame, MarkedFrame):
-        settings: tuple[tuple[str, Node], ...] = (
-            ("address_name", frame.address_name),
-            ("marker", Hex(frame.marker)),
-            ("address_bits", _pair(frame.address_bits)),
-            ("id_bits", _pair(frame.id_bits)),
-            ("end", frame.end_id),
-        )
-        return Call("MarkedFrame", (messages,), settings + check)
-    if direction == "request":
-        return Call("RequestPacket", (messages,))
-    rejected = (("rejected", frame.rejected),) if frame.rejected is not None else ()
-    return Call("ResponsePacket", (messages,), (*check, ("word", frame.word_size), *rejected))
-
-
-def _pair(chunk: Chunk) -> tuple[int, int]:
-    return chunk.shift, chunk.bits
+def _stuffing(frame: FramePlan) -> tuple[tuple[str, Node], ...]:
+    how = frame.transparency
+    match how:
+        case Plain() | SevenBit():
+            return ()
+        case PayloadStuffing():
+            over: tuple[str, ...] = ()
+        case FrameStuffing():
+            over = tuple(part.name for part in frame.envelope.between(how.front, how.back))
+        case _:
+            assert_never(how)
+    given = (how.rule.after, bytes((how.rule.insert,)), *((Sequence(over),) if over else ()))
+    return (("stuffing", Call("Stuffing", given)),)

@@ -1,136 +1,253 @@
-"""From the fields of a message to the constructor calls of its payload."""
+"""From the steps of a payload to the constructor calls of its fields."""
 
 from __future__ import annotations
 
+import keyword
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
+from typing import assert_never
 
-from qlinkgen.backends.construct.tree import Call, Named, Node, Power, Ref, Sequence, Table
-from qlinkgen.model.message import Field, Message
-from qlinkgen.model.types import Array, Bits, Blob, Chunk, Enum, Flags, Scalar
+from qlinkgen.backends.construct.tree import Call, Definition, Named, Node, Number, Ref, Sequence, hexadecimal
+from qlinkgen.model import naming
+from qlinkgen.model.integer import Integer
+from qlinkgen.model.types import Enum, Flags, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
+from qlinkgen.plan.expr import Clear, Limit, Within
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    Member,
+    MemberConstant,
+    MemberReserved,
+    MemberValue,
+    ReservedStep,
+    Step,
+    ValueStep,
+    conditions,
+)
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Bytes of the integers that construct has a name for.
 _NAMED_SIZES = (1, 2, 3, 4, 8)
+_UNCONFIRMED = "NOT CONFIRMED by a second source."
 
 
-def fields(message: Message) -> tuple[Node, ...]:
-    """The members of a message's payload, in wire order."""
-    return tuple(Named(field.name, _field(message, field), _doc(field)) for field in message.fields)
-
-
-def integer(chunks: tuple[Chunk, ...], *, signed: bool = False) -> Node:
+def integer(kind: Integer, *, signed: bool | None = None) -> Node:
     """The integer of construct that has these bytes, or Groups where it has none."""
-    size = len(chunks)
-    orders = {
-        tuple(Chunk(8 * index, 8) for index in range(size)): "l",
-        tuple(Chunk(8 * index, 8) for index in reversed(range(size))): "b",
-    }
-    order = orders.get(chunks)
-    sign = "s" if signed else "u"
-    if order is None:
-        pairs = tuple((chunk.shift, chunk.bits) for chunk in chunks)
+    signed = kind.signed if signed is None else signed
+    if kind.byteorder is None:
+        pairs = tuple((chunk.shift, chunk.bits) for chunk in kind.chunks)
         return Call("Groups", pairs, (("signed", True),) if signed else ())
-    if size in _NAMED_SIZES:
-        return Ref(f"Int{8 * size}{sign}{order}")
-    flags = {"signed": signed, "swapped": order == "l"}
-    return Call("BytesInteger", (size,), tuple((key, True) for key, value in flags.items() if value))
+    if kind.size in _NAMED_SIZES:
+        return Ref(f"Int{kind.bits}{'s' if signed else 'u'}{kind.byteorder[0]}")
+    flags = {"signed": signed, "swapped": kind.byteorder == "little"}
+    return Call("BytesInteger", (kind.size,), tuple((key, True) for key, value in flags.items() if value))
 
 
-def _field(message: Message, field: Field) -> Node:
-    kind = field.type
-    if isinstance(kind, Bits):
-        members = (Named(each.name, _bit_field(each.shift, each.type), each.doc) for each in kind.members)
-        return Call("BitFields", (integer(kind.container.chunks), *members))
-    if isinstance(kind, Scalar):
-        return _scalar(message, kind)
-    return _items(message, field, kind)
+class Names:
+    """Names of what a module defines: that of the schema in capitals, with a suffix where it is taken."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        """``taken`` are names that the module has itself."""
+        self._taken = set(taken)
+
+    def of(self, name: str, suffix: str) -> str:
+        """A name that nothing else has."""
+        upper = naming.upper(name)
+        while upper in self._taken:
+            upper += f"_{suffix}"
+        self._taken.add(upper)
+        return upper
 
 
-def _scalar(message: Message, scalar: Scalar) -> Node:
-    raw = integer(scalar.chunks, signed=scalar.signed)
-    if scalar.constant:
-        return Call("Const", (scalar.default, raw))
-    if scalar.reserved and scalar.byteorder is None:  # bits between the groups are ignored too
-        data = bytes(scalar.default >> chunk.shift & chunk.mask for chunk in scalar.chunks)
-        return Call("Rebuild", (Call("Bytes", (scalar.size,)), data))
-    if scalar.reserved:
-        return Call("Rebuild", (raw, scalar.default))
-    if scalar.counts:
-        target = next(field for field in message.fields if field.name == scalar.counts)
-        assert isinstance(target.type, Blob | Array)
-        step = target.type.item_size if scalar.counts_unit == "bytes" else 1
-        return Call("Count", (_ranged(raw, scalar), scalar.counts, *((step,) if step > 1 else ())))
-    return _value(raw, scalar)
+class Types:
+    """The types that the schema names: each is defined once, and used by every field that has its integer.
+
+    Enums and flags are named by their labels; a type of another name is that of its conversion.
+    """
+
+    def __init__(self, plan: Plan, groups: Mapping[str, str], names: Names) -> None:
+        """``groups`` are the names of enums and flags, ``names`` gives those of other types."""
+        self._plan = plan
+        found: dict[str, Counter[Node]] = {}
+        for number, raw in self._numbers():
+            if name := _name(number):
+                found.setdefault(name, Counter())[_converted(number, raw)] += 1
+        self._usual = {
+            name: node
+            for name, node in ((name, counts.most_common(1)[0][0]) for name, counts in found.items())
+            if name in groups or isinstance(node, Call)  # a plain integer of construct needs no name
+        }
+        self._names = {name: groups.get(name) or names.of(name, "TYPE") for name in self._usual} | dict(
+            groups
+        )
+
+    def definitions(self) -> Iterator[Definition]:
+        """The enums and flags of the plan, and the other types that its messages use."""
+        for enum in self._plan.enums:
+            members = tuple((each.name, each.value) for each in enum.members)
+            yield self._labelled("Enum", enum, members)
+        for flags in self._plan.flags:
+            digits = (flags.bits + 3) // 4
+            bits = tuple((each.name, hexadecimal(1 << each.value, digits)) for each in flags.members)
+            yield self._labelled("FlagsEnum", flags, bits)
+        groups = {each.name for each in self._plan.enums} | {each.name for each in self._plan.flags}
+        others = [(name, node) for name, node in self._usual.items() if name not in groups]
+        for index, (name, node) in enumerate(others):
+            yield Definition(self._names[name], node, "" if index else "Types of fields.", bool(index))
+
+    def _labelled(self, kind: str, group: Enum | Flags, members: tuple[tuple[str, Node], ...]) -> Definition:
+        size = (group.bits + 7) // 8
+        plain = integer(Integer(8 * size, signed=False, chunks=byte_chunks(size, "big")))
+        carrier = self._usual.get(group.name, plain)
+        if any(keyword.iskeyword(name) or name in ("self", "subcon") for name, _ in members):
+            node = Call(kind, (carrier, Sequence(tuple(Call("Member", each) for each in members))))
+        else:
+            node = Call(kind, (carrier,), members)
+        return Definition(self._names[group.name], node, comment(group.doc, group.section))
+
+    def _numbers(self) -> Iterator[tuple[Scalar, Node]]:
+        for message in self._plan.messages:
+            for step in message.payload.steps:
+                match step:
+                    case ValueStep():
+                        yield step.number, integer(step.integer)
+                    case ItemsStep():
+                        yield step.number, integer(step.item)
+                    case BitsStep():
+                        yield from (
+                            (each.number, _bits(each))
+                            for each in step.members
+                            if isinstance(each, MemberValue)
+                        )
+                    case ConstantStep() | ReservedStep() | CountStep() | BytesStep():
+                        pass
+                    case _:
+                        assert_never(step)
+
+    def of(self, number: Scalar, raw: Node) -> Node:
+        """What turns an integer into the native value."""
+        node, name = _converted(number, raw), _name(number)
+        same = self._usual.get(name) == node
+        if not isinstance(number.meaning, Enum | Flags):
+            return Ref(self._names[name]) if same else node
+        known = Ref(self._names[name])
+        named: Node = known if same else Call("like", (known, node))
+        return Call("Whole", (named,)) if isinstance(number.meaning, Flags) else named
 
 
-def _bit_field(shift: int, scalar: Scalar) -> Node:
-    signed = (("signed", True),) if scalar.signed else ()
-    return _value(Call("Bits", (shift, shift + scalar.bits - 1), signed), scalar)
+def comment(doc: str, section: str, *, confirmed: bool = True) -> str:
+    """Purpose and section; what is not confirmed says so."""
+    words = [doc.strip(), f"({section})" if section else "", "" if confirmed else _UNCONFIRMED]
+    return " ".join(filter(None, words))
 
 
-def _value(raw: Node, scalar: Scalar) -> Node:
-    """An integer with everything that makes it the native value, and its default."""
-    node = _ranged(raw, scalar)
-    if isinstance(scalar.meaning, Flags) and scalar.meaning.reserved_zero:
-        node = Call("Flagged", (node, scalar.meaning.mask))
-    if scalar.meaning == "bool":
+def fields(message: MessagePlan, types: Types) -> tuple[Node, ...]:
+    """The fields of a message, in wire order."""
+    return tuple(_Field(message, types).of(step) for step in message.payload.steps)
+
+
+class _Field:
+    """Prints the fields of one message."""
+
+    def __init__(self, message: MessagePlan, types: Types) -> None:
+        self._types = types
+        self._stated = {field.name: field for field in message.message.fields}
+        self._inner = {value.name: value.doc for value in message.message.values if value.bits}
+
+    def of(self, step: Step) -> Named:
+        match step:
+            case ValueStep():
+                return self._named(step, self._value(step.number, integer(step.integer)), step.number.unit)
+            case ConstantStep():
+                return self._named(step, Call("Const", (step.value, integer(step.integer))))
+            case ReservedStep():
+                data = Call("Bytes", (step.integer.size,))
+                return self._named(step, Call("Rebuild", (data, step.integer.pack(step.value))))
+            case CountStep():
+                scale = (step.scale,) if step.scale > 1 else ()
+                return self._named(step, Call("Count", (integer(step.integer), step.run, *scale)))
+            case BitsStep():
+                members = tuple(map(self._member, step.members))
+                return self._named(step, Call("BitFields", (integer(step.integer, signed=False), *members)))
+            case BytesStep():
+                kind, default = (
+                    ("Characters", step.default.decode()) if step.text else ("Octets", step.default)
+                )
+                return self._run(step, kind, (), default)
+            case ItemsStep():
+                item = self._types.of(step.number, integer(step.item))
+                return self._run(step, "Items", (item,), Sequence(step.default))
+            case _:
+                assert_never(step)
+
+    def _run(self, step: BytesStep | ItemsStep, kind: str, item: tuple[Node, ...], default: Node) -> Named:
+        run = Call(kind, (*item, step.length.minimum, step.length.maximum))
+        return self._named(step, Call("Default", (run, default)))
+
+    def _named(self, step: Step, node: Node, unit: str = "") -> Named:
+        field = self._stated[step.name]
+        doc = ": ".join(filter(None, (unit, field.doc)))
+        return Named(step.name, node, doc + ("" if field.confirmed else " (not confirmed)"))
+
+    def _member(self, member: Member) -> Named:
+        bits = _bits(member)
+        match member:
+            case MemberValue():
+                return Named(member.name, self._value(member.number, bits), self._inner[member.name])
+            case MemberConstant():
+                return Named(member.name, Call("Const", (member.value, bits)))
+            case MemberReserved():
+                return Named(member.name, Call("Rebuild", (bits, member.value)))
+            case _:
+                assert_never(member)
+
+    def _value(self, number: Scalar, raw: Node) -> Node:
+        default = native_from_raw(number, number.default)
+        assert isinstance(default, int | float | Decimal)
+        shown: Node = Call("Decimal", (str(default),)) if isinstance(default, Decimal) else default
+        return Call("Default", (self._types.of(number, raw), shown))
+
+
+def _name(number: Scalar) -> str:
+    """Name of a number's type, "" where it has none."""
+    return number.meaning.name if isinstance(number.meaning, Enum | Flags) else number.type_name
+
+
+def _bits(member: Member) -> Node:
+    signed = (("signed", True),) if isinstance(member, MemberValue) and member.number.signed else ()
+    return Call("Bits", (member.shift, member.shift + member.bits - 1), signed)
+
+
+def _converted(number: Scalar, raw: Node) -> Node:
+    """An integer with its conditions and its conversion, labels left out."""
+    node = raw
+    for each in conditions(number):
+        node = _limited(node, each)
+    if number.meaning == "bool":
         node = Call("Boolean", (node,))
-    if scaling := scalar.scaling:
+    if scaling := number.scaling:
         settings = {"factor": (scaling.factor, 1), "bias": (scaling.bias, 0), "divisor": (scaling.divisor, 1)}
         kwargs = tuple((key, _steps(value)) for key, (value, usual) in settings.items() if value != usual)
-        node = Call("Scaled", (node,), kwargs + ((("exact", True),) if scalar.number == "decimal" else ()))
-    default = native_from_raw(scalar, scalar.default)
-    assert isinstance(default, int | float | Decimal)
-    return Call(
-        "Default", (node, Call("Decimal", (str(default),)) if isinstance(default, Decimal) else default)
-    )
+        node = Call("Scaled", (node,), kwargs + ((("exact", True),) if number.number == "decimal" else ()))
+    return node
+
+
+def _limited(node: Node, limit: Limit) -> Node:
+    match limit:
+        case Within():
+            return Call("Ranged", (node, limit.low, limit.high))
+        case Clear():
+            return Call("Clear", (node, Number(limit.mask, hex(limit.mask))))
+        case _:
+            assert_never(limit)
 
 
 def _steps(number: int) -> Node:
     """Fractions of fixed point numbers are read as powers of two."""
     is_power = number >= 1 << 10 and number.bit_count() == 1
-    return Power(number.bit_length() - 1) if is_power else number
-
-
-def _ranged(raw: Node, scalar: Scalar) -> Node:
-    return raw if scalar.full_range else Call("Ranged", (raw, scalar.minimum, scalar.maximum))
-
-
-def _items(message: Message, field: Field, kind: Blob | Array) -> Node:
-    length = kind.length
-    kwargs: tuple[tuple[str, Node], ...] = ()
-    if length.counted_by:
-        kwargs = (("count", length.counted_by),)
-    elif not length.fixed:
-        kwargs = _behind(message, field)
-    if isinstance(kind, Array):
-        item = _ranged(integer(kind.item.chunks, signed=kind.item.signed), kind.item)
-        return Call(
-            "Default", (Call("Items", (item, length.minimum, length.maximum), kwargs), Sequence(kind.default))
-        )
-    node = Call("Characters" if kind.text else "Octets", (length.minimum, length.maximum), kwargs)
-    return Call("Default", (node, kind.default.decode("ascii") if kind.text else kind.default))
-
-
-def _behind(message: Message, field: Field) -> tuple[tuple[str, Node], ...]:
-    """What follows a field that takes the rest: fixed bytes, and counts with the size of an item."""
-    behind = message.fields[message.fields.index(field) + 1 :]
-    found: list[tuple[str, Node]] = []
-    if tail := sum(each.max_size for each in behind if each.fixed):
-        found.append(("tail", tail))
-    sizes: list[tuple[str, Node]] = [
-        (each.type.length.counted_by, each.type.item_size)
-        for each in behind
-        if isinstance(each.type, Blob | Array) and not each.fixed
-    ]
-    return (*found, ("counted", Table(tuple(sizes)))) if sizes else tuple(found)
-
-
-def _doc(field: Field) -> str:
-    """What stands beside a field: its unit, its purpose, and a warning."""
-    kind = field.type
-    words = [kind.unit] if isinstance(kind, Scalar) and kind.unit else []
-    if isinstance(kind, Scalar) and isinstance(kind.meaning, Enum | Flags):
-        words.append(kind.meaning.name)
-    words += [field.doc] if field.doc else []
-    return ": ".join(words) + ("" if field.confirmed else " (not confirmed)")
+    return Number(number, f"2**{number.bit_length() - 1}") if is_power else number

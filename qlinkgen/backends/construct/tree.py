@@ -24,23 +24,11 @@ class Ref:
 
 
 @dataclass(frozen=True, slots=True)
-class Hex:
-    """An integer that is read more easily in hexadecimal digits."""
+class Number:
+    """An integer, and how it is best read."""
 
     value: int
-    digits: int = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Power:
-    """A power of two, by its exponent."""
-
-    exponent: int
-
-    @property
-    def value(self) -> int:
-        """The number itself."""
-        return 1 << self.exponent
+    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,30 +56,13 @@ class Sequence:
     items: tuple[Node, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A dictionary from names."""
-
-    items: tuple[tuple[str, Node], ...]
-
-
 #: Besides these, what `repr` prints as it is written: numbers, text, bytes, and tuples of them.
-Node = (
-    Ref
-    | Hex
-    | Power
-    | Call
-    | Named
-    | Sequence
-    | Table
-    | int
-    | float
-    | str
-    | bytes
-    | bool
-    | None
-    | tuple[Any, ...]
-)
+Node = Ref | Number | Call | Named | Sequence | int | float | str | bytes | bool | None | tuple[Any, ...]
+
+
+def hexadecimal(value: int, digits: int = 2) -> Number:
+    """An integer in so many hexadecimal digits."""
+    return Number(value, f"0x{value:0{digits}X}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,35 +86,40 @@ def evaluate(definitions: tuple[Definition, ...], names: Mapping[str, Any]) -> d
 
 
 def _value(node: Node, known: Mapping[str, Any]) -> Any:
-    if isinstance(node, Call):
-        args = [_value(each, known) for each in node.args]
-        return known[node.name](*args, **{key: _value(each, known) for key, each in node.kwargs})
-    if isinstance(node, Named):
-        return node.name / _value(node.node, known)
-    if isinstance(node, Sequence):
-        return [_value(each, known) for each in node.items]
-    if isinstance(node, Table):
-        return {key: _value(each, known) for key, each in node.items}
-    if isinstance(node, Ref):
-        return known[node.name]
-    return node.value if isinstance(node, Hex | Power) else node
+    match node:
+        case Call():
+            args = [_value(each, known) for each in node.args]
+            return known[node.name](*args, **{key: _value(each, known) for key, each in node.kwargs})
+        case Named():
+            return node.name / _value(node.node, known)
+        case Sequence():
+            return [_value(each, known) for each in node.items]
+        case Ref():
+            return known[node.name]
+        case Number():
+            return node.value
+        case _:
+            return node
 
 
 def used(node: Node) -> Iterator[str]:
     """Every name that a node refers to."""
     if isinstance(node, Ref | Call):
         yield node.name
-    children: tuple[Node, ...] = ()
-    if isinstance(node, Call):
-        children = node.args + tuple(each for _, each in node.kwargs)
-    elif isinstance(node, Named):
-        children = (node.node,)
-    elif isinstance(node, Sequence):
-        children = node.items
-    elif isinstance(node, Table):
-        children = tuple(each for _, each in node.items)
-    for child in children:
+    for child in _children(node):
         yield from used(child)
+
+
+def _children(node: Node) -> tuple[Node, ...]:
+    match node:
+        case Call():
+            return node.args + tuple(each for _, each in node.kwargs)
+        case Named():
+            return (node.node,)
+        case Sequence():
+            return node.items
+        case _:
+            return ()
 
 
 # Printing
@@ -163,18 +139,17 @@ def _text(node: Node, column: int, indent: int) -> str:
     if column + len(flat) < WIDTH and not _documented(node):
         return flat
     inner = indent + 4
-    if isinstance(node, Named):
-        return f'"{node.name}" / {_text(node.node, column + len(node.name) + 5, indent)}'
-    if isinstance(node, Call):
-        parts = [_part("", each, inner) for each in node.args]
-        parts += [_part(f"{key}=", each, inner) for key, each in node.kwargs]
-        return f"{node.name}(\n{''.join(parts)}{' ' * indent})"
-    if isinstance(node, Sequence):
-        return f"[\n{''.join(_part('', each, inner) for each in node.items)}{' ' * indent}]"
-    if isinstance(node, Table):
-        parts = [_part(f'"{key}": ', each, inner) for key, each in node.items]
-        return f"{{\n{''.join(parts)}{' ' * indent}}}"
-    return flat
+    match node:
+        case Named():
+            return f'"{node.name}" / {_text(node.node, column + len(node.name) + 5, indent)}'
+        case Call():
+            parts = [_part("", each, inner) for each in node.args]
+            parts += [_part(f"{key}=", each, inner) for key, each in node.kwargs]
+            return f"{node.name}(\n{''.join(parts)}{' ' * indent})"
+        case Sequence():
+            return f"[\n{''.join(_part('', each, inner) for each in node.items)}{' ' * indent}]"
+        case _:
+            return flat
 
 
 def _part(prefix: str, node: Node, indent: int) -> str:
@@ -188,26 +163,28 @@ def _part(prefix: str, node: Node, indent: int) -> str:
 
 
 def _documented(node: Node) -> bool:
-    parts = node.args if isinstance(node, Call) else ()
-    return any(isinstance(part, Named) and (part.doc or _documented(part.node)) for part in parts)
+    return isinstance(node, Call) and any(
+        isinstance(part, Named) and (part.doc or _documented(part.node)) for part in node.args
+    )
 
 
 def _flat(node: Node) -> str:
-    if isinstance(node, Call):
-        parts = [_flat(each) for each in node.args] + [f"{key}={_flat(each)}" for key, each in node.kwargs]
-        return f"{node.name}({', '.join(parts)})"
-    if isinstance(node, Named):
-        return f'"{node.name}" / {_flat(node.node)}'
-    if isinstance(node, Sequence):
-        return f"[{', '.join(map(_flat, node.items))}]"
-    if isinstance(node, Table):
-        parts = [f'"{key}": {_flat(each)}' for key, each in node.items]
-        return f"{{{', '.join(parts)}}}"
-    if isinstance(node, Hex):
-        return f"0x{node.value:0{node.digits}X}"
-    if isinstance(node, Power):
-        return f"2**{node.exponent}"
-    return node.name if isinstance(node, Ref) else _literal(node)
+    match node:
+        case Call():
+            parts = [_flat(each) for each in node.args] + [
+                f"{key}={_flat(each)}" for key, each in node.kwargs
+            ]
+            return f"{node.name}({', '.join(parts)})"
+        case Named():
+            return f'"{node.name}" / {_flat(node.node)}'
+        case Sequence():
+            return f"[{', '.join(map(_flat, node.items))}]"
+        case Ref():
+            return node.name
+        case Number():
+            return node.text
+        case _:
+            return _literal(node)
 
 
 def _literal(value: Any) -> str:

@@ -1,0 +1,170 @@
+"""Construct structures accept what the interpreter of the plan accepts, with the same values and errors."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from construct import ConstructError
+
+from qlinkgen.backends import construct
+from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.model.values import native_from_raw
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import BadContent, Raw, Unsendable, pack, unpack
+from qlinkgen.plan.reading import BadFrame
+from qlinkgen.schema import loads
+from qlinkgen.schema.loader import load
+from tests.proof.outputs import plain_numbers
+from tests.support.random_raw import damaged, random_address, random_values
+from tests.support.whole.schemas import generate
+
+_ROOT = Path(__file__).resolve().parents[2]
+_FILES = sorted([*(_ROOT / "schemas").glob("*.yaml"), *(_ROOT / "tests" / "schemas").glob("*.yaml")])
+_SEEDS = range(40)
+#: Random payloads and frames of each message, half of them damaged.
+_TRIES = 12
+
+every_schema = pytest.mark.parametrize("name", [*(path.stem for path in _FILES), *map(str, _SEEDS)])
+
+
+class Both:
+    """The interpreter and the structures of one protocol."""
+
+    def __init__(self, protocol: Protocol) -> None:
+        self.protocol = protocol
+        self.plan = plan_of(protocol)
+        self.codec = Codec(self.plan)
+        self.live = construct.live(protocol)
+
+    def natives(self, message: Message, raws: Mapping[str, Raw]) -> dict[str, Any]:
+        """Raw values as construct holds them."""
+        found: dict[str, Any] = {}
+        for value in (each for each in message.values if each.name in raws):
+            raw, kind = raws[value.name], value.type
+            if isinstance(kind, Scalar):
+                assert isinstance(raw, int)
+                found[value.name] = native_from_raw(kind, raw)
+            elif isinstance(raw, bytes):
+                assert isinstance(kind, Blob)
+                found[value.name] = raw.decode("ascii") if kind.text else raw
+            else:
+                found[value.name] = raw
+        return found
+
+    def frame(self, message: Message) -> Direction:
+        """The direction of whose frame the message is."""
+        return message.direction if message.direction in self.live.frames else "request"
+
+    def same_payload(self, message: Message, payload: bytes) -> None:
+        """The structures read a payload as the interpreter does."""
+        try:
+            expected: object = self.natives(message, unpack(self.plan.message(message.name).payload, payload))
+        except BadContent:
+            expected = None
+        try:
+            found: object = plain_numbers(self.live.messages[message.name].parse(payload))
+        except ConstructError:
+            found = None
+        assert found == expected, (message.name, payload.hex())
+
+    def same_frame(self, direction: Direction, wire: bytes, request: bytes) -> None:
+        """They read a frame alike, or refuse it for the same reason."""
+        found, expected = self._parsed(direction, wire, request), self._decoded(direction, wire, request)
+        assert found == expected, (direction, wire.hex())
+
+    def _decoded(self, direction: Direction, wire: bytes, request: bytes) -> object:
+        try:
+            decoded = self.codec.decode(wire, direction, request)
+        except BadFrame as bad:
+            return bad.kind
+        message = decoded.message.message
+        return message.name, decoded.address, self.natives(message, decoded.values)
+
+    def _parsed(self, direction: Direction, wire: bytes, request: bytes) -> object:
+        try:
+            found = self.live.parse(direction, wire, request)
+        except ConstructError as error:
+            return getattr(error, "kind", "")
+        return found["message"], found.get(self.plan.frame.address), plain_numbers(found["fields"])
+
+
+@cache
+def both(name: str) -> Both | None:
+    """Of a file, or of a random schema; None where lint refuses that."""
+    path = next((path for path in _FILES if path.stem == name), None)
+    protocol = load(path) if path else loads(generate(int(name)), "random.yaml")[0]
+    return Both(protocol) if protocol else None
+
+
+@every_schema
+def test_payloads_and_frames_are_read_as_the_plan_says(name: str) -> None:
+    one = both(name)
+    if one is None:
+        return
+    for message in one.protocol.messages:
+        chance = random.Random(f"{name} {message.name}")
+        steps, direction = one.plan.message(message.name).payload, one.frame(message)
+        for _ in range(_TRIES):
+            raws = dict(
+                zip((value.name for value in message.values), random_values(message, chance), strict=True)
+            )
+            try:
+                payload = pack(steps, raws)
+            except Unsendable:  # more items than their count can tell
+                continue
+            address = random_address(message, chance)
+            request = b""
+            if one.plan.frame.needs_request and direction == "response":
+                request = bytes((message.id,)) + chance.randbytes(chance.randrange(5))
+            wire = one.codec.seal(message.name, payload, address, request)
+            assert one.live.payload(message.name, one.natives(message, raws)) == payload
+            assert one.live.seal(message.name, payload, address, request) == wire
+            spoilt = damaged(payload, chance, payload or b"\0")[: one.plan.frame.max_payload]
+            for each in (payload, spoilt, payload[:-1]):
+                one.same_payload(message, each)
+                shown = chance.choice((None, None, message.id ^ 1))
+                sealed = one.codec.seal(message.name, each, address, request, shown)
+                one.same_frame(direction, sealed, request)
+            for each in (
+                wire,
+                damaged(wire, chance, wire),
+                wire[: chance.randrange(len(wire))],
+                wire + b"\0",
+            ):
+                one.same_frame(direction, each, request)
+
+
+@every_schema
+def test_what_cannot_be_sent_is_refused_as_the_plan_says(name: str) -> None:
+    one = both(name)
+    for message in one.protocol.messages if one else ():
+        assert one is not None
+        for value in message.values:
+            kind = value.type.item if isinstance(value.type, Array) else value.type
+            if not isinstance(kind, Scalar) or kind.meaning == "bool":
+                continue
+            for raw in (kind.minimum - 1, kind.minimum, kind.maximum, kind.maximum + 1):
+                given: Raw = (
+                    [raw] * max(1, value.type.length.minimum) if isinstance(value.type, Array) else raw
+                )
+                assert _sends(one, message, {value.name: given}), (message.name, value.name, given)
+
+
+def _sends(one: Both, message: Message, raws: Mapping[str, Raw]) -> bool:
+    """Both refuse, or both make the same bytes."""
+    natives = one.natives(message, raws)
+    try:
+        expected = pack(one.plan.message(message.name).payload, raws)
+    except Unsendable:
+        with pytest.raises(ConstructError):
+            one.live.payload(message.name, natives)
+        return True
+    return one.live.payload(message.name, natives) == expected
