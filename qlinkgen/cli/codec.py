@@ -9,6 +9,7 @@ from typing import Any
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import did_you_mean
 from qlinkgen.model.message import Message
+from qlinkgen.model.naming import address_attribute, attribute
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import BadValue, check_items, from_json, to_json
 
@@ -36,14 +37,17 @@ def build(codec: ModuleType, message: Message, given: Mapping[str, Any], address
     except BadValue as error:
         raise Failure(f"{message.name}: {error}") from None
     try:
-        return codec.MESSAGES[message.name](**address, **natives)
+        return codec.MESSAGES[message.name](
+            **{address_attribute(name): number for name, number in address.items()},
+            **{attribute(name): native for name, native in natives.items()},
+        )
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
 
 
 def fields(message: Message, found: Any) -> dict[str, Any]:
     """The values of a message object, for JSON."""
-    return {value.name: to_json(value, getattr(found, value.name)) for value in message.values}
+    return {value.name: to_json(value, getattr(found, attribute(value.name))) for value in message.values}
 
 
 def _no_field(message: Message, name: str, known: list[str]) -> str:

@@ -12,6 +12,7 @@ from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.hearing import MOST, Telling, values_text
 from qlinkgen.cli.wire_options import counted
 from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
+from qlinkgen.model.naming import address_attribute
 from qlinkgen.model.protocol import Protocol
 
 
@@ -63,7 +64,7 @@ class RingTeller:
         if self._raw:
             record["raw"] = frame.hex()
             remarks.append(frame.hex(" "))
-        who = f"{name} {getattr(message, name)}{', here' if sent_on is False else ''}"
+        who = f"{name} {getattr(message, address_attribute(name))}{', here' if sent_on is False else ''}"
         return Telling(record, who, message.NAME, values_text(self._protocol, message), remarks)
 
     def broken(

@@ -173,9 +173,7 @@ def _further(request: Bad, response: Bad) -> Bad:
 
 def _transaction(message: Any) -> tuple[str, object]:
     """Command and address: what a response has in common with its request."""
-    address = (
-        getattr(message, "node", None) if hasattr(message, "node") else getattr(message, "address", None)
-    )
+    address = getattr(message, message.ADDRESS) if message.ADDRESS else None
     return message.NAME.rpartition(".")[0], address
 
 
