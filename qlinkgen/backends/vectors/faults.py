@@ -84,6 +84,10 @@ class Bad:
         }
 
 
+#: Up to so many bytes a frame is cut after each.
+_ALL_CUTS = 512
+
+
 class Faults:
     """Makes wrong frames of right ones."""
 
@@ -123,7 +127,7 @@ class _Frame:
                     yield part.name, what, self._joined({**self._cells, **cells})
         yield from self._misplaced()
         wire = self._good.wire
-        for size in range(0 if first else len(wire) - 1, len(wire)):
+        for size in _cuts(len(wire)) if first else (len(wire) - 1,):
             yield self._part_at(self._cells, wire, size), f"it ends after {size} bytes", wire[:size]
         if first:
             yield self._envelope.parts[-1].name, "a byte follows the frame", wire + b"\1"
@@ -310,3 +314,8 @@ def _outside(rule: Condition | None, least: int, most: int) -> list[int]:
         case _:
             assert_never(rule)
     return [number for number in near if least <= number <= most and not rule.holds(number)][:1]
+
+
+def _cuts(size: int) -> Iterable[int]:
+    """After how many bytes a frame is cut: after each, or near both ends of a long one."""
+    return range(size) if size <= _ALL_CUTS else (*range(_ALL_CUTS // 2), *range(size - _ALL_CUTS // 2, size))
