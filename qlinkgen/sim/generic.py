@@ -15,8 +15,7 @@ _SMALLEST: Mapping[str, Callable[[Any], Any]] = {
     "Items": lambda rule: [rule.item.ranges[0][0]] * rule.fewest,
     "Octets": lambda rule: bytes(rule.fewest),
     "Text": lambda rule: " " * rule.fewest,
-    "Steps": lambda rule: min(rule.value(rule.low), rule.value(rule.high)),
-    "DecimalSteps": lambda rule: min(rule.value(rule.low), rule.value(rule.high)),
+    "Scaled": lambda rule: min(rule.scale.value(rule.scale.low), rule.scale.value(rule.scale.high)),
 }
 
 

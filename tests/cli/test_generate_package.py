@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from qlinkgen.model.texts import visible
 from tests.cli.conftest import Run
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -117,7 +118,7 @@ def test_a_package_of_ones_own_is_not_touched(qlinkgen: Run, out: Path, thermo: 
 def test_names_that_no_package_can_have(qlinkgen: Run, out: Path, thermo: Path, name: str) -> None:
     result = qlinkgen("generate", thermo, "--package", name, "-o", out)
     assert result.code == 2
-    assert f"--package {name}" in result.err
+    assert f"--package {visible(name)}" in result.err
     assert not out.exists()
 
 

@@ -30,10 +30,14 @@ def make(*, attempts: int = 3, forgets: float = 0.0, **options: Any) -> HostEngi
     return HostEngine(mc1231a, timing, RULES, **options)
 
 
+def _value(rule: Any) -> Any:
+    return rule.scale.value(129) if hasattr(rule, "scale") else 129
+
+
 def sample(command: Any) -> Any:
     """A request whose words are 129, a value that every command takes."""
     rules = [(rule, rule.name) for rule in command.request.RULES]
-    return command.request(**{name: getattr(rule, "value", int)(129) for rule, name in rules})
+    return command.request(**{name: _value(rule) for rule, name in rules})
 
 
 def on_axis(request: Any, axis: int = 1) -> Packet:

@@ -176,9 +176,9 @@ class Session:
     def _value(self, name: str) -> Any:
         """A value that the register takes; no acceleration below 0, since a profile refuses that."""
         rule = _RULES[name]
-        if hasattr(rule, "low"):
-            low = 0 if name == "acc" else rule.low
-            return rule.value(self._random.randint(low, rule.high))
+        if scale := getattr(rule, "scale", None):
+            low = 0 if name == "acc" else scale.low
+            return scale.value(self._random.randint(low, scale.high))
         if name == "intrpt_mask":
             return self._random.randrange(0x1000)
         low, high = rule.ranges[0]
