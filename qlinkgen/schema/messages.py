@@ -122,6 +122,9 @@ class MessageBuilder:
         self._check_end(message, path)
         if isinstance(self._frame, PacketFrame):
             self._check_words(message, self._frame.word_size, path)
+            if message.direction == "response" and not message.max_size and not self._frame.checksum:
+                what = f"{message.name} would have no bytes: it has neither fields nor a check value"
+                self._error("bad-response", path, what, "use response: none, or add a checksum to the packet")
 
     def _error(self, rule: str, path: Path, what: str, hint: str) -> None:
         self._report.error(rule, path, what, hint, of_key=True, needs=(path, _FRAME))

@@ -39,17 +39,6 @@ commands:
     response: {{}}
 """
 
-BARE = """
-qlinkgen: 1
-protocol: {name: wide, title: Bare, revision: "1", source: this test, doc: Nothing around an answer.}
-frame: {packet: {id: {role: message, type: u8}, data: {role: payload, size: 0..40}}}
-bus: {kind: host, baud: 9600, response_within: 1 ms}
-defaults: {repeat: safe}
-commands:
-  set: {id: 1, doc: Set., request: {a: u16}, response: {}}
-  get: {id: 2, doc: Get., request: {}, response: {a: u16}}
-"""
-
 
 def write(folder: Path, *, most: int, bits: int = 8, values: int = 1) -> Path:
     """The kit of a schema with long frames, wide ids and addresses, or many values."""
@@ -70,7 +59,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def check(kit: Path, compiler: str) -> None:
-    kits.ran(kits.compiled(kit.with_name("kit"), compiler, "-std=c99", kits.STDIO, kit)).check("wide")
+    kits.ran(kits.compiled(kit.with_name("kit"), compiler, "-std=c99", kits.STDIO, kit)).check()
 
 
 @pytest.mark.parametrize("most", [250, 3000])
@@ -91,7 +80,3 @@ def test_wide_ids_and_addresses(
 @pytest.mark.parametrize("values", [255, 256, 300])
 def test_many_values(values: int, tmp_path: Path, require_tool: Callable[..., str]) -> None:
     check(write(tmp_path, most=values, values=values), require_tool("gcc", package="gcc"))
-
-
-def test_answers_of_no_bytes(tmp_path: Path, require_tool: Callable[..., str]) -> None:
-    check(written(tmp_path, BARE), require_tool("gcc", package="gcc"))

@@ -76,11 +76,10 @@ class _Vectors:
             begun.add(one.message.direction)
 
     def rows(self, vectors: Mapping[str, Good]) -> Iterator[Mapping[str, Json]]:
-        """The lines of a message in the file; equal frames are one, and no bytes are no frame."""
+        """The lines of a message in the file; equal frames are one."""
         kinds: dict[tuple[bytes, bytes], list[str]] = {}
         for kind, good in vectors.items():
-            if good.wire:
-                kinds.setdefault((good.request, good.wire), []).append(kind)
+            kinds.setdefault((good.request, good.wire), []).append(kind)
         for same in kinds.values():
             yield self._row(same, vectors[same[0]])
 
