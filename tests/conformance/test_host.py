@@ -80,7 +80,7 @@ def test_every_vector_is_there_and_fine(
     program = require_tool(compiler, package=compiler.replace("clang++", "clang"))
     language = ("-x", "c++") if compiler.endswith("++") else ()
     report = kits.ran(kits.compiled(tmp_path / "kit", program, *flags, kits.STDIO, *language, kit(name)))
-    report.check(name)
+    report.check()
     check_values = [each for each in report.names if each.startswith("check value ")]
     assert len(check_values) == (name != "mc1231a")
     counted = report.by_verb
@@ -110,7 +110,7 @@ def test_parts_are_the_whole(kit: Write, tmp_path: Path, require_tool: Callable[
             part = (f"-DCONFORMANCE_FIRST={first}", f"-DCONFORMANCE_LAST={last}")
             file = kits.compiled(tmp_path / "kit", program, "-std=c99", *part, kits.STDIO, kit("modbus_rtu"))
             report = kits.ran(file)
-            report.check("modbus_rtu")
+            report.check()
             found += report.by_verb
         assert set(vectors_of("modbus_rtu") - found) == lost
 
@@ -119,7 +119,7 @@ def test_dispatching_can_be_left_out(kit: Write, tmp_path: Path, require_tool: C
     program = require_tool("clang", package="clang")
     options = ("-std=c99", "-DCONFORMANCE_DISPATCH=0", kits.STDIO)
     report = kits.ran(kits.compiled(tmp_path / "kit", program, *options, kit("modbus_rtu")))
-    report.check("modbus_rtu")
+    report.check()
     assert set(report.by_verb) >= {"encode", "decode", "receive"}
     assert not {"ask", "tell"} & set(report.by_verb)
 
@@ -140,7 +140,7 @@ def test_a_role_has_the_vectors_of_its_side(
     only = ("set_pos", "get_pos", "update") if name == "mc1231a" else ()
     file = kits.write(name, tmp_path, Options(role=role, only=only))
     report = kits.ran(kits.compiled(tmp_path / "kit", program, "-std=c99", kits.STDIO, file))
-    report.check(name)
+    report.check()
     messages = [m for m in cases.protocol(name).messages if not only or m.command in only]
     sent, heard = ("response", "request") if role == "slave" else ("request", "response")
     for verb, direction in (("encode", sent), ("decode", heard)):
@@ -154,7 +154,7 @@ def test_what_is_left_out_has_no_vectors(tmp_path: Path, require_tool: Callable[
     file = kits.write("qlink", tmp_path, Options(role="slave", only=("motion", "node_start")))
     program = require_tool("gcc", package="gcc")
     report = kits.ran(kits.compiled(tmp_path / "kit", program, "-std=c99", kits.STDIO, file))
-    report.check("qlink")
+    report.check()
     names = {"motion.request", "motion.response", "node_start.request"}
     assert {each.split(" ")[0] for each in report.names} - {"check"} == names
     assert set(re.findall(r"^/\* [0-9]+: (\S+) \*/$", file.read_text(), re.MULTILINE)) == names
@@ -193,4 +193,4 @@ def test_it_can_be_called(kit: Write, tmp_path: Path, require_tool: Callable[...
     assert first == third
     for part in (first, second):
         report = kits.report(int("\nnot ok" in part), part)
-        report.check("modbus_rtu" if part is second else "trio")
+        report.check()

@@ -87,7 +87,7 @@ def test_a_mistake_is_found(what: str, kit: Write, tmp_path: Path, require_tool:
     report = run_with(mistake, kit, tmp_path, require_tool("clang", package="clang"))
     assert report.status == 1
     assert len(report.names) == report.planned
-    failed = report.unforeseen(mistake.name)
+    failed = report.failed
     assert {each.split(" ")[0] for each in failed} == mistake.messages
     assert {each.rsplit(" ", 1)[1] for each in failed} == mistake.verbs
 

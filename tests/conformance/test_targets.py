@@ -21,7 +21,7 @@ def test_big_endian(name: str, kit: Write, tmp_path: Path, require_tool: Callabl
     emulator = require_tool("qemu-s390x", package="qemu-user")
     program = kits.compiled(tmp_path / "kit", compiler, "-std=c99", "-O0", "-static", kits.STDIO, kit(name))
     report = kits.ran(emulator, program)
-    report.check(name)
+    report.check()
     assert not vectors_of(name) - report.by_verb
 
 
@@ -51,7 +51,7 @@ def test_cortex_m3_without_a_library(
         "-semihosting",
     )
     report = kits.ran(emulator, *machine, "-kernel", program)
-    report.check(name)
+    report.check()
     assert not vectors_of(name) - report.by_verb
 
 
@@ -98,7 +98,7 @@ def test_atmega328p(
         *(kits.TARGETS_DIR / "avr_main.c", kit(name)),
     )
     report = kits.ran(simulator, program)
-    report.check(name)
+    report.check()
     messages = [message.name for message in cases.protocol(name).messages]
     kept = set(messages[part[0] : part[1] + 1] if part else messages)
     assert {each.split(" ")[0] for each in report.names} - {"check"} == kept

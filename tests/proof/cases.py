@@ -25,21 +25,6 @@ SHIPPED = ("qlink", "trio", "mc1231a")
 OTHERS = tuple(sorted(path.stem for path in (ROOT / "tests" / "schemas").glob("*.yaml")))
 PROTOCOLS = (*SHIPPED, *OTHERS)
 
-#: Wrong frames that C and construct, which do not print the plan of a frame yet, give another kind: the kind
-#: found and that of the plan, and how many there are. An entry goes as soon as they agree.
-UNLIKE: Mapping[tuple[str, str], Mapping[tuple[str, str], int]] = {
-    ("mc1231a", "construct"): {
-        ("length", "truncated"): 68,
-        ("illegal", "truncated"): 41,
-        ("crc", "length"): 1,
-    },
-    ("modbus_rtu", "construct"): {
-        ("length", "truncated"): 13,
-        ("crc", "truncated"): 17,
-        ("crc", "length"): 2,
-    },
-}
-
 
 @dataclass(frozen=True)
 class Case:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from qlinkgen.backends.c.interface import count_member, interface
+from qlinkgen.model import naming
 from qlinkgen.model.message import Direction, Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
@@ -314,7 +315,7 @@ class _Source:
 
 
 def _parsed(value: Value) -> list[str]:
-    kind, name = value.type, value.name
+    kind, name = value.type, naming.member(value.name)
     if isinstance(kind, Scalar):
         number = "strtoll" if kind.signed else "strtoull"
         width = next(w for w in (8, 16, 32, 64) if w >= kind.bits)
@@ -357,7 +358,7 @@ def _parsed(value: Value) -> list[str]:
 
 
 def _printed(value: Value) -> list[str]:
-    kind, name = value.type, value.name
+    kind, name = value.type, naming.member(value.name)
     if isinstance(kind, Scalar):
         form, cast = ("%lld", "long long") if kind.signed else ("%llu", "unsigned long long")
         return [f'printf(" {form}", ({cast})m->{name});']

@@ -32,6 +32,7 @@ from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, SevenBit
 from qlinkgen.schema import loads
 from tests.c import test_shapes
 from tests.proof import cases
+from tests.proof.outputs import plain_numbers
 from tests.support.whole import schemas
 
 Row = Mapping[str, Any]
@@ -77,8 +78,6 @@ def test_every_right_vector_decodes_in_python_and_construct() -> None:
     for plan, document in written():
         module, live = python.load(plan.protocol), construct.live(plan.protocol)
         for row in document["vectors"]:
-            if not row["wire"]:  # a response of nothing at all: no bytes are no frame
-                continue
             message = plan.message(row["message"])
             fields = {v.name: from_json(v, row["fields"][v.name]) for v in message.message.values}
             found = decoded(module, plan, message, row)
@@ -86,7 +85,8 @@ def test_every_right_vector_decodes_in_python_and_construct() -> None:
             assert {name: getattr(found, name) for name in fields} == fields, row
             parsed = live.parse(plan.hears(message), wire(row), wire(row, "request"))
             assert parsed["message"] == message.name
-            assert {name: parsed["fields"][name] for name in fields} == fields, row
+            parsed_fields = plain_numbers(parsed["fields"])
+            assert {name: parsed_fields[name] for name in fields} == fields, row
             address = row.get(plan.frame.address)
             assert address == (getattr(found, plan.frame.address) if plan.frame.address else None)
             assert address == parsed.get(plan.frame.address)
