@@ -16,7 +16,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.model.texts import one_line
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.dissect import dissect, request_size
-from qlinkgen.plan.payload import MemberConstant, MemberReserved, MemberValue
+from qlinkgen.plan.payload import Member
 from qlinkgen.plan.spans import Dissection, Rule, Span
 
 Line = tuple[int, str, str, str, bool]
@@ -141,7 +141,7 @@ def _of_span(found: Dissection, span: Span) -> Iterator[Line]:
     part, value = value_of(found, span)
     misplaced = {fault.at for fault in found.faults if fault.rule is Rule.STUFFING}
     match span.of:
-        case MemberValue() | MemberConstant() | MemberReserved():
+        case Member():
             yield span.places[-1], "", f"  .{part}", value, span.fault != ""
         case _:
             for place, byte in zip(span.places, span.raw, strict=True):

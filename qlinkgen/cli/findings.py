@@ -19,7 +19,7 @@ from qlinkgen.plan.describe import (
     value_text,
 )
 from qlinkgen.plan.framing import ByLength, ByMark, CheckPart, ConstantPart, LengthPart, MarkPart
-from qlinkgen.plan.payload import Member, Step
+from qlinkgen.plan.payload import ConstantStep, Member, Step
 from qlinkgen.plan.spans import Dissection, Fault, Rule
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan
@@ -228,7 +228,7 @@ def _value(fault: Fault) -> Words:
     seen = fault.seen or 0
     if scalar is None:
         return f"{fault.of.name} has a byte 0x{seen:02X} that it cannot have", "bytes were changed on the way"
-    if scalar.constant:
+    if isinstance(fault.of, ConstantStep):
         always = number_text(scalar.default)
         cause = "another message or revision of the protocol"
         return f"{fault.of.name} is {seen}, but is always {always}", cause

@@ -22,9 +22,6 @@ from qlinkgen.plan.payload import (
     CountStep,
     ItemsStep,
     Member,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
     ReservedStep,
     Step,
     ValueStep,
@@ -75,9 +72,7 @@ def _of_part(found: Dissection, part: Part, span: Span) -> str:
 def _of_field(field: Step | Member, span: Span) -> str:
     number = span.number or 0
     match field:
-        case ConstantStep() | ReservedStep() | ValueStep():
-            return value_text(field.number, number)
-        case MemberConstant() | MemberReserved() | MemberValue():
+        case ConstantStep() | ReservedStep() | ValueStep() | Member():
             return value_text(field.number, number)
         case CountStep():
             return str(number)

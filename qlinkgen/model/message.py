@@ -115,8 +115,7 @@ class Message:
         for field in self.fields:
             if isinstance(field.type, Bits):
                 for member in field.type.members:
-                    if member.type.settable:
-                        yield Value(member.name, member.type, member.doc, field, member)
+                    yield Value(member.name, member.type, member.doc, field, member)
             elif not isinstance(field.type, Scalar) or field.type.settable:
                 yield Value(field.name, field.type, field.doc, field)
 

@@ -25,14 +25,19 @@ __all__ = [
     "ByteOrder",
     "Chunk",
     "Constant",
+    "Count",
     "Enum",
     "FieldType",
     "Flags",
     "Integer",
     "Length",
+    "NamedValue",
     "Number",
+    "Reserved",
+    "Role",
     "Scalar",
     "Scaling",
+    "Settable",
     "byte_chunks",
     "group_chunks",
 ]
@@ -47,7 +52,7 @@ _EXACT = Context(prec=100)
 
 
 @dataclass(frozen=True, slots=True)
-class Constant:
+class NamedValue:
     """One name of an enum, or one bit of a set of flags."""
 
     name: str
@@ -61,7 +66,7 @@ class Enum:
 
     name: str
     bits: int
-    members: tuple[Constant, ...]
+    members: tuple[NamedValue, ...]
     doc: Text = ""
     section: Text = ""
 
@@ -72,11 +77,11 @@ class Enum:
 
 @dataclass(frozen=True, slots=True)
 class Flags:
-    """Named bits of an integer; ``Constant.value`` is the bit's number. Other bits are reserved."""
+    """Named bits of an integer; ``NamedValue.value`` is the bit's number. Other bits are reserved."""
 
     name: str
     bits: int
-    members: tuple[Constant, ...]
+    members: tuple[NamedValue, ...]
     #: True: a reserved bit that is set is a range error. False: reserved bits are kept as they are.
     reserved_zero: bool = False
     doc: Text = ""
@@ -126,6 +131,38 @@ def _gcd(a: int, b: int) -> int:
     return a
 
 
+@dataclass(frozen=True, slots=True)
+class Settable:
+    """The caller chooses the value."""
+
+    #: No default is written, and 0 is not legal.
+    required: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """Always sent as the default, and must be received as it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reserved:
+    """Sent as the default, and ignored when received."""
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """The size of a run that follows: filled and verified by the codec."""
+
+    #: Name of the field of variable size.
+    run: str
+    #: What is counted of it.
+    unit: Literal["items", "bytes"]
+
+
+#: What a codec does with an integer.
+Role = Settable | Constant | Reserved | Count
+
+
 @dataclass(frozen=True, kw_only=True)
 class Scalar:
     """An integer on the wire, whatever it means: number, bool, enum, flags, scaled or fixed-point value."""
@@ -136,21 +173,12 @@ class Scalar:
     minimum: int
     maximum: int
     default: int = 0
-    #: The caller has to choose: no default is written, and 0 is not legal.
-    required: bool = False
+    role: Role = Settable()
     scaling: Scaling | None = None
     unit: Text = ""
     meaning: Enum | Flags | Literal["bool"] | None = None
     #: The named type that the field has, "" where its type has no name. Equal layouts may differ in it.
     type_name: str = field(default="", compare=False)
-    #: A constant is always sent as ``default`` and must be received as it.
-    constant: bool = False
-    #: Reserved bits are sent as ``default`` and ignored when received.
-    reserved: bool = False
-    #: Name of the variable field whose size this one carries; filled and verified by the codec.
-    counts: str = ""
-    #: What it counts: "items" or "bytes" of that field.
-    counts_unit: Literal["items", "bytes"] = "items"
 
     @property
     def size(self) -> int:
@@ -184,8 +212,13 @@ class Scalar:
 
     @property
     def settable(self) -> bool:
-        """The caller chooses the value (it is no constant, reserved, or count that the codec fills)."""
-        return not (self.constant or self.reserved or self.counts)
+        """The caller chooses the value; the codec fills the others."""
+        return isinstance(self.role, Settable)
+
+    @property
+    def required(self) -> bool:
+        """The caller has to choose: no default is written, and 0 is not legal."""
+        return self.role == Settable(required=True)
 
     @property
     def number(self) -> Literal["int", "float", "decimal"]:

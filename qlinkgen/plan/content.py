@@ -20,9 +20,7 @@ from qlinkgen.plan.payload import (
     Infer,
     ItemsStep,
     Learn,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
+    Member,
     PayloadPlan,
     ReservedStep,
     RunStep,
@@ -79,10 +77,10 @@ def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     return b"".join(_packed(step, whole, counts) for step in plan.steps)
 
 
-def default_of(each: ValueStep | MemberValue | RunStep) -> Raw:
+def default_of(each: ValueStep | Member | RunStep) -> Raw:
     """What is sent where the caller gives nothing."""
     match each:
-        case ValueStep() | MemberValue():
+        case ValueStep() | Member():
             return each.number.default
         case BytesStep():
             return each.default
@@ -118,14 +116,8 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
             assert_never(step)
 
 
-def _member_bits(member: MemberValue | MemberConstant | MemberReserved, values: Mapping[str, Raw]) -> int:
-    match member:
-        case MemberValue():
-            return _checked(member.name, member.number, values[member.name]) & member.number.integer.mask
-        case MemberConstant() | MemberReserved():
-            return member.value
-        case _:
-            assert_never(member)
+def _member_bits(member: Member, values: Mapping[str, Raw]) -> int:
+    return _checked(member.name, member.number, values[member.name]) & member.number.integer.mask
 
 
 def _checked(name: str, number: Scalar, value: object) -> int:
@@ -262,6 +254,6 @@ def _members(step: BitsStep, whole: int, at: int) -> dict[str, Raw]:
         value = integer.signed_value(whole >> member.shift & integer.mask)
         if broken(member.conditions, value):
             raise BadContent("range", member.name, at)
-        if isinstance(member, MemberValue):
+        if isinstance(member, Member):
             found[member.name] = value
     return found

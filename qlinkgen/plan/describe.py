@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import assert_never
 
 from qlinkgen.model.integer import Chunk, Integer
-from qlinkgen.model.types import Enum, Flags, Length, Number, Scalar
+from qlinkgen.model.types import Constant, Count, Enum, Flags, Length, Number, Reserved, Scalar, Settable
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
@@ -39,9 +39,6 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Learn,
     Member,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
     ReservedStep,
     Sizing,
     Step,
@@ -77,11 +74,15 @@ def limits_text(scalar: Scalar) -> str:
 
 def range_text(scalar: Scalar) -> str:
     """Legal values in the unit; "" for a bool, an enum or flags that may hold anything."""
-    if scalar.constant:
-        return f"always {number_text(scalar.physical(scalar.default))}"
-    if scalar.reserved:
-        return "reserved"
-    return "" if scalar.meaning is not None and scalar.full_range else limits_text(scalar)
+    match scalar.role:
+        case Constant():
+            return f"always {number_text(scalar.physical(scalar.default))}"
+        case Reserved():
+            return "reserved"
+        case Settable() | Count():
+            return "" if scalar.meaning is not None and scalar.full_range else limits_text(scalar)
+        case _:
+            assert_never(scalar.role)
 
 
 def scale_text(scalar: Scalar) -> str:
@@ -121,9 +122,7 @@ def value_text(scalar: Scalar, raw: int) -> str:
 def number_of(step: Step | Member) -> Scalar | None:
     """What the number of a step means, or that of each of its items; None where it holds no value."""
     match step:
-        case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep():
-            return step.number
-        case MemberValue() | MemberConstant() | MemberReserved():
+        case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep() | Member():
             return step.number
         case CountStep() | BitsStep() | BytesStep():
             return None
@@ -134,9 +133,7 @@ def number_of(step: Step | Member) -> Scalar | None:
 def type_text(step: Step | Member) -> str:
     """A type as a schema would name it: u16, i32 little, text[1..256], u16[0..12]."""
     match step:
-        case ValueStep() | ConstantStep() | ReservedStep():
-            return _scalar_text(step.number)
-        case MemberValue() | MemberConstant() | MemberReserved():
+        case ValueStep() | ConstantStep() | ReservedStep() | Member():
             return _scalar_text(step.number)
         case CountStep() | BitsStep():
             return integer_text(step.integer)
@@ -186,9 +183,7 @@ def _length_text(length: Length) -> str:
 def holds_text(step: Step | Member) -> str:
     """What a step may hold, beyond its type: a range, a constant, or what it counts."""
     match step:
-        case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep():
-            return range_text(step.number)
-        case MemberValue() | MemberConstant() | MemberReserved():
+        case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep() | Member():
             return range_text(step.number)
         case CountStep():
             return f"{count_unit(step)} of {step.run}"
@@ -203,11 +198,11 @@ def holds_text(step: Step | Member) -> str:
 def kind_text(step: Step | Member) -> str:
     """What a step does, in a word."""
     match step:
-        case ValueStep() | MemberValue():
+        case ValueStep() | Member():
             return "value"
-        case ConstantStep() | MemberConstant():
+        case ConstantStep():
             return "constant"
-        case ReservedStep() | MemberReserved():
+        case ReservedStep():
             return "reserved"
         case CountStep():
             return "count"
@@ -224,13 +219,11 @@ def kind_text(step: Step | Member) -> str:
 def must_text(step: Step | Member) -> str:
     """What must hold of the raw number of a step, or of each of its items, beyond what its bits can hold."""
     match step:
-        case ValueStep() | ItemsStep() | MemberValue():
+        case ValueStep() | ItemsStep() | Member():
             return " and ".join(map(condition_text, step.conditions))
         case ConstantStep():
             return str(step.value)
-        case MemberConstant():
-            return str(step.number.integer.signed_value(step.value))
-        case ReservedStep() | MemberReserved():
+        case ReservedStep():
             return f"anything; sent as {step.value}"
         case CountStep():
             return f"{count_unit(step)} of {step.run}, {condition_text(step.bounds)}"

@@ -13,7 +13,20 @@ from typing import assert_never
 
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Field, Message
-from qlinkgen.model.types import Array, BitField, Bits, Blob, Enum, Flags, Length, Scalar
+from qlinkgen.model.types import (
+    Array,
+    BitField,
+    Bits,
+    Blob,
+    Constant,
+    Count,
+    Enum,
+    Flags,
+    Length,
+    Reserved,
+    Scalar,
+    Settable,
+)
 from qlinkgen.plan.expr import Clear, Limit, Size, Within
 
 
@@ -99,7 +112,7 @@ class CountStep:
 
 
 @dataclass(frozen=True)
-class MemberValue:
+class Member:
     """Bits that the caller chooses and reads."""
 
     name: str
@@ -111,45 +124,6 @@ class MemberValue:
     def conditions(self) -> tuple[Limit, ...]:
         """What must hold of the number, beyond what its bits can hold."""
         return conditions(self.number)
-
-
-@dataclass(frozen=True)
-class MemberConstant:
-    """Bits that are always the same; ``value`` is the bit pattern."""
-
-    name: str
-    shift: int
-    bits: int
-    value: int
-    number: Scalar
-
-    @property
-    def signed(self) -> bool:
-        """The number is in two's complement."""
-        return self.number.signed
-
-    @property
-    def conditions(self) -> tuple[Limit, ...]:
-        """What must hold of the number."""
-        value = self.number.integer.signed_value(self.value)
-        return (Within(value, value),)
-
-
-@dataclass(frozen=True)
-class MemberReserved:
-    """Bits that are sent as ``value`` and ignored when received."""
-
-    name: str
-    shift: int
-    bits: int
-    value: int
-    number: Scalar
-
-    #: What must hold of the number.
-    conditions = ()
-
-
-Member = MemberValue | MemberConstant | MemberReserved
 
 
 @dataclass(frozen=True)
@@ -298,15 +272,15 @@ class PayloadPlan:
         )
 
     @property
-    def settable(self) -> tuple[ValueStep | MemberValue | BytesStep | ItemsStep, ...]:
+    def settable(self) -> tuple[ValueStep | Member | BytesStep | ItemsStep, ...]:
         """What a caller sets and reads, in wire order."""
-        found: list[ValueStep | MemberValue | BytesStep | ItemsStep] = []
+        found: list[ValueStep | Member | BytesStep | ItemsStep] = []
         for step in self.steps:
             match step:
                 case ValueStep() | BytesStep() | ItemsStep():
                     found.append(step)
                 case BitsStep():
-                    found += [member for member in step.members if isinstance(member, MemberValue)]
+                    found += step.members
                 case ConstantStep() | ReservedStep() | CountStep():
                     pass
                 case _:
@@ -392,18 +366,21 @@ class _Planner:
                 assert_never(kind)
 
     def _integer(self, name: str, scalar: Scalar, place: Place) -> Step:
-        if scalar.reserved:
-            return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
-        if scalar.constant:
-            return ConstantStep(name, place, scalar.integer, scalar.default, scalar)
-        if not scalar.counts:
-            return ValueStep(name, place, scalar.integer, scalar)
-        counted = self._fields[scalar.counts]
-        assert isinstance(counted.type, Blob | Array)
-        scale = counted.type.item_size if scalar.counts_unit == "bytes" else 1
-        length = counted.type.length
-        bounds = Within(length.minimum * scale, length.maximum * scale)
-        return CountStep(name, place, scalar.integer, counted.name, scale, bounds)
+        match scalar.role:
+            case Settable():
+                return ValueStep(name, place, scalar.integer, scalar)
+            case Constant():
+                return ConstantStep(name, place, scalar.integer, scalar.default, scalar)
+            case Reserved():
+                return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
+            case Count(run, unit):
+                counted = self._fields[run].type
+                assert isinstance(counted, Blob | Array)
+                scale = counted.item_size if unit == "bytes" else 1
+                bounds = Within(counted.length.minimum * scale, counted.length.maximum * scale)
+                return CountStep(name, place, scalar.integer, run, scale, bounds)
+            case _:
+                assert_never(scalar.role)
 
     def _sizing(self, steps: list[Step], size: Size) -> Iterator[Sizing]:
         """Wire order: the count that a run names precedes it; lint refuses a count after an open run."""
@@ -429,13 +406,7 @@ class _Planner:
 
 
 def _member(member: BitField) -> Member:
-    kind = member.type
-    pattern = kind.default & kind.integer.mask
-    if kind.reserved:
-        return MemberReserved(member.name, member.shift, kind.bits, pattern, kind)
-    if kind.constant:
-        return MemberConstant(member.name, member.shift, kind.bits, pattern, kind)
-    return MemberValue(member.name, member.shift, kind.bits, kind)
+    return Member(member.name, member.shift, member.type.bits, member.type)
 
 
 def _item_size(field: Field) -> int:

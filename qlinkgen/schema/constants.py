@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from qlinkgen.model.types import Constant, Enum, Flags
+from qlinkgen.model.types import Enum, Flags, NamedValue
 from qlinkgen.schema.file_model import EnumSpec, FlagsSpec
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
@@ -35,7 +35,7 @@ def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:
     members = {key: value.value for key, value in spec.values.items()}
     limits = integer_range(bits, signed=signed)
     _check_members(members, limits, f"does not fit {spec.type}", path, report)
-    constants = tuple(Constant(key, value.value, value.doc) for key, value in spec.values.items())
+    constants = tuple(NamedValue(key, value.value, value.doc) for key, value in spec.values.items())
     return Enum(name, bits, constants, spec.doc, spec.section)
 
 
@@ -45,7 +45,7 @@ def build_flags(name: str, spec: FlagsSpec, report: Reporter) -> Flags:
     bits, _ = _carrier(spec.type, path, report, signed=False)
     members = {key: value.bit for key, value in spec.values.items()}
     _check_members(members, (0, bits - 1), f"is no bit of {spec.type}", path, report)
-    constants = tuple(Constant(key, value.bit, value.doc) for key, value in spec.values.items())
+    constants = tuple(NamedValue(key, value.bit, value.doc) for key, value in spec.values.items())
     return Flags(name, bits, constants, spec.reserved == "zero", spec.doc, spec.section)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.message import Field
-from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.file_model import Fields, FieldSpec, SchemaFile
 from qlinkgen.schema.notation import shown, type_text
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -56,29 +56,29 @@ class FieldBuilder:
         """The fields, where those that have a count know it."""
         counters: dict[str, str] = {}
         for index, field in enumerate(fields):
-            if isinstance(field.type, Scalar) and field.type.counts:
+            if isinstance(field.type, Scalar) and isinstance(count := field.type.role, Count):
                 later = {other.name: other for other in fields[index + 1 :]}
-                if self._check_count(field, field.type, later, (*path, field.name, "counts")):
-                    counters.setdefault(field.type.counts, field.name)
+                if self._check_count(field, field.type, count, later, (*path, field.name, "counts")):
+                    counters.setdefault(count.run, field.name)
         return [_with_counter(field, counters.get(field.name)) for field in fields]
 
-    def _check_count(self, field: Field, count: Scalar, later: Mapping[str, Field], path: Path) -> bool:
-        target = later.get(count.counts)
-        needs = (path[:-1], (*path[:-2], count.counts))
+    def _check_count(
+        self, field: Field, scalar: Scalar, count: Count, later: Mapping[str, Field], path: Path
+    ) -> bool:
+        target = later.get(count.run)
+        needs = (path[:-1], (*path[:-2], count.run))
         if target is None or not isinstance(target.type, Blob | Array) or target.type.length.fixed:
             known = [name for name, other in later.items() if not other.fixed]
-            hint = did_you_mean(count.counts, known, f"such fields here: {listed(known)}")
-            what = f"{shown(count.counts)} is no field of variable size behind {field.name}"
+            hint = did_you_mean(count.run, known, f"such fields here: {listed(known)}")
+            what = f"{shown(count.run)} is no field of variable size behind {field.name}"
             self._report.error("bad-count", path, what, hint, needs=needs)
             self._report.taint(path)
             return False
-        if isinstance(target.type, Blob) and count.counts_unit == "items":
-            # An item of a byte string is a byte: say so once, here.
-            count = replace(count, counts_unit="bytes")
-        most = target.type.length.maximum * (target.type.item_size if count.counts_unit == "bytes" else 1)
-        if most > count.maximum and (*path[:-2], target.name) not in self._types.unbounded:
-            unit = count.counts_unit
-            what = f"{field.name} counts up to {count.maximum}, {target.name} has up to {most} {unit}"
+        # An item of a byte string is a byte.
+        unit = "bytes" if isinstance(target.type, Blob) else count.unit
+        most = target.type.length.maximum * (target.type.item_size if unit == "bytes" else 1)
+        if most > scalar.maximum and (*path[:-2], target.name) not in self._types.unbounded:
+            what = f"{field.name} counts up to {scalar.maximum}, {target.name} has up to {most} {unit}"
             self._report.error(
                 "bad-count", path, what, f"shorten {target.name}, or use a wider count", needs=needs
             )
@@ -128,8 +128,9 @@ class FieldBuilder:
         kind, place = field.type, (*path, field.name)
         assert isinstance(kind, Blob | Array)
         most = max(0, room) // kind.item_size
-        if counter := counters.get(kind.length.counted_by):
-            most = min(most, counter.maximum // (kind.item_size if counter.counts_unit == "bytes" else 1))
+        counter = counters.get(kind.length.counted_by)
+        if counter and isinstance(counter.role, Count):
+            most = min(most, counter.maximum // (kind.item_size if counter.role.unit == "bytes" else 1))
         if most == 0:
             what = f"no room is left for {field.name}"
             hint = f"the frame holds {self._payload_max} bytes; shorten the other fields"

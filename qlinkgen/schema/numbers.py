@@ -7,7 +7,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Protocol
 
-from qlinkgen.model.types import DOUBLE_BITS, Enum, Flags, Scalar, Scaling
+from qlinkgen.model.types import DOUBLE_BITS, Enum, Flags, Scalar, Scaling, Settable
 from qlinkgen.schema.constants import MAX_BITS
 from qlinkgen.schema.notation import Range, shown
 from qlinkgen.schema.report import did_you_mean, listed
@@ -109,7 +109,7 @@ def defaulted(scalar: Scalar, value: Written | None, key: str, site: Site) -> Sc
     """A scalar with the default or constant that is written for it; without one, the number nearest to 0."""
     if value is None:
         nearest = min(max(0, scalar.minimum), scalar.maximum)
-        return replace(scalar, default=nearest, required=nearest != 0)
+        return replace(scalar, default=nearest, role=Settable(required=nearest != 0))
     raw = _raw(scalar, value, key, site)
     if raw is None:
         return scalar

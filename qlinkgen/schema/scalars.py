@@ -8,7 +8,18 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal
 
-from qlinkgen.model.types import Chunk, Enum, Flags, Scalar, Scaling, byte_chunks, group_chunks
+from qlinkgen.model.types import (
+    Chunk,
+    Constant,
+    Count,
+    Enum,
+    Flags,
+    Reserved,
+    Scalar,
+    Scaling,
+    byte_chunks,
+    group_chunks,
+)
 from qlinkgen.schema.constants import INTEGER, MAX_BITS, carrier, integer_range
 from qlinkgen.schema.file_model import FieldSpec, SchemaFile
 from qlinkgen.schema.notation import shown
@@ -120,11 +131,13 @@ class ScalarBuilder:
         )  # fmt: skip
         _check_keys(spec, plain, site)
         if spec.counts is not None:
-            return replace(scalar, counts=spec.counts, counts_unit=spec.counts_in)
+            return replace(scalar, role=Count(spec.counts, spec.counts_in))
         scalar = quantified(scalar, spec, plain.what, site)
         key = "const" if spec.const is not None else "default"
         scalar = defaulted(scalar, getattr(spec, key), key, site)
-        return replace(scalar, constant=spec.const is not None and not spec.reserved, reserved=spec.reserved)
+        if spec.reserved:
+            return replace(scalar, role=Reserved())
+        return scalar if spec.const is None else replace(scalar, role=Constant())
 
     def _chunks(self, spec: FieldSpec, bits: int, base: str, site: Site) -> tuple[Chunk, ...] | None:
         if not 1 <= bits <= MAX_BITS:

@@ -15,7 +15,7 @@ import pytest
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import MessagePlan, Plan, plan_of
 from qlinkgen.plan.content import BadContent, Raw, Unsendable, pack, unpack
-from qlinkgen.plan.payload import BytesStep, CountStep, ItemsStep, MemberValue, ValueStep, least_size
+from qlinkgen.plan.payload import BytesStep, CountStep, ItemsStep, Member, ValueStep, least_size
 from qlinkgen.schema import loads
 from tests.c.conftest import SANITIZED
 from tests.c.test_shapes import EMPTY, FIELDS
@@ -89,7 +89,7 @@ def values(message: MessagePlan, chance: random.Random) -> dict[str, Raw]:
     found: dict[str, Raw] = {}
     for each in message.payload.settable:
         match each:
-            case ValueStep() | MemberValue():
+            case ValueStep() | Member():
                 numbers = (each.number.minimum, each.number.default, each.number.maximum)
                 found[each.name] = chance.choice(
                     [n for n in numbers if all(c.holds(n) for c in each.conditions)]

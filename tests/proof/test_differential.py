@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.types import Array, Scalar
+from qlinkgen.model.types import Array, Count, Scalar
 from qlinkgen.model.values import native_from_raw
 from tests.proof import cases
 from tests.proof.outputs import OUTPUTS, Decoded, Output, Refused
@@ -121,7 +121,8 @@ def as_reason(name: str, message: Message, found: Any) -> Any:
     Without a length a frame that is cut short and a payload of the wrong size are one thing. Behind a wrong
     count every byte stands for another field: size and a value can be wrong at once, and either may be named.
     """
-    counted = any(isinstance(field.type, Scalar) and field.type.counts for field in message.fields)
+    kinds = [field.type for field in message.fields if isinstance(field.type, Scalar)]
+    counted = any(isinstance(kind.role, Count) for kind in kinds)
     if counted and found in ((Refused, "length"), (Refused, "range"), (Refused, "truncated")):
         return Refused
     frame = cases.protocol(name).frame

@@ -12,7 +12,7 @@ from qlinkgen.backends.c.interface import Interface, interface
 from qlinkgen.backends.c.names import integer_type, scalar_literal, scalar_type
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Bits, Scalar
+from qlinkgen.model.types import Array, Bits, Reserved, Scalar
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.framing import Hunt, Rescan
 from qlinkgen.plan.transparency import FrameStuffing
@@ -22,10 +22,10 @@ def _ignores_bits(message: Message) -> bool:
     """Some received bits are not kept: what is encoded again may differ in them."""
     for each in message.fields:
         kind = each.type
-        if isinstance(kind, Scalar) and kind.reserved:
+        if isinstance(kind, Scalar) and isinstance(kind.role, Reserved):
             return True
         if isinstance(kind, Bits):
-            kept = sum(member.mask for member in kind.members if not member.type.reserved)
+            kept = sum(member.mask for member in kind.members)
             if kept != (1 << kind.container.bits) - 1:
                 return True
     return False

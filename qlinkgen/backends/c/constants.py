@@ -9,7 +9,7 @@ from qlinkgen.backends.c.names import Names, bracketed, integer_type, literal, u
 from qlinkgen.model import sizes
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Constant, Enum, Flags
+from qlinkgen.model.types import Enum, Flags, NamedValue
 
 
 def limits(protocol: Protocol, kept: tuple[Message, ...]) -> list[tuple[str, str]]:
@@ -73,7 +73,7 @@ def _is_signed(each: Enum | Flags) -> bool:
     return isinstance(each, Enum) and any(member.value < 0 for member in each.members)
 
 
-def _number(member: Constant, each: Enum | Flags, *, signed: bool) -> str:
+def _number(member: NamedValue, each: Enum | Flags, *, signed: bool) -> str:
     if isinstance(each, Flags):
         return unsigned(1 << member.value, each.bits, hexadecimal=True)
     return bracketed(literal(member.value, each.bits, signed=signed))

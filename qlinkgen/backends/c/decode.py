@@ -24,9 +24,6 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Learn,
     Member,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
     Place,
     ReservedStep,
     RunStep,
@@ -148,16 +145,8 @@ class Decoder(Learner):
     def _member(self, member: Member, bits: int) -> None:
         mask = unsigned((1 << member.bits) - 1, bits, hexadecimal=True)
         raw = f"({f'(bits >> {member.shift})' if member.shift else 'bits'} & {mask})"
-        match member:
-            case MemberValue():
-                kind = "" if member.number.meaning == "bool" else f"({unsigned_type(member.bits)})"
-                self._assign(f"message->{naming.member(member.name)}", member.number, f"{kind}{raw}")
-            case MemberConstant():
-                self.refuse([f"{raw} != {unsigned(member.value, bits, hexadecimal=True)}"], "RANGE")
-            case MemberReserved():
-                pass
-            case _:
-                assert_never(member)
+        kind = "" if member.number.meaning == "bool" else f"({unsigned_type(member.bits)})"
+        self._assign(f"message->{naming.member(member.name)}", member.number, f"{kind}{raw}")
 
     def _number_of(self, run: RunStep) -> str:
         """How many items there are; where that varies, the message is told."""

@@ -7,7 +7,19 @@ from fractions import Fraction
 from qlinkgen.backends import c_text
 from qlinkgen.model.message import Field, Message, Value
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Array, Bits, Blob, Enum, Flags, Scalar
+from qlinkgen.model.types import (
+    Array,
+    Bits,
+    Blob,
+    Constant,
+    Count,
+    Enum,
+    Flags,
+    Reserved,
+    Role,
+    Scalar,
+    Settable,
+)
 
 #: Characters of a line of a comment.
 WIDTH = 100
@@ -41,6 +53,9 @@ def field_rows(message: Message) -> list[str]:
     return [f"{place:>4}  {kind:<{width}}  {name}".rstrip() for place, kind, name in rows]
 
 
+_ROLES: dict[type[Role], str] = {Settable: "", Constant: " const", Reserved: " reserved", Count: " count"}
+
+
 def _wire_type(field: Field) -> str:
     kind = field.type
     if isinstance(kind, Blob):
@@ -49,7 +64,7 @@ def _wire_type(field: Field) -> str:
         return f"{_integer(kind.item)}[{_length(kind)}]{_order(kind.item)}"
     if isinstance(kind, Bits):
         return f"{_integer(kind.container)}{_order(kind.container)}"
-    role = " const" if kind.constant else " reserved" if kind.reserved else " count" if kind.counts else ""
+    role = _ROLES[type(kind.role)]
     return f"{_integer(kind)}{_order(kind)}{role}"
 
 

@@ -19,9 +19,7 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
+    Member,
     PayloadPlan,
     Place,
     ReservedStep,
@@ -70,7 +68,7 @@ class Encoder:
                 self._check_value(step)
             case BitsStep():
                 for member in step.members:
-                    if isinstance(member, MemberValue):
+                    if isinstance(member, Member):
                         self._check_value(member)
             case BytesStep():
                 if step.text:
@@ -86,7 +84,7 @@ class Encoder:
             case _:
                 assert_never(step)
 
-    def _check_value(self, value: ValueStep | MemberValue) -> None:
+    def _check_value(self, value: ValueStep | Member) -> None:
         self._refuse(
             checks.refused_before_sending(value.number, f"message->{member_of(value.name)}"), "RANGE"
         )
@@ -144,20 +142,10 @@ def loop(count: str, body: list[str], kind: str = "size_t") -> list[str]:
 
 def _whole(step: BitsStep) -> str:
     """The integer that is put together from its members."""
-    bits, preset = step.integer.bits, 0
-    terms: list[str] = []
-    for member in step.members:
-        match member:
-            case MemberValue():
-                terms.append(
-                    _in_place(member.number, member.shift, f"message->{member_of(member.name)}", bits)
-                )
-            case MemberConstant() | MemberReserved():
-                preset |= member.value << member.shift
-            case _:
-                assert_never(member)
-    if preset or not terms:
-        terms.append(unsigned(preset, bits, hexadecimal=True))
+    bits = step.integer.bits
+    terms = [
+        _in_place(each.number, each.shift, f"message->{member_of(each.name)}", bits) for each in step.members
+    ]
     return terms[0] if len(terms) == 1 else f"({unsigned_type(bits)})({' | '.join(terms)})"
 
 

@@ -8,7 +8,7 @@ from qlinkgen.backends.c.dispatch import told_name
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.naming import file_stem, handler, member, snake
 from qlinkgen.model.transaction import Command
-from qlinkgen.plan.payload import MemberValue, ValueStep
+from qlinkgen.plan.payload import Member, ValueStep
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def _echo(request: MessagePlan, response: MessagePlan) -> list[str]:
 
 
 def _numbers(message: MessagePlan) -> list[str]:
-    return [each.name for each in message.payload.settable if isinstance(each, ValueStep | MemberValue)]
+    return [each.name for each in message.payload.settable if isinstance(each, ValueStep | Member)]
 
 
 def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: str) -> list[str]:

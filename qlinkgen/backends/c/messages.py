@@ -13,14 +13,14 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Types
 from qlinkgen.model import naming
-from qlinkgen.plan.payload import BytesStep, ItemsStep, MemberValue, RunStep, ValueStep
+from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
 from qlinkgen.plan.tree import MessagePlan
 
-Settable = ValueStep | MemberValue | RunStep
+Settable = ValueStep | Member | RunStep
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
+class StructMember:
     """One line of a struct."""
 
     declaration: str
@@ -105,7 +105,7 @@ class MessageWriter:
         lines = []
         for each in plan.payload.settable:
             match each:
-                case ValueStep() | MemberValue():
+                case ValueStep() | Member():
                     default = scalar_literal(each.number, each.number.default)
                     lines.append(f"message->{naming.member(each.name)} = {default};")
                 case BytesStep() | ItemsStep() if each.fixed or each.default:
@@ -124,10 +124,10 @@ class MessageWriter:
         kind = self._types.conversions(plan.message, each.name, each.number)
         return None if kind is None or kind.named else kind
 
-    def _members(self, each: Settable, note: str) -> list[Member]:
+    def _members(self, each: Settable, note: str) -> list[StructMember]:
         match each:
-            case ValueStep() | MemberValue():
-                return [Member(f"{self._types.of(each.number)} {naming.member(each.name)};", note)]
+            case ValueStep() | Member():
+                return [StructMember(f"{self._types.of(each.number)} {naming.member(each.name)};", note)]
             case BytesStep():
                 return _run_members(each, "uint8_t", "bytes", note)
             case ItemsStep():
@@ -136,15 +136,18 @@ class MessageWriter:
                 assert_never(each)
 
 
-def _run_members(run: RunStep, item: str, what: str, note: str) -> list[Member]:
+def _run_members(run: RunStep, item: str, what: str, note: str) -> list[StructMember]:
     most = run.length.maximum
-    number = Member(f"{count_type(most)} {run.name}_{run.quantity};", f"{what} in {run.name}")
-    return [*([] if run.fixed else [number]), Member(f"{item} {naming.member(run.name)}[{most}];", note)]
+    number = StructMember(f"{count_type(most)} {run.name}_{run.quantity};", f"{what} in {run.name}")
+    return [
+        *([] if run.fixed else [number]),
+        StructMember(f"{item} {naming.member(run.name)}[{most}];", note),
+    ]
 
 
 def _initialiser(each: Settable) -> str:
     match each:
-        case ValueStep() | MemberValue():
+        case ValueStep() | Member():
             return scalar_literal(each.number, each.number.default)
         case BytesStep():
             items = [unsigned(byte, 8, hexadecimal=True) for byte in each.default]
@@ -166,7 +169,7 @@ def nearest_helpers(types: Types, messages: tuple[MessagePlan, ...]) -> list[dic
         types.conversions(message.message, each.name, each.number)
         for message in messages
         for each in message.payload.settable
-        if isinstance(each, ValueStep | MemberValue)
+        if isinstance(each, ValueStep | Member)
     )
     return [
         {

@@ -13,7 +13,7 @@ from qlinkgen.backends.c.constants import constant_type
 from qlinkgen.backends.c.names import Names, bracketed, scalar_literal, scalar_type
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Enum, Flags, Scalar
-from qlinkgen.plan.payload import BytesStep, ItemsStep, MemberValue, ValueStep
+from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, ValueStep
 from qlinkgen.plan.tree import Plan
 
 
@@ -114,7 +114,7 @@ class Types:
         for message in self._plan.messages:
             for each in message.payload.settable:
                 match each:
-                    case ValueStep() | MemberValue() | ItemsStep():
+                    case ValueStep() | Member() | ItemsStep():
                         yield each.number
                     case BytesStep():
                         pass

@@ -21,9 +21,6 @@ from qlinkgen.plan.payload import (
     CountStep,
     ItemsStep,
     Member,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
     ReservedStep,
     Step,
     ValueStep,
@@ -119,11 +116,7 @@ class Types:
                     case ItemsStep():
                         yield step.number, integer(step.item)
                     case BitsStep():
-                        yield from (
-                            (each.number, _bits(each))
-                            for each in step.members
-                            if isinstance(each, MemberValue)
-                        )
+                        yield from ((each.number, _bits(each)) for each in step.members)
                     case ConstantStep() | ReservedStep() | CountStep() | BytesStep():
                         pass
                     case _:
@@ -196,15 +189,7 @@ class _Field:
 
     def _member(self, member: Member) -> Named:
         bits = _bits(member)
-        match member:
-            case MemberValue():
-                return Named(member.name, self._value(member.number, bits), self._inner[member.name])
-            case MemberConstant():
-                return Named(member.name, Call("Const", (member.value, bits)))
-            case MemberReserved():
-                return Named(member.name, Call("Rebuild", (bits, member.value)))
-            case _:
-                assert_never(member)
+        return Named(member.name, self._value(member.number, bits), self._inner[member.name])
 
     def _value(self, number: Scalar, raw: Node) -> Node:
         default = native_from_raw(number, number.default)
@@ -219,7 +204,7 @@ def _name(number: Scalar) -> str:
 
 
 def _bits(member: Member) -> Node:
-    signed = (("signed", True),) if isinstance(member, MemberValue) and member.number.signed else ()
+    signed = (("signed", True),) if member.number.signed else ()
     return Call("Bits", (member.shift, member.shift + member.bits - 1), signed)
 
 

@@ -24,7 +24,7 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
-    MemberValue,
+    Member,
     PayloadPlan,
     ReservedStep,
     Step,
@@ -193,7 +193,7 @@ class ClassBuilder:
         """The constant that converts each scaled value: named by its type, else by its field."""
         found = {}
         for each in message.payload.settable:
-            if isinstance(each, ValueStep | MemberValue) and each.number.scaling is not None:
+            if isinstance(each, ValueStep | Member) and each.number.scaling is not None:
                 found[each.name] = self._scale(each.name, each.number)
         return found
 

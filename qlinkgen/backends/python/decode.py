@@ -33,9 +33,7 @@ from qlinkgen.plan.payload import (
     Infer,
     ItemsStep,
     Learn,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
+    Member,
     ReservedStep,
     RunStep,
     Sizing,
@@ -377,17 +375,9 @@ class Decoder:
         for member in step.members:
             mask = (1 << member.bits) - 1
             taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
-            match member:
-                case MemberValue():
-                    self._member(member, taken, _offset(step))
-                case MemberConstant():
-                    self._refuse(f"({taken}) != {member.value}", member.name, taken, _offset(step))
-                case MemberReserved():
-                    pass
-                case _:
-                    assert_never(member)
+            self._member(member, taken, _offset(step))
 
-    def _member(self, member: MemberValue, taken: str, offset: str) -> None:
+    def _member(self, member: Member, taken: str, offset: str) -> None:
         raw, target = f"{member.name}_raw", f"message.{attribute(member.name)}"
         if member.number.signed:
             taken = integers.sign_extended(f"({taken})", member.bits)

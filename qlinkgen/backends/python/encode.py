@@ -37,9 +37,7 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
+    Member,
     ReservedStep,
     Step,
     ValueStep,
@@ -225,23 +223,15 @@ class Encoder:
             self._lines.append(f"{raw} = {integers.sign_extended(raw, step.integer.bits)}")
         self._integer(step.integer, raw)
 
-    def _member(self, member: MemberValue | MemberConstant | MemberReserved) -> str:
-        match member:
-            case MemberValue():
-                number = f"{member.name}_raw"
-                if member.number.scaling is not None:
-                    source = f"self.{attribute(member.name)}"
-                    self._lines.append(f"{number} = {self.scales[member.name]}.raw({source})")
-                else:
-                    self._indexed(member.name, member.number)
-                if member.number.signed:
-                    number = f"({number} & 0x{(1 << member.bits) - 1:X})"
-            case MemberConstant() | MemberReserved():
-                if not member.value:
-                    return ""
-                number = f"0x{member.value:X}"
-            case _:
-                assert_never(member)
+    def _member(self, member: Member) -> str:
+        number = f"{member.name}_raw"
+        if member.number.scaling is not None:
+            source = f"self.{attribute(member.name)}"
+            self._lines.append(f"{number} = {self.scales[member.name]}.raw({source})")
+        else:
+            self._indexed(member.name, member.number)
+        if member.number.signed:
+            number = f"({number} & 0x{(1 << member.bits) - 1:X})"
         return f"{number} << {member.shift}" if member.shift else number
 
     def _bytes(self, step: BytesStep) -> None:

@@ -12,7 +12,7 @@ from qlinkgen.backends.python.layout import WIDTH, in_hex, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Bus, Command
-from qlinkgen.model.types import Constant, Enum, Flags
+from qlinkgen.model.types import Enum, Flags, NamedValue
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -52,7 +52,7 @@ def flags_model(flags: Flags, name: str) -> ConstantsModel:
     return ConstantsModel(name, _doc(flags.doc, flags.section, f"Masks. {rest}"), members)
 
 
-def _comment(constant: Constant) -> list[str]:
+def _comment(constant: NamedValue) -> list[str]:
     return python_text.comment(constant.doc, WIDTH - 10)
 
 

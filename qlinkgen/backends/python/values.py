@@ -20,9 +20,6 @@ from qlinkgen.plan.payload import (
     CountStep,
     ItemsStep,
     Member,
-    MemberConstant,
-    MemberReserved,
-    MemberValue,
     ReservedStep,
     RunStep,
     Step,
@@ -30,13 +27,13 @@ from qlinkgen.plan.payload import (
 )
 from qlinkgen.plan.tree import MessagePlan
 
-Settable = ValueStep | MemberValue | RunStep
+Settable = ValueStep | Member | RunStep
 
 
 def is_required(each: Settable) -> bool:
     """The caller has to choose the value."""
     match each:
-        case ValueStep() | MemberValue():
+        case ValueStep() | Member():
             return each.number.required
         case BytesStep() | ItemsStep():
             return each.required
@@ -51,7 +48,7 @@ def annotation(each: Settable, place: Place) -> str:
             return "list[int]"
         case BytesStep():
             return "str" if each.text else "bytes"
-        case ValueStep() | MemberValue():
+        case ValueStep() | Member():
             return _number_type(each.number, place)
         case _:
             assert_never(each)
@@ -99,7 +96,7 @@ def default(each: Settable, place: Place) -> str:
             return f'bytes({list(each.default)}).decode("ascii")' if each.default else '""'
         case BytesStep():
             return literal(each.default)
-        case ValueStep() | MemberValue():
+        case ValueStep() | Member():
             return _default_number(each.number, place)
         case _:
             assert_never(each)
@@ -171,15 +168,7 @@ def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
 
 
 def _member_rules(member: Member, place: Place, scales: Mapping[str, str]) -> list[Call]:
-    match member:
-        case MemberValue():
-            return [_number_rule(member.name, member.number, place, scales)]
-        case MemberConstant():
-            return [_rule(place, "Constant", attribute(member.name), member.value)]
-        case MemberReserved():
-            return []
-        case _:
-            assert_never(member)
+    return [_number_rule(member.name, member.number, place, scales)]
 
 
 def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, str]) -> Call:
@@ -214,7 +203,7 @@ def _facts(each: Settable, place: Place) -> str:
         case ItemsStep():
             item, items = each.number, span(each.length.minimum, each.length.maximum)
             return f"{items} items, each {item.minimum}..{item.maximum}{_of(item)}"
-        case ValueStep() | MemberValue():
+        case ValueStep() | Member():
             return _number_facts(each.number, place)
         case _:
             assert_never(each)

@@ -15,7 +15,7 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
-    MemberValue,
+    Member,
     PayloadPlan,
     ReservedStep,
     ValueStep,
@@ -72,7 +72,7 @@ class Rule:
                 case BitsStep():
                     bits = self._bits(step.integer)
                     for member in step.members:
-                        if isinstance(member, MemberValue):
+                        if isinstance(member, Member):
                             found[member.name] = self._chosen(member.number, bits >> member.shift)
                 case BytesStep():
                     mask = 0x7F if step.text else 0xFF
