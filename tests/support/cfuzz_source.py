@@ -10,6 +10,7 @@ from pathlib import Path
 
 from qlinkgen.backends.c.interface import Interface, interface
 from qlinkgen.backends.c.names import integer_type, scalar_literal, scalar_type
+from qlinkgen.model import naming
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Bits, Reserved, Scalar
@@ -145,7 +146,7 @@ class Harness:
 
     def _filled(self, value: Value) -> list[str]:
         """Statements that give a value of a message whatever the input says, legal or not."""
-        kind, member = value.type, f"message->{value.name}"
+        kind, member = value.type, f"message->{naming.member(value.name)}"
         if isinstance(kind, Scalar):
             if scalar_type(kind) == "bool":
                 return [f"{member} = (take(input) & 1u) != 0u;"]
@@ -168,7 +169,8 @@ class Harness:
         kind, ok = value.type, f"{self.c.upper}_OK"
         if not isinstance(kind, Scalar) or kind.scaling is None:
             return []
-        function, member = self.c.conversions(message, value.name, kind), f"message.{value.name}"
+        function = self.c.conversions(message, value.name, kind)
+        member = f"message.{naming.member(value.name)}"
         constant = function.upper()
         least, most = scalar_literal(kind, kind.minimum), scalar_literal(kind, kind.maximum)
         # A double holds every whole number of so many bits, and not every longer one.
