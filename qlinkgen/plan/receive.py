@@ -48,6 +48,8 @@ class Receiver:
         self.known = plan.known(direction)
         #: Bytes taken so far.
         self.taken = 0
+        #: Nothing more comes; the next byte taken begins a new stream.
+        self.ended = False
 
     def run(self, stream: bytes) -> list[Event]:
         """The events of a whole stream, those of its end included."""
@@ -56,6 +58,7 @@ class Receiver:
     def feed(self, byte: int) -> Iterator[Event]:
         """Take one byte."""
         self.taken += 1
+        self.ended = False
         yield from self.take(byte)
 
     def take(self, byte: int) -> Iterator[Event]:
@@ -64,20 +67,29 @@ class Receiver:
 
     def finish(self) -> Iterator[Event]:
         """The stream has ended; the receiver is as new."""
+        self.ended = True
+        yield from self.give_up()
+
+    def give_up(self) -> Iterator[Event]:
+        """What is left of a stream that has ended."""
         raise NotImplementedError
 
-    def event(self, kind: str, raw: bytes, offset: int | None = None, *, ended: bool = False) -> Event:
+    @property
+    def _at(self) -> int:
+        return self.taken if self.ended else self.taken - 1
+
+    def event(self, kind: str, raw: bytes, offset: int | None = None) -> Event:
         """A fault; without an offset it ends with the byte taken last."""
         start = self.taken - len(raw) if offset is None else offset
-        return Event(kind, self.taken if ended else self.taken - 1, start, bytes(raw))
+        return Event(kind, self._at, start, bytes(raw))
 
     def judged(self, taken: Taken, raw: bytes, offset: int, request: bytes = b"") -> Event:
         """The message of a frame, or what is wrong with it."""
         try:
             decoded = self.codec.judge(taken, self.direction, request)
         except BadFrame as bad:
-            return Event(bad.kind, self.taken - 1, offset, raw)
-        return Event("message", self.taken - 1, offset, raw, decoded)
+            return Event(bad.kind, self._at, offset, raw)
+        return Event("message", self._at, offset, raw, decoded)
 
 
 def receiver(plan: Plan, direction: Direction) -> Receiver:
@@ -139,11 +151,11 @@ class HuntingReceiver(Receiver):
         self._marks = int(raw[-1] == self._mark)
         yield self.judged(taken, raw, self.taken - len(raw))
 
-    def finish(self) -> Iterator[Event]:
+    def give_up(self) -> Iterator[Event]:
         """An unfinished frame is truncated."""
         raw = self._raw or (bytes((self._mark, self._mark)) if self._marks >= 2 else b"")
         if raw:
-            yield self.event("truncated", raw, ended=True)
+            yield self.event("truncated", raw)
         self._raw, self._marks = b"", 0
 
 
@@ -158,7 +170,6 @@ class RescanningReceiver(Receiver):
         self._reader = FrameReader(plan.frame, self.known, direction)
         self._longest = plan.frame.envelopes[direction].max_frame
         self._buffer, self._skipped, self._due = b"", b"", b""
-        self._ended = False
 
     def take(self, byte: int) -> Iterator[Event]:
         """Everything that the buffer now holds."""
@@ -174,7 +185,7 @@ class RescanningReceiver(Receiver):
             try:
                 taken = self._reader.read(self._buffer)
             except Missing:
-                if not self._ended:
+                if not self.ended:
                     return
                 yield from self._drop("", b"")
             except Astray:
@@ -213,21 +224,20 @@ class RescanningReceiver(Receiver):
     def _report(self, end: int) -> Iterator[Event]:
         """The bytes skipped in a row, as one fault."""
         if self._skipped:
-            yield self.event("frame", self._skipped, end - len(self._skipped), ended=self._ended)
+            yield self.event("frame", self._skipped, end - len(self._skipped))
         self._skipped = b""
 
-    def finish(self) -> Iterator[Event]:
+    def give_up(self) -> Iterator[Event]:
         """The frame that is not complete is given up, and others are looked for in its bytes."""
-        self._ended = True
         if self._due and self._buffer[:1] == self._due:
             self._buffer = self._buffer[1:]
         self._due = b""
         if self._buffer and not self._strategy.bare:
-            yield self.event("truncated", self._buffer, self._start, ended=True)
+            yield self.event("truncated", self._buffer, self._start)
             self._buffer = self._buffer[1:]
         yield from self._scan()
         yield from self._report(self.taken)
-        self._buffer, self._due, self._ended = b"", b"", False
+        self._buffer, self._due = b"", b""
 
 
 class MarkReceiver(Receiver):
@@ -254,7 +264,7 @@ class MarkReceiver(Receiver):
         elif self._raw:
             self._raw += bytes((byte,))
             if marked:
-                yield self._ended()
+                yield self._complete()
             elif len(self._raw) - 1 > self._most:
                 yield self.event("frame", self._raw)
                 self._raw, self._hunting = b"", True
@@ -262,7 +272,7 @@ class MarkReceiver(Receiver):
             self._hunting = True
             yield self.event("frame", bytes((byte,)))
 
-    def _ended(self) -> Event:
+    def _complete(self) -> Event:
         raw, self._raw = self._raw, b""
         try:
             taken = take_marked(self.plan.frame, self.known, raw)
@@ -270,10 +280,10 @@ class MarkReceiver(Receiver):
             return self.event(bad.kind, raw)
         return self.judged(taken, raw, self.taken - len(raw))
 
-    def finish(self) -> Iterator[Event]:
+    def give_up(self) -> Iterator[Event]:
         """An unfinished message is truncated."""
         if self._raw:
-            yield self.event("truncated", self._raw, ended=True)
+            yield self.event("truncated", self._raw)
         self._raw, self._hunting = b"", False
 
 
@@ -316,9 +326,9 @@ class PacketReceiver(Receiver):
             request = self._requests.pop(0) if answers else b""
             yield self.judged(take_packet(message, raw), raw, self.taken - len(raw), request)
 
-    def finish(self) -> Iterator[Event]:
+    def give_up(self) -> Iterator[Event]:
         """An unfinished packet is truncated."""
         if self._raw:
-            yield self.event("truncated", self._raw, ended=True)
+            yield self.event("truncated", self._raw)
         self._raw = b""
         self._requests.clear()

@@ -59,21 +59,21 @@ def streams(plan: Plan, direction: Direction, rng: random.Random, number: int) -
         yield damaged(stream, rng, alphabet) if each % 8 else stream
 
 
-def told(event: Event, at: int) -> str:
+def told(event: Event) -> str:
     """An event as the program tells it."""
     if event.decoded is None:
-        return f"{at}:{event.kind}"
+        return f"{event.at}:{event.kind}"
     decoded = event.decoded
     address = "-" if decoded.address is None else decoded.address
-    return f"{at}:message:{decoded.message.name}:{address}:{decoded.payload.hex() or '-'}"
+    return f"{event.at}:message:{decoded.message.name}:{address}:{decoded.payload.hex() or '-'}"
 
 
 def events(plan: Plan, direction: Direction, stream: bytes) -> list[str]:
     """What a receiver makes of a stream; one that keeps no bytes has nothing to say of its end."""
     machine = receiver(plan, direction)
-    found = [told(event, event.at) for byte in stream for event in machine.feed(byte)]
+    found = [told(event) for byte in stream for event in machine.feed(byte)]
     ends = machine.finish() if isinstance(plan.frame.receiver, Rescan) else ()
-    return found + [told(event, len(stream)) for event in ends]
+    return found + [told(event) for event in ends]
 
 
 def kind(plan: Plan, direction: Direction, frame: bytes, request: bytes = b"") -> str:
