@@ -11,7 +11,7 @@ def measure_lines(payload: PayloadPlan) -> list[str]:
     """Body of the method that finds the size of a payload from its beginning; empty where it never varies.
 
     The method takes the bytes and the index of the payload. It returns the size as far as the counts are
-    there to tell, -1 where one is not allowed.
+    there to tell; where one is not allowed, the index after it, negative.
     """
     if payload.fixed:
         return []
@@ -43,6 +43,6 @@ def _learned(payload: PayloadPlan, count: CountStep) -> list[str]:
     return [
         *lines,
         f"if {odd}{integers.broken(Within(least, run.length.maximum), name)}:",
-        "    return -1",
+        f"    return -({at(count.integer.size)})",
         f"size += {item} * {more}" if item > 1 else f"size += {more}",
     ]
