@@ -45,7 +45,8 @@ def _entry(names: Names, message: Message, answer: Message | None, command: Comm
         "answer_function": names.function(answer) if answer else "",
         "answer_constant": names.constant(answer) if answer else "",
         "answer_struct": bool(answer and answer.values),
-        "refuses_broadcast": addressing == "node",
+        # A message of no command goes to one node.
+        "refuses_broadcast": addressing in ("node", "none"),
         "broadcast_only": addressing == "broadcast",
         "silent_broadcast": answer is not None and addressing == "either",
     }
