@@ -14,7 +14,7 @@ from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm
 from qlinkgen.model.naming import file_stem
 from qlinkgen.plan import Plan
-from qlinkgen.plan.framing import Marks, Rescan
+from qlinkgen.plan.framing import Rescan
 
 #: Bits of a row's first byte that name kinds; the two above them say "by hand" and "refused".
 _KINDS = 6
@@ -45,7 +45,6 @@ class Kit:
             **{name: getattr(header, name) for name in _HABITS},
             "address_type": f"uint{header.address_bits}_t",
             "address_bytes": header.address_bits // 8,
-            "marked": isinstance(self._plan.frame.receiver, Marks),
             "rescans": isinstance(self._plan.frame.receiver, Rescan),
             "packets": self._plan.frame.needs_request,
             "broadcast": header.address and self._plan.protocol.bus.broadcast is not None,
