@@ -13,9 +13,9 @@ The checks of a whole frame come in one order, the same in every target:
 6. a message number that the direction does not have: ``unknown``;
 7. the payload: its sizes are ``length``, then its values ``range``; at last the address, ``range``.
 
-A marked frame has no length: a size that its message cannot have is ``frame``, as is all else that does not
-fit between its header and its end. In a frame without leading constants an unknown number or a forbidden
-address is found in step 2.
+A marked frame has no length: fewer or more bytes than its message can have are ``frame``, as are a header or
+an end that does not fit, and bytes after the end. In a frame without leading constants an unknown number or
+a forbidden address is found in step 2.
 """
 
 from __future__ import annotations
