@@ -29,7 +29,7 @@ class _Source:
         self.lines: list[str] = []
 
     def text(self) -> str:
-        head = f'#include "{self.protocol.name}.h"\n' + self._filled(_HEAD)
+        head = f'#include "{naming.file_stem(self.protocol.name)}.h"\n' + self._filled(_HEAD)
         for message in self.protocol.messages:
             self._show(message)
             self._encode(message)

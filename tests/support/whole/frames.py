@@ -96,26 +96,29 @@ class _Parts:
         return name
 
     def make(self, *, hunted: bool) -> Shape:
+        # Some frames break one of the rules by which a receiver may hunt.
+        strict = hunted and self._chance(0.8)
         lead = self.rng.choice(("A5 A5", "AA AA", "02 02")) if hunted else self._lead()
         names = {"lead": self._add("start", {"role": "constant", "value": lead})} if lead else {}
         roles = self._header(hunted=hunted)
         for role in roles:
-            names[role] = self._add(*self._header_part(role))
+            name, spec = self._header_part(role)
+            names[role] = self._add(name, spec | {"type": "u8"} if strict else spec)
         if self._chance(0.08) and not hunted:
             self._add("gap", {"role": "constant", "value": "55"})
         names["payload"] = self._add("data", {"role": "payload"})
-        if self._chance(0.08):
+        if self._chance(0.08) and not strict:
             self._add("fence", {"role": "constant", "value": "5A"})
-        self._checked(names)
-        if self._chance(0.3):
+        self._checked(names, whole=strict)
+        if self._chance(0.3) and not strict:
             names["end"] = self._add("end", {"role": "constant", "value": self.rng.choice(_ENDS)})
         if "length" in names:
-            self._counts(names, hunted=hunted)
+            self._counts(names, hunted=hunted, every=strict and lead == "02 02")
         frame: Doc = {"parts": self.parts}
-        stuffing = self._stuffing(names, lead, hunted=hunted)
+        stuffing = self._stuffing(names, lead, hunted=hunted, strict=strict)
         if stuffing:
             frame["stuffing"] = stuffing
-        return self._shape(frame, names, stuffing)
+        return self._shape(frame, names, stuffing, strict=strict)
 
     def _lead(self) -> str:
         return self.rng.choice(_LEADS) if self._chance(0.75) else ""
@@ -143,32 +146,35 @@ class _Parts:
         name = {"message": "code", "address": "node", "length": "length"}[role]
         return name, {"role": role, "type": kind, **_order(rng)}
 
-    def _checked(self, names: Doc) -> None:
-        if not self._chance(0.78):
+    def _checked(self, names: Doc, *, whole: bool) -> None:
+        """A check value; `whole`: over everything after the first part, and sent as it is."""
+        if not whole and not self._chance(0.78):
             return
         rng, covered = self.rng, list(self.parts)
         algorithm, width = _algorithm(rng)
-        if self._chance(0.35):
+        if whole:
+            covered = covered[1:]
+        elif self._chance(0.35):
             covered = [name for name in covered if rng.random() < 0.7] or [names["payload"]]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
         spec |= _order(rng)
-        if width == 16 and self._chance(0.15):
+        if width == 16 and not whole and self._chance(0.15):
             spec["sent"] = rng.choice(
                 (["0..6", "8..14"], ["8..15"], ["0..3", "4..7", "8..11", "12..15"], ["7..14", "0..6"])
             )
         names["checksum"] = self._add("crc", spec)
 
-    def _counts(self, names: Doc, *, hunted: bool) -> None:
+    def _counts(self, names: Doc, *, hunted: bool, every: bool) -> None:
         counted = [
             name
             for name in self.parts
-            if name == names["payload"] or self.rng.random() < (0.3 if hunted else 0.5)
+            if every or name == names["payload"] or self.rng.random() < (0.3 if hunted else 0.5)
         ]
         self.parts[names["length"]]["counts"] = counted
         if hunted:
             self.parts[names["length"]]["type"] = "u8"
 
-    def _stuffing(self, names: Doc, lead: str, *, hunted: bool) -> Doc:
+    def _stuffing(self, names: Doc, lead: str, *, hunted: bool, strict: bool) -> Doc:
         rng = self.rng
         if not hunted and not self._chance(0.35 if lead else 0.05):
             return {}
@@ -181,6 +187,8 @@ class _Parts:
         spec: Doc = {"after": after, "insert": "00" if hunted else insert}
         if not hunted and self._chance(0.4):
             return spec | {"checksum": "after"}
+        if strict:
+            return spec | {"exempt": [names["lead"]]}
         front = [names["lead"]] if lead and not self._chance(0.04) else []
         if front and self._chance(0.1) and list(self.parts)[1] == names.get("length"):
             front.append(names["length"])
@@ -189,11 +197,11 @@ class _Parts:
             spec["exempt"] = front + tail
         return spec
 
-    def _shape(self, frame: Doc, names: Doc, stuffing: Doc) -> Shape:
+    def _shape(self, frame: Doc, names: Doc, stuffing: Doc, *, strict: bool) -> Shape:
         rng, parts = self.rng, self.parts
         most, least = rng.choice(_SIZES), rng.choice((0,) * 7 + (1,))
         if "length" in names:
-            most = self._longest(names, stuffing, most)
+            most = self._longest(names, stuffing, most, below=strict)
         parts[names["payload"]]["size"] = f"{least}..{most}"
         address = parts.get(names.get("address", ""), {})
         return Shape(
@@ -209,8 +217,8 @@ class _Parts:
             int(stuffing["after"].split()[0], 16) if stuffing else 0xA5,
         )
 
-    def _longest(self, names: Doc, stuffing: Doc, most: int) -> int:
-        """As much payload as the length can count."""
+    def _longest(self, names: Doc, stuffing: Doc, most: int, *, below: bool) -> int:
+        """As much payload as the length can count; `below`: without being the byte that is stuffed."""
         length = parts_length = self.parts[names["length"]]
         bias = sum(_size(self.parts[name]) for name in length["counts"])
         top = (1 << int(parts_length["type"][1:])) - 1 - bias
@@ -218,6 +226,8 @@ class _Parts:
             top = top * len(stuffing["after"].split()) // (len(stuffing["after"].split()) + 1)
         # Lengths below, around and above the byte that is stuffed.
         mark = int(stuffing["after"].split()[0], 16) - bias if stuffing else 0
+        if below and mark > 4:
+            return min(most, mark - 1)
         if mark > 4 and self._chance(0.5):
             most = self.rng.choice((mark - 1, mark, mark + 40))
         return max(4, min(most, top))

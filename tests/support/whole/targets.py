@@ -16,7 +16,15 @@ from construct import ConstructError
 
 from qlinkgen.backends import construct, python
 from qlinkgen.backends.base import Options
+from qlinkgen.model import naming
+from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import Plan
+from qlinkgen.plan import receive as interpreted
+from qlinkgen.plan.codec import Codec, Decoded
+from qlinkgen.plan.content import Unsendable, pack
+from qlinkgen.plan.reading import BadFrame
+from qlinkgen.plan.receive import receiver
 from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
 from tests.support.whole.reference.document import Message, Number, Run
@@ -91,13 +99,17 @@ def native(kind: Number | Run, raw: Raw) -> Any:
 
 
 def raw_of(kind: Number | Run, found: Any) -> Raw:
-    """The integer that a value stands for; a value that no integer has is its own, telling, text."""
+    """The integer that a value stands for. Raises TypeError or ValueError for a value that no integer has."""
     if isinstance(kind, Run):
         return list(found) if kind.item else found.encode("ascii") if kind.text else bytes(found)
     if kind.scale is None:
-        return int(found) if isinstance(found, bool) == kind.truth else f"{found!r} of a wrong type"  # type: ignore[return-value]
+        if isinstance(found, bool) != kind.truth:
+            raise TypeError(f"{found!r} is of a wrong type")
+        return int(found)
     raw = round((Fraction(found) - kind.offset) / kind.scale)
-    return raw if found == native(kind, raw) else f"{found!r} is not exact"  # type: ignore[return-value]
+    if found != native(kind, raw):
+        raise ValueError(f"{found!r} is not exact")
+    return raw
 
 
 class PythonTarget(Target):
@@ -109,14 +121,16 @@ class PythonTarget(Target):
         """Compile the module in memory."""
         super().__init__(reference)
         self.module: Any = python.load(protocol)
+        self._address = naming.address_attribute(reference.address_name or "")
 
     def encode(
         self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
     ) -> tuple[bytes, bytes]:
         """See Target."""
-        place = {self.reference.address_name: address} if self.reference.address_name else {}
+        place = {self._address: address} if self._address else {}
+        natives = {naming.attribute(name): each for name, each in self.natives(message, given).items()}
         try:
-            made = self.module.MESSAGES[message.name](**self.natives(message, given), **place)
+            made = self.module.MESSAGES[message.name](**natives, **place)
             return made.to_bytes(), made.to_frame(*self._context(request))
         except self.module.EncodeError as error:
             raise Wrong("encode", str(error)) from None
@@ -134,11 +148,11 @@ class PythonTarget(Target):
             raise Wrong(error.kind, str(error)) from None
 
     def _seen(self, found: Any) -> Seen:
-        name = self.reference.address_name
-        values = self.raws(self.reference.by_name[found.NAME], lambda each: getattr(found, each))
-        return Seen(found.NAME, getattr(found, name) if name else None, values)
+        shape = self.reference.by_name[found.NAME]
+        values = self.raws(shape, lambda each: getattr(found, naming.attribute(each)))
+        return Seen(found.NAME, getattr(found, self._address) if self._address else None, values)
 
-    def events(self, direction: str, pieces: Sequence[bytes]) -> list[list[Heard]]:
+    def events(self, direction: Direction, pieces: Sequence[bytes]) -> list[list[Heard]]:
         """The events of each piece, then those at the end; `at` is the last byte of the piece."""
         decoder = self.module.StreamDecoder(*(() if direction == "message" else (direction,)))
         found, end = [], 0
@@ -152,6 +166,54 @@ class PythonTarget(Target):
             seen = self._seen(event)
             return Heard(at, "message", seen.name, seen.address, str(dict(seen.values)))
         return Heard(at, event.kind, place=(event.offset, event.raw.hex()))
+
+
+class InterpreterTarget(Target):
+    """The plan itself, run without generating anything."""
+
+    name = "interpreter"
+
+    def __init__(self, reference: Reference, plan: Plan) -> None:
+        """Run a plan."""
+        super().__init__(reference)
+        self._plan = plan
+        self._codec = Codec(plan)
+
+    def encode(
+        self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
+    ) -> tuple[bytes, bytes]:
+        """See Target."""
+        place = address if self.reference.address_name else None
+        try:
+            wire = self._codec.encode(message.name, given, place, request)
+            return pack(self._plan.message(message.name).payload, given), wire
+        except Unsendable as error:
+            raise Wrong("encode", str(error)) from None
+
+    def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
+        """See Target."""
+        try:
+            return self._seen(self._codec.decode(wire, self._direction(message), request))
+        except BadFrame as error:
+            raise Wrong(error.kind, str(error)) from None
+
+    def _direction(self, message: Message) -> Direction:
+        return self._plan.hears(self._plan.message(message.name))
+
+    def _seen(self, decoded: Decoded) -> Seen:
+        found = decoded.values
+        shape = self.reference.by_name[decoded.message.name]
+        return Seen(shape.name, decoded.address, {name: found[name] for name, _ in shape.values()})
+
+    def events(self, direction: Direction, stream: bytes) -> list[Heard]:
+        """The events of a stream."""
+        return [self._heard(event) for event in receiver(self._plan, direction).run(stream)]
+
+    def _heard(self, event: interpreted.Event) -> Heard:
+        if event.decoded is None:
+            return Heard(event.at, event.kind, place=(event.offset, event.raw.hex()))
+        seen = self._seen(event.decoded)
+        return Heard(event.at, "message", seen.name, seen.address, str(dict(seen.values)))
 
 
 class ConstructTarget(Target):
@@ -195,7 +257,7 @@ def printed(protocol: Protocol, folder: Path) -> construct.Live:
     package.mkdir()
     for path, text in construct.generate(protocol, Options()).items():
         (package / Path(path).name).write_text(text, "utf-8")
-    return construct.Live(vars(_imported(package, protocol.name)))
+    return construct.Live(vars(_imported(package, naming.file_stem(protocol.name))))
 
 
 def _imported(package: Path, name: str) -> types.ModuleType:
@@ -239,7 +301,7 @@ class CTarget(Target):
         values = {name: _raw(kind, word) for (name, kind), word in zip(message.values(), found, strict=True)}
         return Seen(message.name, None if address == "-" else int(address), values)
 
-    def events(self, direction: str, stream: bytes) -> list[Heard]:
+    def events(self, direction: Direction, stream: bytes) -> list[Heard]:
         """The events of a stream fed byte by byte."""
         return [self._heard(word) for word in self._ask("stream", direction, stream.hex() or "-")]
 

@@ -18,7 +18,10 @@ from types import FrameType
 from qlinkgen.backends import construct
 from qlinkgen.backends.base import Options
 from qlinkgen.cli.targets import TARGETS
+from qlinkgen.model.message import Direction
+from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import plan_of
 from qlinkgen.schema import loads
 from tests.support.cdriver import WARNINGS, Driver, build
 from tests.support.whole import chance, schemas
@@ -26,7 +29,15 @@ from tests.support.whole.reference import Reference, Seen, Wrong
 from tests.support.whole.reference.document import Message
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.special import Packets
-from tests.support.whole.targets import ConstructTarget, CTarget, Heard, PythonTarget, Target, printed
+from tests.support.whole.targets import (
+    ConstructTarget,
+    CTarget,
+    Heard,
+    InterpreterTarget,
+    PythonTarget,
+    Target,
+    printed,
+)
 
 #: Seconds of processor time that one schema may take, and of any time that a compiled program may.
 SECONDS = 120
@@ -34,7 +45,7 @@ _STRICT = ("-std=c99", "-fsyntax-only", *WARNINGS)
 #: Most differences of the streams of one output that are made small and reported.
 _MOST = 3
 #: Targets that need no vectors, which take long.
-_QUICK = ("python", "stations", "c", "construct")
+_QUICK = ("python", "bus", "c", "construct")
 _PLAIN = ("-O0", "-std=c99")
 _CHECKED = ("-O1", "-g", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
@@ -172,11 +183,12 @@ class _Trial:
             (self.folder / Path(path).name).write_text(text, "utf-8")
             if path.endswith(".py"):
                 self.guard("parse", Path(path).parent.name, partial(_parse, text, path))
+        self.targets.append(InterpreterTarget(self.reference, plan_of(protocol)))
         self.guard("load", "python", lambda: self.targets.append(PythonTarget(self.reference, protocol)))
         self.guard("load", "construct", lambda: self._construct("construct", construct.live(protocol)))
         source = partial(printed, protocol, self.folder)
         self.guard("load", "construct source", lambda: self._construct("construct source", source()))
-        header = self.folder / f"{protocol.name}.h"
+        header = self.folder / f"{file_stem(protocol.name)}.h"
         if not self.effort.uncompiled and header.exists() and self._compile(header):
             self.guard("driver", "c", lambda: self._driver(protocol, programs))
 
@@ -278,9 +290,10 @@ class _Trial:
     # Streams
 
     def _streams(self) -> None:
-        for direction in (
-            ("request",) if isinstance(self.reference.frame, Packets) else self.reference.directions
-        ):
+        directions: tuple[Direction, ...] = self.reference.directions
+        if isinstance(self.reference.frame, Packets):
+            directions = ("request",)
+        for direction in directions:
             known = list(self.reference.known(direction).values())
             frames = [frame for each in known for frame in self._frames(each)]
             if not frames:
@@ -297,7 +310,7 @@ class _Trial:
             frames.append(self.reference.encode(message.name, given, chance.address(message, self.rng))[1])
         return sorted(frames, key=len)[:2]
 
-    def _stream(self, direction: str, data: bytes) -> None:
+    def _stream(self, direction: Direction, data: bytes) -> None:
         seed = self.rng.random()
         for target in list(self.targets):
             if isinstance(target, PythonTarget):
@@ -306,9 +319,11 @@ class _Trial:
                 self._heard(target, direction, data, "cut stream", cut)
             elif isinstance(target, CTarget):
                 self._heard(target, direction, data, "stream", partial(_c_stream, target, direction))
+            elif isinstance(target, InterpreterTarget):
+                self._heard(target, direction, data, "stream", partial(_plan_stream, target, direction))
 
     def _heard(
-        self, target: Target, direction: str, data: bytes, stage: str, compare: Callable[[bytes], str]
+        self, target: Target, direction: Direction, data: bytes, stage: str, compare: Callable[[bytes], str]
     ) -> None:
         self.outcome.compared += 1
         if target not in self.targets:
@@ -367,8 +382,8 @@ def _kit(program: Path) -> None:
 def _result(action: Callable[[], object]) -> object:
     try:
         return action()
-    except Wrong:
-        return "refused"
+    except Wrong as wrong:
+        return f"refused: {wrong.kind}"
     except Exception as error:  # noqa: BLE001 - see guard
         last = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__} at {last.name}: {error}"[:300]
@@ -381,18 +396,23 @@ def _shown(result: object) -> str:
 
 
 def _manner(expected: object, found: object) -> str:
-    if found == "refused":
-        return "refuses what is right"
-    return "takes what is wrong" if expected == "refused" else "other values"
+    if not isinstance(found, str):
+        return "takes what is wrong" if isinstance(expected, str) else "other values"
+    return f"{found} instead of {expected}" if isinstance(expected, str) else "refuses what is right"
 
 
-def _python_stream(target: PythonTarget, direction: str, data: bytes) -> str:
+def _python_stream(target: PythonTarget, direction: Direction, data: bytes) -> str:
     expected = [Heard.of(event) for event in target.reference.events(direction, data)]
     found = target.events(direction, [bytes([byte]) for byte in data])
     return _unlike(expected, [event for events in found for event in events])
 
 
-def _c_stream(target: CTarget, direction: str, data: bytes) -> str:
+def _plan_stream(target: InterpreterTarget, direction: Direction, data: bytes) -> str:
+    expected = [Heard.of(event) for event in target.reference.events(direction, data)]
+    return _unlike(expected, target.events(direction, data))
+
+
+def _c_stream(target: CTarget, direction: Direction, data: bytes) -> str:
     expected = [Heard.of(event) for event in target.reference.events(direction, data)]
     if not target.finishes:
         expected = [event for event in expected if event.at < len(data)]
@@ -400,7 +420,7 @@ def _c_stream(target: CTarget, direction: str, data: bytes) -> str:
     return _unlike(bare, target.events(direction, data))
 
 
-def _cut_stream(target: PythonTarget, direction: str, seed: float, data: bytes) -> str:
+def _cut_stream(target: PythonTarget, direction: Direction, seed: float, data: bytes) -> str:
     """What a piece brings is what its bytes bring one by one."""
     cut = chance.pieces(data, random.Random(seed))
     single = target.events(direction, [bytes([byte]) for byte in data])

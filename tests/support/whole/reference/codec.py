@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tests.support.whole.reference import document, values
-from tests.support.whole.reference.document import Fields, Message, whole_span
+from tests.support.whole.reference.document import Direction, Fields, Message, whole_span
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.receivers import (
     Event,
@@ -47,13 +47,15 @@ class Reference:
         self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
         self.by_name = {message.name: message for message in self.messages}
         used = {message.direction for message in self.messages}
-        self.directions = ("message",) if used == {"message"} else ("request", "response")
+        self.directions: tuple[Direction, ...] = (
+            ("message",) if used == {"message"} else ("request", "response")
+        )
 
-    def known(self, direction: str) -> dict[int, Message]:
+    def known(self, direction: Direction) -> dict[int, Message]:
         """The messages that can come in a direction."""
         return {each.number: each for each in self.messages if each.direction in (direction, "message")}
 
-    def hears(self, message: Message) -> str:
+    def hears(self, message: Message) -> Direction:
         """A direction in which a message can come."""
         return message.direction if message.direction in self.directions else "request"
 
@@ -76,28 +78,27 @@ class Reference:
             return frame.seal(message, payload, address)
         return frame.seal(message, payload, request)
 
-    def decode(self, direction: str, wire: bytes, request: bytes = b"") -> Seen:
+    def decode(self, direction: Direction, wire: bytes, request: bytes = b"") -> Seen:
         """What exactly one frame says. Raises Wrong."""
-        if request:
-            assert isinstance(self.frame, Packets)
-            message = self.known("response").get(request[0])
+        if not wire:
+            raise Wrong("truncated")
+        known = self.known(direction)
+        if isinstance(self.frame, Packets):
+            message = known.get((request or wire)[0])
             if message is None:
                 raise Wrong("unknown")
             payload = self.frame.opened(message, wire, request)
             return Seen(message.name, None, values.decode(message, payload))
         if isinstance(self.frame, Frame):
-            event, rest = Searcher(self.frame, self.known(direction)).whole(wire)
+            event = Searcher(self.frame, known).whole(wire)
         else:
-            events = self.receiver(direction).run(wire)
-            event = events[0] if events else Event("truncated", 0, 0, wire)
-            rest = wire[len(event.raw) :]
+            self.frame.check_extent(wire)
+            event = MarkedReceiver(self.frame, known).ended(wire)
         if event.kind != "message":
             raise Wrong(event.kind)
-        if rest or event.offset:
-            raise Wrong("length", "bytes follow the frame")
         return Seen(event.name, event.address, event.values)
 
-    def receiver(self, direction: str) -> Receiver:
+    def receiver(self, direction: Direction) -> Receiver:
         """A new receiver."""
         known = self.known(direction)
         if isinstance(self.frame, Marked):
@@ -106,6 +107,6 @@ class Reference:
             return PacketReceiver(self.frame, known)
         return Hunter(self.frame, known) if self.frame.unique else Searcher(self.frame, known)
 
-    def events(self, direction: str, stream: bytes) -> list[Event]:
+    def events(self, direction: Direction, stream: bytes) -> list[Event]:
         """What a receiver delivers, the end of the stream included."""
         return self.receiver(direction).run(stream)

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import yaml
 
 Doc = dict[str, Any]
+Direction = Literal["request", "response", "message"]
 Role = Literal["value", "constant", "reserved", "count"]
 
 
@@ -103,6 +104,11 @@ class Slot:
         return not isinstance(self.kind, Run) or self.kind.low == self.kind.high
 
     @property
+    def least_bytes(self) -> int:
+        """Fewest bytes on the wire."""
+        return self.kind.step * self.kind.low if isinstance(self.kind, Run) else len(self.kind.pieces)
+
+    @property
     def most_bytes(self) -> int:
         """Most bytes on the wire; 0 of a run without a bound."""
         return self.kind.step * (self.kind.high or 0) if isinstance(self.kind, Run) else len(self.kind.pieces)
@@ -114,7 +120,7 @@ class Message:
 
     name: str
     number: int
-    direction: str
+    direction: Direction
     slots: tuple[Slot, ...]
     addresses: tuple[tuple[int, int], ...]
     default_address: int
@@ -129,9 +135,10 @@ class Message:
             elif slot.role == "value":
                 yield slot.name, slot.kind
 
-    def counter(self, name: str) -> Slot | None:
-        """The first count of a field."""
-        return next((slot for slot in self.slots if slot.counts == name), None)
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Fewest and most bytes of payload."""
+        return sum(slot.least_bytes for slot in self.slots), sum(slot.most_bytes for slot in self.slots)
 
     def allows(self, address: int) -> bool:
         """The message may carry the address."""
@@ -354,7 +361,8 @@ def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, .
 
 
 def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Iterator[Message]:
-    for direction in ("request", "response"):
+    both: tuple[Direction, ...] = ("request", "response")
+    for direction in both:
         if spec[direction] == "none":
             continue
         ranges, default = (
@@ -383,7 +391,9 @@ def _nodes(document: Doc) -> tuple[int, int]:
     return whole_span(document["bus"]["nodes"])
 
 
-def _addresses(addressing: str, direction: str, document: Doc) -> tuple[tuple[tuple[int, int], ...], int]:
+def _addresses(
+    addressing: str, direction: Direction, document: Doc
+) -> tuple[tuple[tuple[int, int], ...], int]:
     nodes, everybody = _nodes(document), document["bus"].get("broadcast")
     if direction == "response" or addressing == "node":
         return (nodes,), nodes[0]

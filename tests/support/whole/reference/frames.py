@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -21,12 +22,12 @@ class NeedMore(Exception):
 
 
 class Refused(Exception):
-    """No frame begins here: kind of fault, "" where none is reported, and its wire bytes."""
+    """No frame begins here: kind of fault, its wire bytes, and whether a receiver tells of it."""
 
-    def __init__(self, kind: str, size: int = 1) -> None:
+    def __init__(self, kind: str, size: int = 1, *, told: bool = True) -> None:
         """Note what a fault tells."""
         super().__init__(kind)
-        self.kind, self.size = kind, size
+        self.kind, self.size, self.told = kind, size, told
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,22 +100,28 @@ class Frame:
         #: Most payload bytes on the wire, inserted ones included where the length counts them.
         self.most_sent = most + most // len(stuffing.after) if stuffing and stuffing.payload_alone else most
 
-    @property
+    @functools.cached_property
     def unique(self) -> bool:
         """The preamble cannot appear inside a frame, so a receiver hunts for it and never looks back."""
-        stuffing, length = self.stuffing, self.by_role.get("length")
-        if stuffing is None or stuffing.payload_alone or length is None or len(stuffing.after) != 1:
+        stuffing, first = self.stuffing, self.parts[0]
+        if stuffing is None or stuffing.payload_alone or first.constant != stuffing.after * 2:
             return False
-        first = self.parts[0]
+        if (
+            len(stuffing.after) != 1
+            or stuffing.insert == stuffing.after[0]
+            or stuffing.exempt != (first.name,)
+        ):
+            return False
         lengths = range(self.bias + self.least, self.bias + self.most + 1)
-        return (
-            first.constant == stuffing.after * 2
-            and stuffing.insert != stuffing.after[0]
-            and stuffing.exempt == (first.name,)
-            and self.parts[1] is length
-            and length.size == 1
-            and stuffing.after[0] not in lengths
-        )
+        roles = [part.role for part in self.parts]
+        if roles[1] != "length" or self.parts[1].size != 1 or stuffing.after[0] in lengths:
+            return False
+        if roles.count("constant") > 1 or roles[-1] != "checksum" or self.by_role["message"].size != 1:
+            return False
+        check = self.parts[-1]
+        whole = [byte_pieces(check.size, order) for order in ("big", "little")]
+        covers = sorted(check.spec["over"]) == sorted(part.name for part in self.parts[1:-1])
+        return covers and 8 * check.size == checks.width(check.spec["algorithm"]) and check.pieces in whole
 
     def stuffed(self, part: Part) -> bool:
         """The finished frame is stuffed, and this part with it."""
@@ -197,8 +204,10 @@ class Cursor:
         """The next byte of a part. Raises NeedMore or Refused."""
         if self.pending:
             assert self._frame.stuffing
-            if self._byte() != self._frame.stuffing.insert:
-                raise Refused("stuffing", self.at)
+            found = self._byte()
+            if found != self._frame.stuffing.insert:
+                again = self._frame.unique and found == self._frame.stuffing.after[0]
+                raise Refused("truncated" if again else "stuffing", self.at)
             self.pending, self._recent = False, b""
         byte = self._byte()
         if self._frame.stuffed(part):
@@ -252,7 +261,7 @@ class Splitter:
         for part in frame.parts[frame.payload_at + 1 :]:
             cut[part.name] = cursor.run(part, part.size)
         if frame.bad_constant(cut):
-            raise Refused("")
+            raise Refused("frame", cursor.at)
         return Cut(cut, cursor.at, cursor.pending)
 
     def _take(self, part: Part, cursor: Cursor, cut: dict[str, bytes]) -> None:
@@ -260,7 +269,7 @@ class Splitter:
         while len(data) < part.size:
             data += bytes([cursor.take(part)])
             if part.role == "constant" and not part.constant.startswith(data):
-                raise Refused("")
+                raise Refused("frame", cursor.at, told=False)
         cut[part.name] = data
 
     def _judge(self, part: Part, cursor: Cursor, cut: Mapping[str, bytes]) -> None:
@@ -274,8 +283,10 @@ class Splitter:
             if number is None:
                 return
             message = self._known.get(number)
-            if message is None or (address is not None and not message.allows(address)):
-                raise Refused("")
+            if message is None:
+                raise Refused("unknown", cursor.at, told=False)
+            if address is not None and not message.allows(address):
+                raise Refused("range", cursor.at, told=False)
 
     def _payload(self, part: Part, cursor: Cursor, cut: Mapping[str, bytes]) -> bytes:
         frame = self._frame
@@ -285,8 +296,6 @@ class Splitter:
         message = self._known.get(frame.number("message", cut) or 0)
         if message is None:
             raise Refused("unknown", cursor.at)
-        if frame.stuffing and frame.stuffing.payload_alone:
-            return _measured_stuffed(message, part, cursor, frame.stuffing)
         return _measured(message, lambda size: cursor.run(part, size), cursor)
 
 
@@ -306,28 +315,3 @@ def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) ->
             except Wrong:
                 raise Refused("length", cursor.at) from None
     return payload
-
-
-def _measured_stuffed(message: Message, part: Part, cursor: Cursor, stuffing: Stuffing) -> bytes:
-    """The same where the payload alone is stuffed: the inserted bytes are part of what is covered."""
-    sent, recent = bytearray(), bytearray()
-
-    def settle() -> None:
-        if recent.endswith(stuffing.after):
-            sent.append(cursor.take(part))
-            if sent[-1] != stuffing.insert:
-                raise Refused("stuffing", cursor.at)
-            recent.clear()
-
-    def take(size: int) -> bytes:
-        data = bytearray()
-        for _ in range(size):
-            settle()
-            data.append(cursor.take(part))
-            sent.append(data[-1])
-            recent.append(data[-1])
-        return bytes(data)
-
-    _measured(message, take, cursor)
-    settle()
-    return bytes(sent)

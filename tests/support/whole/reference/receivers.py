@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from tests.support.whole.reference import values
 from tests.support.whole.reference.document import Message
-from tests.support.whole.reference.frames import Frame, NeedMore, Refused, Splitter
+from tests.support.whole.reference.frames import Cut, Frame, NeedMore, Refused, Splitter
 from tests.support.whole.reference.special import Marked, Packets
 from tests.support.whole.reference.values import Raw, Wrong
 
@@ -136,8 +136,6 @@ class Hunter(Receiver):
         return cut
 
     def _complete(self, cut: Mapping[str, bytes], offset: int, raw: bytes) -> Event:
-        if self.frame.bad_constant(cut):
-            return Event("frame", self.at, offset, raw)
         if self.frame.check_fails(cut):
             return Event("crc", self.at, offset, raw)
         payload = cut[self.frame.by_role["payload"].name]
@@ -162,18 +160,21 @@ class Searcher(Receiver):
         self.swallow, self.ended = False, False
         self.needed = 0
 
-    def whole(self, wire: bytes) -> tuple[Event, bytes]:
-        """The event of the frame in front, and the bytes behind it. Raises Wrong."""
+    def whole(self, wire: bytes) -> Event:
+        """The event of bytes that are exactly one frame. Raises Wrong."""
         self.buffer = wire
         try:
-            event, size, pending = self._attempt()
+            cut = self.splitter.split(wire)
+            payload = self._plain(cut)
+            rest = wire[cut.size :]
+            inserted = bytes([self.frame.stuffing.insert]) if self.frame.stuffing and cut.pending else b""
+            if rest not in (b"", inserted):
+                raise Wrong("length", "bytes follow the frame")
+            return self._event(cut, payload)
         except NeedMore:
             raise Wrong("truncated") from None
         except Refused as refused:
-            raise Wrong(refused.kind or "frame") from None
-        rest = wire[size:]
-        inserted = bytes([self.frame.stuffing.insert]) if self.frame.stuffing and pending else b""
-        return event, b"" if rest == inserted else rest
+            raise Wrong(refused.kind) from None
 
     def take(self, byte: int) -> Iterator[Event]:
         """Everything that the bytes so far tell."""
@@ -203,7 +204,7 @@ class Searcher(Receiver):
                 if not self.ended:
                     self.needed = more.size
                     return
-                yield from self._drop(Refused(""))
+                yield from self._drop(Refused("truncated", told=False))
             except Refused as refused:
                 yield from self._drop(refused)
             else:
@@ -217,7 +218,7 @@ class Searcher(Receiver):
     def _drop(self, refused: Refused) -> Iterator[Event]:
         if self.frame.bare:
             self.skipped += self.buffer[:1]
-        elif refused.kind:
+        elif refused.told:
             yield Event(refused.kind, self.at, self.start, self.buffer[: refused.size])
         self._advance(1)
         if len(self.skipped) == self.frame.overhead + self.frame.most_sent:
@@ -231,22 +232,32 @@ class Searcher(Receiver):
 
     def _attempt(self) -> tuple[Event, int, bool]:
         cut = self.splitter.split(self.buffer)
-        raw, stuffing = self.buffer[: cut.size], self.frame.stuffing
-        payload = cut.parts[self.frame.by_role["payload"].name]
-        if stuffing and stuffing.payload_alone:
-            try:
-                payload = stuffing.unstuff(payload)
-            except Wrong:
-                raise Refused("stuffing", cut.size) from None
-        if self.frame.check_fails(cut.parts):
-            raise Refused("crc", cut.size)
-        message = self.known.get(self.frame.number("message", cut.parts) or 0)
-        address = self.frame.number("address", cut.parts)
-        event = self.carried(message, address, lambda: payload, self.start, raw)
-        if event.kind != "message" and "checksum" not in self.frame.by_role:
+        event = self._event(cut, self._plain(cut))
+        if event.kind == "crc" or (event.kind != "message" and "checksum" not in self.frame.by_role):
             # Nothing has proven that this is a frame at all, so what follows its first byte may hold one.
             raise Refused(event.kind, cut.size)
         return event, cut.size, cut.pending
+
+    def _plain(self, cut: Cut) -> bytes:
+        """The payload as its message means it. Raises Refused."""
+        payload, stuffing = cut.parts[self.frame.by_role["payload"].name], self.frame.stuffing
+        if stuffing is None or not stuffing.payload_alone:
+            return payload
+        try:
+            plain = stuffing.unstuff(payload)
+        except Wrong:
+            raise Refused("stuffing", cut.size) from None
+        if len(plain) > self.frame.most:
+            raise Refused("length", cut.size)
+        return plain
+
+    def _event(self, cut: Cut, payload: bytes) -> Event:
+        raw = self.buffer[: cut.size]
+        if self.frame.check_fails(cut.parts):
+            return Event("crc", self.at, self.start, raw)
+        number, address = (self.frame.number(role, cut.parts) for role in ("message", "address"))
+        message = self.known.get(number or 0)
+        return self.carried(message, address, lambda: payload, self.start, raw)
 
 
 class MarkedReceiver(Receiver):
@@ -276,17 +287,20 @@ class MarkedReceiver(Receiver):
         self.raw = b"" if ended else raw
         if not ended and len(raw) - 1 <= self.frame.most + self.frame.check_size:
             return
-        offset = self.at + 1 - len(raw)
         if not ended:
             self.raw, self.lost = b"", True
-            yield Event("frame", self.at, offset, raw)
+            yield Event("frame", self.at, self.at + 1 - len(raw), raw)
             return
+        yield self.ended(raw)
+
+    def ended(self, raw: bytes) -> Event:
+        """The event of the bytes from a header to an end."""
+        offset = self.at + 1 - len(raw)
         try:
             message, address, payload = self.frame.opened(raw, self.known)
         except Wrong as wrong:
-            yield Event(wrong.kind, self.at, offset, raw)
-        else:
-            yield self.carried(message, address, lambda: payload, offset, raw)
+            return Event(wrong.kind, self.at, offset, raw)
+        return self.carried(message, address, lambda: payload, offset, raw)
 
     def finish(self) -> Iterator[Event]:
         """An unfinished message is truncated."""
@@ -307,7 +321,7 @@ class PacketReceiver(Receiver):
         """One step."""
         self.raw += bytes([byte])
         message = self.known.get(self.raw[0])
-        size = self.frame.size(message) if message else 0
+        size = message.sizes[1] if message else 0
         if message is None or len(self.raw) == 1 + size:
             raw, self.raw = self.raw, b""
             yield self.carried(message, None, lambda: raw[1:], self.at + 1 - len(raw), raw)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tests.support.whole.reference import checks, values
+from tests.support.whole.reference import checks
 from tests.support.whole.reference.document import Doc, Message, whole_span
 from tests.support.whole.reference.frames import part_of
 from tests.support.whole.reference.values import Wrong, put
@@ -42,22 +42,24 @@ class Marked:
         covered = payload if "payload" in self._check.spec["over"] else b""
         return put(self._check.pieces, checks.compute(self._check.spec["algorithm"], covered))
 
-    def opened(self, raw: bytes, known: Mapping[int, Message]) -> tuple[Message, int, bytes]:
-        """Message, address and payload. Raises Wrong."""
-        if len(raw) < 2 or not (raw[0] & raw[-1] & self.marker) or not self.is_end(raw[-1]):
+    def check_extent(self, wire: bytes) -> None:
+        """Refuse bytes that are not one header, and an end after bytes without the marker. Raises Wrong."""
+        marks = [at for at, byte in enumerate(wire) if byte & self.marker]
+        if not wire or (marks == [0] and not self.is_end(wire[0])):
+            raise Wrong("truncated")
+        if marks != [0, len(wire) - 1] or self.is_end(wire[0]) or not self.is_end(wire[-1]):
             raise Wrong("frame")
+
+    def opened(self, raw: bytes, known: Mapping[int, Message]) -> tuple[Message, int, bytes]:
+        """Message, address and payload between a header and an end. Raises Wrong."""
         message, address = known.get(self._bits(raw[0], self._message)), self._bits(raw[0], self._address)
         if message is None or address == 0 or self._bits(raw[-1], self._address) != address:
             raise Wrong("frame")
-        size = self.check_size if message.checked else 0
-        payload, sent = raw[1 : len(raw) - 1 - size], raw[max(1, len(raw) - 1 - size) : -1]
-        if len(sent) < size or any(byte & self.marker for byte in raw[1:-1]):
+        end = len(raw) - 1 - (self.check_size if message.checked else 0)
+        payload, sent = raw[1:end], raw[end:-1]
+        least, most = message.sizes
+        if not (least <= end - 1 <= most or (end == 1 and message.empty_is_default)):
             raise Wrong("frame")
-        try:
-            values.decode(message, payload)
-        except Wrong as wrong:
-            if wrong.kind == "length":
-                raise Wrong("frame") from None
         if sent != self._value(message, payload):
             raise Wrong("crc")
         return message, address, payload
@@ -73,10 +75,6 @@ class Packets:
         found = [part_of(name, spec, order) for name, spec in parts.items() if spec["role"] == "checksum"]
         self._check = found[0] if found else None
 
-    def size(self, message: Message) -> int:
-        """Payload bytes, always the same."""
-        return sum(slot.most_bytes for slot in message.slots)
-
     def seal(self, message: Message, payload: bytes, request: bytes) -> bytes:
         """A request, or a response to one."""
         if message.direction == "request":
@@ -91,11 +89,18 @@ class Packets:
         return put(self._check.pieces, checks.compute(self._check.spec["algorithm"], [request[0], *units]))
 
     def opened(self, message: Message, wire: bytes, request: bytes) -> bytes:
-        """The payload of a response. Raises Wrong."""
-        size = self._check.size if self._check else 0
-        payload, sent = wire[: len(wire) - size], wire[len(wire) - size :]
-        if len(wire) != self.size(message) + size:
+        """The payload of a request, or of the response to one. Raises Wrong."""
+        answers = message.direction == "response"
+        size = self._check.size if self._check and answers else 0
+        beside = size if answers else 1
+        least, most = message.sizes
+        if len(wire) < (0 if message.empty_is_default else least) + beside:
+            raise Wrong("truncated")
+        if len(wire) > most + beside:
             raise Wrong("length")
+        if not answers:
+            return wire[1:]
+        payload, sent = wire[: len(wire) - size], wire[len(wire) - size :]
         if sent != self._value(request, payload):
             rejected = self._check.spec.get("rejected") if self._check else None
             refused = self._check and rejected is not None and sent == put(self._check.pieces, rejected)
