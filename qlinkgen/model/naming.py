@@ -68,7 +68,7 @@ def constant_class(name: str, kind: str, messages: frozenset[str]) -> str:
 
 #: Keywords of C and C++ up to C23 and C++23, those of compilers without -std, and macros without arguments:
 #: those of the C library, of GNU compilers and of Windows. Macros with arguments are expanded only before a
-#: parenthesis, and none follows a member.
+#: parenthesis, and none follows a member. In C++ a member cannot be called like the type of another one.
 _C_WORDS = frozenset(
     """alignas alignof and and_eq asm atomic_cancel atomic_commit atomic_noexcept auto bitand bitor bool
     break case catch char char8_t char16_t char32_t class co_await co_return co_yield compl concept
@@ -84,12 +84,12 @@ _C_WORDS = frozenset(
     si_overrun si_pid si_pkey si_ptr si_status si_stime si_syscall si_timerid si_uid si_upper
     si_utime si_value st_atime st_ctime st_mtime arm mips i386 vax far huge near interface small
     hyper cdecl pascal interrupt""".split()  # noqa: SIM905
-)
+) | {f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)}
 #: Variables, types and functions of the generated functions that have the address as a parameter.
 _C_LOCALS = frozenset(
     """size payload wire capacity message value from to end check since index sent status id slave master
     listener frame checked request response body buffer start count raw sum crc payload_size
-    payload_capacity bool uint8_t uint16_t uint32_t uint64_t int8_t size_t""".split()  # noqa: SIM905
+    payload_capacity size_t""".split()  # noqa: SIM905
 )
 #: What a table of handlers has beside its functions.
 _C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id"})
