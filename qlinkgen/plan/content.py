@@ -59,12 +59,18 @@ class BadContent(ValueError):
 
 
 class MoreNeeded(Exception):
-    """The bytes so far do not tell how long the payload is; it has at least ``least`` bytes."""
+    """The bytes so far do not tell how long the payload is.
 
-    def __init__(self, least: int) -> None:
-        """Note the least size."""
-        super().__init__(least)
+    Attributes:
+        least: fewest bytes that it has.
+        needed: bytes up to the end of the next count.
+    """
+
+    def __init__(self, least: int, needed: int) -> None:
+        """Note the sizes."""
+        super().__init__(least, needed)
         self.least = least
+        self.needed = needed
 
 
 # Encoding ---------------------------------------------------------------------------------------------------
@@ -192,7 +198,7 @@ def measure(plan: PayloadPlan, start: bytes) -> int:
         if isinstance(each, Learn):
             end = each.count.place.front.value(counts) + each.count.integer.size
             if len(start) < end:
-                raise MoreNeeded(plan.size.value(counts))
+                raise MoreNeeded(plan.size.value(counts), end)
             counts[each.count.run] = _learn(each.count, start, counts)
     return plan.size.value(counts)
 

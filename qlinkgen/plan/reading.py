@@ -64,7 +64,12 @@ class Astray(Exception):
 
 
 class Missing(Exception):
-    """The bytes so far may be the beginning of a frame."""
+    """The bytes so far may be the beginning of a frame; fewer than ``size`` tell nothing new."""
+
+    def __init__(self, size: int = 0) -> None:
+        """Note the size."""
+        super().__init__(size)
+        self.size = size
 
 
 @dataclass
@@ -106,17 +111,31 @@ class Cursor:
 
     def take(self, size: int, *, stuffed: bool) -> bytes:
         """Bytes of a part. Raises Missing, or BadFrame where an inserted byte is another one."""
-        taken = bytearray()
+        taken = b""
+        rule = self._rule if stuffed else None
         while len(taken) < size:
             self._pass_inserted()
-            taken.append(self._byte())
-            self.places.append(self.at - 1)
-            if stuffed and self._rule is not None:
-                self._recent = (self._recent + taken[-1:])[-len(self._rule.after) :]
-                self.due = self._recent == self._rule.after
+            run = self._run(size - len(taken), rule)
+            taken += run
+            if rule is not None:
+                self._recent = (self._recent + run)[-len(rule.after) :]
+                self.due = self._recent == rule.after
         if not stuffed:
             self._recent = b""
-        return bytes(taken)
+        return taken
+
+    def _run(self, most: int, rule: Insertion | None) -> bytes:
+        """The next bytes before which none is inserted, but for the first."""
+        start, left = self.at, len(self._wire) - self.at
+        if left == 0:
+            raise Missing(start + 1)
+        last = -1 if rule is None else self._wire.find(rule.after[-1:], start, start + most)
+        size = min(most, left) if last < 0 else last + 1 - start
+        self.at += size
+        self.places += range(start, self.at)
+        if size < most and rule is None:
+            raise Missing(start + most)
+        return self._wire[start : self.at]
 
     def _pass_inserted(self) -> None:
         if self.due and self._rule is not None:
@@ -134,7 +153,7 @@ class Cursor:
 
     def _byte(self) -> int:
         if self.at == len(self._wire):
-            raise Missing
+            raise Missing(self.at + 1)
         self.at += 1
         return self._wire[self.at - 1]
 
@@ -244,8 +263,8 @@ class FrameReader:
         while True:
             try:
                 size = measure(message.payload, sent)
-            except MoreNeeded:
-                sent += self._take(cursor, part, 1)
+            except MoreNeeded as more:
+                sent += self._take(cursor, part, more.needed - len(sent))
             except BadContent:
                 raise BadFrame("length", cursor.at) from None
             else:

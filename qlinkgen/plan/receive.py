@@ -119,6 +119,8 @@ class HuntingReceiver(Receiver):
         self._reader = FrameReader(plan.frame, self.known, direction)
         self._marks = 0
         self._raw = b""
+        #: With fewer bytes the frame is not complete.
+        self._needed = 0
 
     def take(self, byte: int) -> Iterator[Event]:
         """One step."""
@@ -134,13 +136,16 @@ class HuntingReceiver(Receiver):
             return
         marks, self._marks = self._marks, 0
         if marks >= 2:
-            self._raw = bytes((self._mark, self._mark, byte))
+            self._raw, self._needed = bytes((self._mark, self._mark, byte)), 0
             yield from self._inside()
 
     def _inside(self) -> Iterator[Event]:
+        if len(self._raw) < self._needed:
+            return
         try:
             taken = self._reader.read(self._raw, hunting=True)
-        except Missing:
+        except Missing as missing:
+            self._needed = missing.size
             return
         except BadFrame as bad:
             aborted = bad.kind == "truncated"
@@ -170,22 +175,27 @@ class RescanningReceiver(Receiver):
         self._reader = FrameReader(plan.frame, self.known, direction)
         self._longest = plan.frame.envelopes[direction].max_frame
         self._buffer, self._skipped, self._due = b"", b"", b""
+        #: With fewer bytes the frame that may begin the buffer is not complete.
+        self._needed = 0
 
     def take(self, byte: int) -> Iterator[Event]:
         """Everything that the buffer now holds."""
         self._buffer += bytes((byte,))
-        yield from self._scan()
+        if len(self._buffer) >= self._needed:
+            yield from self._scan()
 
     def _scan(self) -> Iterator[Event]:
         while self._buffer:
+            self._needed = 0
             due, self._due = self._due, b""
             if due and self._buffer[:1] == due:
                 self._buffer = self._buffer[1:]
                 continue
             try:
                 taken = self._reader.read(self._buffer)
-            except Missing:
+            except Missing as missing:
                 if not self.ended:
+                    self._needed = missing.size
                     return
                 yield from self._drop("", b"")
             except Astray:
@@ -237,7 +247,7 @@ class RescanningReceiver(Receiver):
             self._buffer = self._buffer[1:]
         yield from self._scan()
         yield from self._report(self.taken)
-        self._buffer, self._due = b"", b""
+        self._buffer, self._due, self._needed = b"", b"", 0
 
 
 class MarkReceiver(Receiver):
