@@ -11,10 +11,10 @@ TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py)))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast lint generate bench soak clean
+.PHONY: help setup demo test test-fast lint generate bench soak soak-schemas clean
 
 help:  ## Show this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' tools
 
@@ -68,6 +68,9 @@ bench: .venv/.user  ## Measure the generated code beside its peers
 soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 20 000 with each firmware; writes docs/soak.md (40 minutes)
 	@$(BIN)/python -m tests.soak.bus --output docs/soak.md
 	@$(BIN)/python -m tests.soak.firmware --output docs/soak.md
+
+soak-schemas: .venv/.dev  ## 1 000 random whole schemas through every target, gcc and clang; writes docs/soak-schemas.md (40 minutes)
+	@$(BIN)/python -m tests.whole --seeds 1..1000 --every --report build/soak-schemas.txt --output docs/soak-schemas.md
 
 clean:  ## Remove everything that make and the tools made
 	rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

@@ -9,19 +9,20 @@ import signal
 import subprocess
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from qlinkgen.backends import construct
+from qlinkgen.backends import c, construct
 from qlinkgen.backends.base import Options
 from qlinkgen.cli.targets import TARGETS
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
+from qlinkgen.plan.select import Role
 from qlinkgen.schema import loads
 from tests.support.cdriver import WARNINGS, Driver, build
 from tests.support.whole import chance, schemas
@@ -41,7 +42,13 @@ from tests.support.whole.targets import (
 
 #: Seconds of processor time that one schema may take, and of any time that a compiled program may.
 SECONDS = 120
-_STRICT = ("-std=c99", "-fsyntax-only", *WARNINGS)
+#: Compilers and the standards by which they take a header; `every` adds the later ones.
+_STRICT = (("gcc", "-std=c99"), ("clang", "-std=c99"))
+_EVERY = (
+    *_STRICT,
+    *(("gcc", "-std=c11"), ("clang", "-std=c11")),
+    *(("g++", "-xc++", "-std=c++17"), ("clang++", "-xc++", "-std=c++17")),
+)
 #: Most differences of the streams of one output that are made small and reported.
 _MOST = 3
 #: Targets that need no vectors, which take long.
@@ -60,6 +67,8 @@ class Effort:
     sanitized: int = 4
     #: C is generated, but nothing is compiled.
     uncompiled: bool = False
+    #: Every compiler and standard takes every header, and both C compilers build the kit.
+    every: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +92,9 @@ class Outcome:
     traits: str = ""
     refused: tuple[str, ...] = ()
     differences: list[Difference] = field(default_factory=list)
+    messages: int = 0
+    frames: int = 0
+    streams: int = 0
     compared: int = 0
 
     def report(self) -> str:
@@ -190,6 +202,7 @@ class _Trial:
         self.guard("load", "construct source", lambda: self._construct("construct source", source()))
         header = self.folder / f"{file_stem(protocol.name)}.h"
         if not self.effort.uncompiled and header.exists() and self._compile(header):
+            self._roles(protocol)
             self.guard("driver", "c", lambda: self._driver(protocol, programs))
 
     def _construct(self, name: str, live: construct.Live) -> None:
@@ -202,7 +215,8 @@ class _Trial:
         folder = self.folder / "driver"
         folder.mkdir()
         try:
-            program = build(protocol, folder, "gcc", _CHECKED if checked else _PLAIN)
+            compiler = "clang" if self.outcome.seed % 2 else "gcc"
+            program = build(protocol, folder, compiler, _CHECKED if checked else _PLAIN)
         except subprocess.CalledProcessError as error:
             raise _Failed(f"the driver does not compile ({error.returncode})") from None
         driver = programs.enter_context(Driver("timeout", str(10 * SECONDS), program))
@@ -210,26 +224,41 @@ class _Trial:
 
     def _compile(self, header: Path) -> bool:
         """Compile strictly; whether it compiles at all."""
-        unit = self.folder / "strict.c"
-        unit.write_text(f'#include "{header.name}"\nint main(void) {{ return 0; }}\n', "utf-8")
-        for compiler in ("gcc", "clang"):
-            self.guard("compile", compiler, partial(_tool, compiler, *_STRICT, unit))
+        unit = self._strict(header, _EVERY if self.effort.every else _STRICT)
         kit = self.folder / f"{header.stem}_conformance.c"
         if kit.exists():
-            self._kit(kit)
+            for compiler in ("gcc", "clang") if self.effort.every else ("gcc",):
+                self._kit(kit, compiler)
         done = subprocess.run(["gcc", *_PLAIN, "-fsyntax-only", str(unit)], capture_output=True, check=False)
         return done.returncode == 0
 
-    def _kit(self, kit: Path) -> None:
+    def _strict(self, header: Path, compilers: Sequence[tuple[str, ...]]) -> Path:
+        unit = header.with_name("strict.c")
+        unit.write_text(f'#include "{header.name}"\nint main(void) {{ return 0; }}\n', "utf-8")
+        for words in compilers:
+            self.guard("compile", " ".join(words), partial(_tool, *words, "-fsyntax-only", *WARNINGS, unit))
+        return unit
+
+    def _roles(self, protocol: Protocol) -> None:
+        """The headers of one side alone."""
+        roles: tuple[Role, ...] = ("slave", "master")
+        for role in roles:
+            folder = self.folder / role
+            folder.mkdir()
+            self.guard("generate", f"c {role}", partial(_header_of, protocol, role, folder))
+            for header in folder.glob("*.h"):
+                self._strict(header, _EVERY if self.effort.every else _STRICT[:1])
+
+    def _kit(self, kit: Path, compiler: str) -> None:
         """Compile strictly and run; warnings do not keep it from running, which would hide what it finds."""
-        program = self.folder / "kit"
-        command = ("gcc", *_PLAIN, "-DCONFORMANCE_STDIO=1", kit, "-o", program)
-        strict = self.guard("compile", "kit", partial(_tool, *command, *WARNINGS))
+        program = self.folder / f"kit-{compiler}"
+        command = (compiler, *_PLAIN, "-DCONFORMANCE_STDIO=1", kit, "-o", program)
+        strict = self.guard("compile", f"kit {compiler}", partial(_tool, *command, *WARNINGS))
         if (
             strict
             or subprocess.run(list(map(str, command)), capture_output=True, check=False).returncode == 0
         ):
-            self.guard("run", "kit", lambda: _kit(program))
+            self.guard("run", f"kit {compiler}", lambda: _kit(program))
 
     # Messages
 
@@ -246,6 +275,7 @@ class _Trial:
         return self.reference.encode(asked.name, chance.values(asked, self.rng, self.mark))[1]
 
     def _message(self, message: Message) -> None:
+        self.outcome.messages += 1
         given = chance.values(message, self.rng, self.mark)
         place, request = chance.address(message, self.rng), self._request(message)
         payload, wire = self.reference.encode(message.name, given, place, request)
@@ -258,6 +288,7 @@ class _Trial:
             self._decoded(message, frame, request)
 
     def _decoded(self, message: Message, wire: bytes, request: bytes) -> None:
+        self.outcome.frames += 1
         try:
             expected: Seen | Wrong = self.reference.decode(self.reference.hears(message), wire, request)
         except Wrong as wrong:
@@ -311,6 +342,7 @@ class _Trial:
         return sorted(frames, key=len)[:2]
 
     def _stream(self, direction: Direction, data: bytes) -> None:
+        self.outcome.streams += 1
         seed = self.rng.random()
         for target in list(self.targets):
             if isinstance(target, PythonTarget):
@@ -352,6 +384,11 @@ class _Trial:
 
 def _generate(name: str, protocol: Protocol, texts: dict[str, str]) -> None:
     texts.update(TARGETS[name].load()(protocol, Options()))
+
+
+def _header_of(protocol: Protocol, role: Role, folder: Path) -> None:
+    for path, text in c.generate(protocol, Options(role=role)).items():
+        (folder / Path(path).name).write_text(text, "utf-8")
 
 
 def _parse(text: str, path: str) -> None:
