@@ -20,7 +20,7 @@ from qlinkgen.cli.encode import asked
 from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
 from qlinkgen.model.message import Direction
-from qlinkgen.model.naming import address_attribute
+from qlinkgen.model.naming import address_attribute, record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan.framing import frame_plan
 
@@ -161,7 +161,7 @@ def message_record(protocol: Protocol, found: Any) -> dict[str, Any]:
     record: dict[str, Any] = {"message": message.name}
     name = protocol.address_name
     if name and message.addresses:
-        record[name] = getattr(found, address_attribute(name))
+        record[record_key(name)] = getattr(found, address_attribute(name))
     record["fields"] = fields(message, found)
     return record
 

@@ -22,6 +22,7 @@ from qlinkgen.cli.common import (
 )
 from qlinkgen.cli.describe import addresses_text
 from qlinkgen.model.message import Message
+from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import whole_number
 from qlinkgen.plan.framing import frame_plan
@@ -115,7 +116,7 @@ class _Record:
 
 
 def _record(protocol: Protocol, given: Mapping[str, Any]) -> _Record:
-    known = {"message", "fields", "node", "address", protocol.address_name}
+    known = {"message", "fields", "node", "address", record_key(protocol.address_name or "")}
     message, fields = given.get("message"), given.get("fields")
     if not (isinstance(message, str) and isinstance(fields, Mapping) and set(given) <= known):
         return _Record(given)

@@ -13,6 +13,7 @@ from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.codec import build, load_codec
 from qlinkgen.cli.common import find_message
+from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
 
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -67,10 +68,11 @@ def _lines(document: yaml.Node | None) -> dict[str, list[int]]:
 def _misfit(protocol: Protocol, codec: ModuleType, row: Mapping[str, Any]) -> str:
     """Why a vector does not fit, "" if it does."""
     message = find_message(protocol, row["message"])
-    address = {name: row[name] for name in ("node", "address") if name in row}
-    if set(address) - {protocol.address_name}:
-        return f"frames have no {next(iter(address))}"
-    built = build(codec, message, row["fields"], address)
+    name = protocol.address_name
+    key = record_key(name) if name else ""
+    if wrong := [each for each in ("node", "address") if each in row and each != key]:
+        return f"frames have no {wrong[0]}"
+    built = build(codec, message, row["fields"], {name: row[key]} if name and key in row else {})
     request = [codec.decode_request(bytes.fromhex(row["request"]))] if "request" in row else []
     payload, wire = bytes.fromhex(row["payload"]), bytes.fromhex(row["wire"])
     if row.get("decode_only"):

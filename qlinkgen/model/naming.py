@@ -85,11 +85,12 @@ _C_WORDS = frozenset(
     si_utime si_value st_atime st_ctime st_mtime arm mips i386 vax far huge near interface small
     hyper cdecl pascal interrupt""".split()  # noqa: SIM905
 ) | {f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)}
-#: Variables, types and functions of the generated functions that have the address as a parameter.
+#: Variables of the generated functions that have the address as a parameter, and what structs have beside it.
 _C_LOCALS = frozenset(
     """size payload wire capacity message value from to end check since index sent status id slave master
     listener frame checked request response body buffer start count raw sum crc payload_size
-    payload_capacity size_t""".split()  # noqa: SIM905
+    payload_capacity total trailer covered head place broadcast context byte
+    size_t""".split()  # noqa: SIM905
 )
 #: What a table of handlers has beside its functions.
 _C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id"})
@@ -148,6 +149,20 @@ _FILES = frozenset(
 def file_stem(protocol: str) -> str:
     """What files of a protocol are called: headers, modules, vectors."""
     return f"{protocol}_" if protocol in _FILES or keyword.iskeyword(protocol) else protocol
+
+
+# Records ----------------------------------------------------------------------------------------------------
+
+#: What JSON lines, vectors and containers of construct say of a message beside its address.
+_IN_RECORDS = frozenset(
+    """message fields raw kinds request payload wire source decode_only what kind part error at from to
+    sent_on repeat delay late stray unanswered asked offset""".split()  # noqa: SIM905
+)
+
+
+def record_key(address: str) -> str:
+    """The key of an address."""
+    return f"{address}_" if address in _IN_RECORDS else address
 
 
 # Conversion -------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from typing import Any
 
 from qlinkgen.backends.conformance.sources import Header, Sources
 from qlinkgen.model.message import Message, Value
+from qlinkgen.model.naming import record_key
 from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.model.values import Native, default_of, from_json, raw_from_native
 from qlinkgen.plan import Plan
@@ -88,7 +89,7 @@ def _right(plan: Plan, header: Header, entry: Mapping[str, Any]) -> Right:
     return Right(
         message=message,
         kinds=() if by_hand else tuple(entry["kinds"]),
-        address=entry.get(plan.frame.address, message.default_address),
+        address=entry.get(record_key(plan.frame.address), message.default_address),
         values=b"".join(_value(header, value, entry) for value in message.values),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),

@@ -9,6 +9,7 @@ from qlinkgen.backends.construct.payload import Names, Types, comment, fields, i
 from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.integer import Integer
+from qlinkgen.model.naming import record_key
 from qlinkgen.plan.framing import (
     AddressPart,
     CheckPart,
@@ -148,7 +149,7 @@ def _check(part: CheckPart, envelope: Envelope) -> Call:
 
 
 def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
-    address = (("address", frame.address),) if frame.address else ()
+    address = (("address", record_key(frame.address)),) if frame.address else ()
     settings = (*address, *_stuffing(frame))
     match frame.receiver:
         case Hunt():

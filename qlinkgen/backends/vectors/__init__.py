@@ -15,6 +15,7 @@ from qlinkgen.backends.vectors.choice import Chance
 from qlinkgen.backends.vectors.faults import Faults, Good
 from qlinkgen.backends.vectors.writer import Json
 from qlinkgen.model.message import Direction, Value
+from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.model.values import Native, native_from_raw, to_json
@@ -86,7 +87,7 @@ class _Vectors:
     def _row(self, kinds: list[str], good: Good) -> Mapping[str, Json]:
         row: dict[str, Json] = {"message": good.message.name, "kinds": kinds}
         if good.address is not None:
-            row[self._codec.plan.frame.address] = good.address
+            row[record_key(self._codec.plan.frame.address)] = good.address
         row |= _shown(good)
         if good.request:
             row["request"] = good.request.hex()

@@ -232,7 +232,7 @@ class ConstructTarget(Target):
         natives = self.natives(message, given)
         whole: dict[str, Any] = {"message": message.name, "fields": natives}
         if self.reference.address_name:
-            whole[self.reference.address_name] = address
+            whole[naming.record_key(self.reference.address_name)] = address
         try:
             frame = self._live.frames[self.reference.hears(message)]
             return self._live.payload(message.name, natives), frame.build(whole, request=request)
@@ -248,7 +248,7 @@ class ConstructTarget(Target):
         fields = found["fields"]
         values = self.raws(self.reference.by_name[found["message"]], lambda each: fields[each])
         name = self.reference.address_name
-        return Seen(found["message"], found[name] if name else None, values)
+        return Seen(found["message"], found[naming.record_key(name)] if name else None, values)
 
 
 def printed(protocol: Protocol, folder: Path) -> construct.Live:

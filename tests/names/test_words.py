@@ -1,0 +1,281 @@
+"""Every word, in every slot for a name: lint takes it, and each target says the same with it.
+
+Slots of which a schema has many hold all words at once. The parts of a frame and the protocol have one name
+each, so there is a schema for each word, and all their headers are compiled as one file.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from qlinkgen.backends import construct, python
+from qlinkgen.backends.base import Options
+from qlinkgen.backends.vectors import choice
+from qlinkgen.backends.vectors.choice import Chance
+from qlinkgen.cli.targets import TARGETS
+from qlinkgen.model import naming
+from qlinkgen.model.message import Value
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.types import Scalar
+from qlinkgen.model.values import native_from_raw
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.content import Raw
+from tests.names import words
+from tests.names.documents import PLAIN_PARTS, Document, Json, frame, packet
+from tests.proof.outputs import plain_numbers
+from tests.python.test_bus import loaded
+from tests.support.cdriver import WARNINGS
+
+#: Types of the schema language, which no name can hide.
+BUILT_IN = ("bool", "bytes", "text")
+INTEGER = re.compile(r"[ui][0-9]+")
+STRICT = (*WARNINGS, "-Wshadow", "-fsyntax-only")
+COMPILERS = {
+    "gcc": ("-std=c99",),
+    "clang": ("-std=c2x",),
+    "g++": ("-std=c++20", "-Wno-missing-field-initializers"),
+}
+Commands = Mapping[str, tuple[Mapping[str, Json], Mapping[str, Json]]]
+LEAST: Commands = {"zz": ({"qq": "u8"}, {"qq": "u8"})}
+NEUTRAL = (
+    Document(
+        enums={"ee": ["mm", "nn"]},
+        flags={"ff": ["oo"]},
+        types=["tt"],
+        commands={"zz": ({"qq": "u8"}, {"yy": {"type": "u8", "counts": "xx"}, "xx": "u16[0..3]"})},
+        messages={"ww": {"ss": "tt", "rr": "ee", "vv": "ff", "uu": "text[4]", "bb": "bytes[0..9]"}},
+    ),
+    Document(frame=frame(PLAIN_PARTS, stuffed=True), commands=LEAST),
+    Document(frame=frame(PLAIN_PARTS, length=False), commands=LEAST),
+    Document(frame=packet(PLAIN_PARTS), kind="host", commands=LEAST),
+)
+
+
+@cache
+def c_words() -> list[str]:
+    """What a compiler, its library or a header knows."""
+    known = {*words.C_KEYWORDS, *words.USUAL, *words.macros("gcc")}
+    return words.names(known | words.of_generated(NEUTRAL, ["c"]))
+
+
+@cache
+def python_words() -> list[str]:
+    """What Python or a generated module knows."""
+    known = words.of_python() | words.of_generated(NEUTRAL, ["python", "bus", "construct"])
+    return words.names(known | set(words.USUAL))
+
+
+@cache
+def kit_words() -> list[str]:
+    """What a conformance kit knows beside its header."""
+    known = words.of_generated(NEUTRAL, ["conformance"]) - words.of_generated(NEUTRAL, ["c"])
+    return words.names(known | set(words.USUAL))
+
+
+@cache
+def every_word() -> list[str]:
+    return sorted({*c_words(), *python_words()})
+
+
+def types_of(known: Sequence[str]) -> list[str]:
+    """Those that are not types of the language itself."""
+    return [word for word in known if word not in BUILT_IN and not INTEGER.fullmatch(word)]
+
+
+def dealt(known: Sequence[str], size: int) -> list[Sequence[str]]:
+    """The words in groups of at most so many; those that begin alike come into different ones."""
+    groups = -(-len(known) // size)
+    return [known[index::groups] for index in range(groups)]
+
+
+def runs(names: Sequence[str]) -> Mapping[str, Json]:
+    """Fields of variable size: a byte string or an array each, with its count."""
+    counts = {f"zz{index}": {"type": "u8", "counts": name} for index, name in enumerate(names)}
+    return {
+        **counts,
+        **{name: "bytes[0..3]" if index % 2 else "u16[0..2]" for index, name in enumerate(names)},
+    }
+
+
+def many(name: str, known: Sequence[str]) -> Document:
+    """All words as the names of one kind."""
+    types = types_of(known)
+    match name:
+        case "of_fields":
+            groups = enumerate(dealt(known, 90))
+            commands = {f"zz{index}": (dict.fromkeys(group, "u8"), runs(group)) for index, group in groups}
+            return Document(name, commands=commands)
+        case "of_bits":
+            groups = enumerate(dealt(known, 60))
+            carriers: Commands = {f"zz{index}": ({"yy": bits(group)}, {}) for index, group in groups}
+            return Document(name, commands=carriers)
+        case "of_enums":
+            return Document(name, enums=dict.fromkeys(types, ("mm", "nn")), commands=used(types))
+        case "of_members":
+            return Document(name, enums={"ee": known}, commands=used(["ee"]))
+        case "of_flags":
+            return Document(name, flags=dict.fromkeys(types, ("mm",)), commands=used(types))
+        case "of_bit_names":
+            flags = {f"ff{index}": group for index, group in enumerate(dealt(known, 60))}
+            return Document(name, flags=flags, commands=used(list(flags)))
+        case "of_types":
+            return Document(name, types=types, commands=used(types))
+        case "of_commands":
+            return Document(name, commands=dict.fromkeys(known, LEAST["zz"]))
+        case "of_messages":
+            return Document(name, messages={word: {"qq": "u8"} for word in known})
+        case _:
+            assert name == "of_all"
+            messages = {word: {word: word} for word in types}
+            return Document(name, enums=dict.fromkeys(types, ("mm",)), messages=messages)
+
+
+def bits(names: Sequence[str]) -> Json:
+    """An integer with a bit for each name."""
+    return {"type": "u64", "bits": {word: {"at": at} for at, word in enumerate(names)}}
+
+
+def used(types: Sequence[str]) -> Commands:
+    """Commands with a field of each type."""
+    groups = [types[index : index + 100] for index in range(0, len(types), 100)]
+    return {
+        f"zz{index}": ({f"qq{place}": name for place, name in enumerate(group)}, {})
+        for index, group in enumerate(groups)
+    }
+
+
+def alone(known: Sequence[str], shapes: int) -> Iterator[Document]:
+    """Every word as the name of each part of a frame, in so many shapes of frames."""
+    for index in range(len(known)):
+        six = [known[(index + 97 * step) % len(known)] for step in range(6)]
+        for shape in range(index, index + shapes):
+            made = frame(six, stuffed=shape % 3 == 1, length=shape % 3 < 2)
+            yield Document(f"parts_{index}_{shape % 3}", frame=made, commands=LEAST)
+
+
+MANY = (
+    "of_fields",
+    "of_bits",
+    "of_enums",
+    "of_members",
+    "of_bit_names",
+    "of_flags",
+    "of_types",
+    "of_commands",
+    "of_messages",
+    "of_all",
+)
+
+
+def test_there_are_many_words() -> None:
+    assert len(every_word()) > 800
+    assert {"int", "class", "uint8_t", "stdin", "payload", "from_bytes", "capacity"} <= {*every_word()}
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_headers_are_clean(compiler: str, tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    """As many as there are, in one file: names of one protocol do not touch those of another either."""
+    program = require_tool(compiler, package=compiler)
+    documents = [many(name, c_words()) for name in MANY]
+    if compiler == "gcc":
+        documents += [
+            *alone(c_words(), 3),
+            *(Document(word, commands=LEAST) for word in words.names(words.USUAL)),
+        ]
+    names = [name for each in documents for name in written(each, "c", tmp_path)]
+    (tmp_path / "all.c").write_text("".join(f'#include "{name}"\n' for name in names), "utf-8")
+    language = "c++" if compiler == "g++" else "c"
+    command = [program, "-x", language, *COMPILERS[compiler], *STRICT, "all.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr[:4000]
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_kits_compile(name: str, tmp_path: Path, require_tool: Callable[..., str]) -> None:
+    document = many(name, kit_words())
+    written(document, "c", tmp_path)
+    command = [require_tool("gcc", package="gcc"), "-std=c99", *STRICT, "-DCONFORMANCE_STDIO=1"]
+    command += written(document, "conformance", tmp_path)
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr[:4000]
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_python_and_construct_say_what_the_plan_says(name: str) -> None:
+    agree(many(name, python_words()).protocol())
+
+
+def test_python_and_construct_take_every_name_of_a_part() -> None:
+    for each in alone(python_words(), 1):
+        agree(each.protocol())
+
+
+def test_modules_can_be_called_so(tmp_path: Path) -> None:
+    """Modules have the names of protocols, in a package: keywords and names of other modules are taken."""
+    taken = [*keyword.kwlist, *words.names(sys.stdlib_module_names)]
+    known = [word for word in words.names([*taken, *words.USUAL]) if len(word) <= 20]
+    modules = []
+    for word in known:
+        document = Document(word, commands=LEAST)
+        for target in ("python", "bus"):
+            files = written(document, target, tmp_path / "wire")
+            modules += [Path(each).stem for each in files if each.endswith(".py")]
+    program = "".join(f"import wire.{name}\n" for name in sorted(set(modules)))
+    command = [sys.executable, "-W", "error", "-c", program]
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=300)
+
+
+def written(document: Document, target: str, folder: Path) -> list[str]:
+    """Write what a target makes into one folder; the names of its files."""
+    folder.mkdir(exist_ok=True)
+    made = TARGETS[target].load()(document.protocol(), Options())
+    for path, text in made.items():
+        (folder / Path(path).name).write_text(text, "utf-8")
+    return [Path(path).name for path in made]
+
+
+def agree(protocol: Protocol) -> None:
+    """Random values of every message are the same frame in Python and construct; calls can be made."""
+    module, live, codec = python.load(protocol), construct.live(protocol), Codec(plan_of(protocol))
+    loaded(protocol, module)
+    for path, text in construct.generate(protocol, Options()).items():
+        compile(text, path, "exec")
+    address, requests = protocol.address_name, dict[str, bytes]()
+    for message in codec.plan.messages:
+        raw = choice.random(Chance(message.name)).values(message.payload)
+        values = {value.name: native_of(value, raw[value.name]) for value in message.message.values}
+        request = requests.get(message.message.command, b"") if codec.plan.frame.needs_request else b""
+        place = {} if address is None else {address: message.message.default_address}
+        wire = codec.encode(message.name, raw, request=request)
+        requests[message.message.command] = wire
+        made = module.MESSAGES[message.name](
+            **{naming.attribute(name): value for name, value in values.items()},
+            **{naming.address_attribute(name): value for name, value in place.items()},
+        )
+        direction = codec.plan.hears(message)
+        asked = [module.decode_request(request)] if request else []
+        assert made.to_frame(*asked) == wire
+        assert getattr(module, f"decode_{direction}")(wire, *asked) == made
+        parsed = live.parse(direction, wire, request)
+        assert {name: plain_numbers(parsed["fields"])[name] for name in values} == values
+        assert {naming.record_key(name): parsed[naming.record_key(name)] for name in place} == {
+            naming.record_key(name): value for name, value in place.items()
+        }
+        assert parsed["message"] == message.name
+
+
+def native_of(value: Value, raw: Raw) -> object:
+    """A value on the wire as Python holds it."""
+    if isinstance(value.type, Scalar):
+        assert isinstance(raw, int)
+        return native_from_raw(value.type, raw)
+    return raw
