@@ -161,9 +161,10 @@ def _messages(file: SchemaFile) -> Iterator[str]:
 
 def _methods(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
     """Methods of bus modules, and members of tables of handlers."""
-    for name in (*file.commands, *file.messages):
-        group = "commands" if name in file.commands else "messages"
-        yield naming.method(name), f"'{name}'", (group, name)
+    for name in file.commands:
+        yield naming.method(name), f"the command '{name}'", ("commands", name)
+    for name in file.messages:
+        yield naming.method(name), f"the message '{name}'", ("messages", name)
 
 
 def _class_base(file: SchemaFile, name: str) -> str:

@@ -24,7 +24,7 @@ from qlinkgen.cli.targets import TARGETS
 from qlinkgen.model import naming
 from qlinkgen.model.message import Value
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Blob, Scalar
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
@@ -278,4 +278,7 @@ def native_of(value: Value, raw: Raw) -> object:
     if isinstance(value.type, Scalar):
         assert isinstance(raw, int)
         return native_from_raw(value.type, raw)
+    if isinstance(value.type, Blob) and value.type.text:
+        assert isinstance(raw, bytes)
+        return raw.decode("ascii")
     return raw
