@@ -1,0 +1,80 @@
+"""A word list for prose: turns of phrase that a reader stumbles on, with what to say instead.
+
+`make lint` runs `python -m tests.prose`, which looks through every text of the project that is not generated.
+Files that were written before the list and have not changed since are left alone: `untouched.txt` has their
+digests. Reword such a file when you change it; `--forget` then takes out its line.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import subprocess
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+UNTOUCHED = Path(__file__).with_name("untouched.txt")
+KINDS = ("*.py", "*.md", "*.j2", "*.yaml", "*.c", "*.h", "*.toml", "Makefile")
+#: Not ours to word: generated, or the list itself and its tests.
+ELSEWHERE = ("generated/", "tests/prose/", "qlinkgen/codecs", "tests/c/corpus/")
+
+#: What is looked for, and what to say.
+PHRASES: Mapping[str, str] = {
+    r"\b(stand|stands|stood) (in|at|behind|alone|there|for|on|beside|between)\b": "is, occurs, appears",
+    r"\bin front of\b": "before",
+    r"\bbehind (it|the|a|an|its|them|each|every)\b": "after, follows",
+    r"\b([Nn]obody|[Ww]hoever|[Aa]nybody)\b": "no one; or name the reader, caller, sender",
+    r"\b(is|are|was|were) no (?!longer\b|more\b|less\b|fewer\b|one\b)[a-z]+\b": "is not a; X is missing",
+    r"\b[Ww]hat (came|comes)\b": "the reply, the bytes received",
+    r"\bof no (bytes|data|items)\b": "empty; without data",
+    r"\b[Ww]hat is not there\b": "name the thing that is missing",
+    r"\bmisfits?\b": "LayoutError; a frame that does not fit",
+}
+#: Between two words a line may end, with what begins a line of a comment.
+_GAP = r"(?:[ \t]|\n[ \t]*(?:#:? |[*>] |// )?)+"
+_PATTERNS = {re.compile(each.replace(" ", _GAP)): better for each, better in PHRASES.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """A turn of phrase in a file."""
+
+    path: str
+    line: int
+    phrase: str
+    advice: str
+
+    def __str__(self) -> str:
+        """As compilers print it."""
+        return f"{self.path}:{self.line}: '{self.phrase}'; say: {self.advice}"
+
+
+def texts() -> Iterator[tuple[str, str]]:
+    """Every text of the project by its path, whether committed or about to be."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *KINDS]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for path in filter(None, listed.split("\0")):
+        file = ROOT / path
+        if not path.startswith(ELSEWHERE) and file.is_file():
+            yield path, file.read_text("utf-8")
+
+
+def hits(path: str, text: str) -> list[Hit]:
+    """The turns of phrase in a text; one that is broken over two lines is found too."""
+    found = [(each, better) for pattern, better in _PATTERNS.items() for each in pattern.finditer(text)]
+    return [
+        Hit(path, text.count("\n", 0, each.start()) + 1, " ".join(each[0].split()), better)
+        for each, better in sorted(found, key=lambda pair: pair[0].start())
+    ]
+
+
+def digest(path: str, text: str) -> str:
+    """What tells whether a file is the one that it was."""
+    return f"{hashlib.sha256(text.encode()).hexdigest()[:16]} {path}"
+
+
+def untouched() -> set[str]:
+    """Files as they were before the list."""
+    return set(UNTOUCHED.read_text("utf-8").splitlines())

@@ -1,0 +1,45 @@
+"""The word list finds what it lists, wherever a line ends, and nothing of what is said instead."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.prose import PHRASES, digest, hits, texts, untouched
+
+OLD = {
+    "The mark stands in the header.": "stands in",
+    "It is in front of the payload.": "in front of",
+    "Bytes behind the\n    # end.": "behind the",
+    "Nobody answers.": "Nobody",
+    "# crc is\n#: no sum": "is #: no sum",
+    "There is no frame.": "is no frame",
+    "There are\n * no frames.": "are * no frames",
+    "What came was damaged.": "What came",
+    "An answer of no bytes": "of no bytes",
+    "What is not there cannot be counted.": "What is not there",
+    "Raises one of the misfits.": "misfits",
+}
+NEW = """The mark is part of the header, before the payload; bytes after the end are dropped. No node
+answers. The CRC is not a sum. No frame was received. The reply was damaged, and is no longer than four bytes.
+A name that refers to nothing cannot be counted. Raises LayoutError. It understands that they stand still."""
+
+
+@pytest.mark.parametrize(("text", "phrase"), OLD.items())
+def test_the_old_dialect_is_found(text: str, phrase: str) -> None:
+    assert [hit.phrase for hit in hits("x.md", f"\n{text}\n")] == [phrase]
+    assert hits("x.md", f"\n\n{text}")[0].line == 3
+
+
+def test_every_phrase_has_an_example() -> None:
+    assert {hit.advice for text in OLD for hit in hits("x.md", text)} == {*PHRASES.values()}
+
+
+def test_plain_words_are_not() -> None:
+    assert hits("x.md", NEW) == []
+
+
+def test_files_from_before_are_known_by_what_is_in_them() -> None:
+    listed = {line.split(maxsplit=1)[1] for line in untouched()}
+    changed = [path for path, text in texts() if path in listed and digest(path, text) not in untouched()]
+    assert not changed, "reword them, then python -m tests.prose --forget"
+    assert digest("x.md", "a") != digest("x.md", "b")
