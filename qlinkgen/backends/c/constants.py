@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 from qlinkgen.backends import c_text
 from qlinkgen.backends.c.names import Names, bracketed, integer_type, literal, unsigned
@@ -33,7 +33,28 @@ def limits(protocol: Protocol, kept: tuple[Message, ...]) -> list[tuple[str, str
     return [*values, ("BITS_PER_BYTE", f"{bus.bits_per_byte}U")]
 
 
-def enum_views(protocol: Protocol, names: Names) -> list[dict[str, Any]]:
+@dataclass(frozen=True, slots=True)
+class ConstantView:
+    """A named value."""
+
+    name: str
+    constant: str
+    value: str
+    doc: str
+
+
+@dataclass(frozen=True, slots=True)
+class EnumView:
+    """An enum or flags."""
+
+    name: str
+    is_enum: bool
+    type: str
+    title: str
+    members: list[ConstantView]
+
+
+def enum_views(protocol: Protocol, names: Names) -> list[EnumView]:
     """Enums and flags for the template."""
     return [_view(each, names) for each in _all(protocol)]
 
@@ -42,26 +63,26 @@ def _all(protocol: Protocol) -> list[Enum | Flags]:
     return [*protocol.enums, *protocol.flags]
 
 
-def _view(each: Enum | Flags, names: Names) -> dict[str, Any]:
+def _view(each: Enum | Flags, names: Names) -> EnumView:
     is_enum, signed = isinstance(each, Enum), _is_signed(each)
     kind = "Enum" if is_enum else "Flags"
     section = f" (section {each.section})" if each.section else ""
     doc = f": {each.doc}" if each.doc else ""
-    return {
-        "name": names.constants(each),
-        "is_enum": is_enum,
-        "type": constant_type(each),
-        "title": c_text.comment_line(f"{kind} {each.name}{section}{doc}"),
-        "members": [
-            {
-                "name": member.name,
-                "constant": f"{names.upper}_{names.constants(each).upper()}_{member.name.upper()}",
-                "value": _number(member, each, signed=signed),
-                "doc": c_text.comment_line(member.doc),
-            }
+    return EnumView(
+        name=names.constants(each),
+        is_enum=is_enum,
+        type=constant_type(each),
+        title=c_text.comment_line(f"{kind} {each.name}{section}{doc}"),
+        members=[
+            ConstantView(
+                name=member.name,
+                constant=f"{names.upper}_{names.constants(each).upper()}_{member.name.upper()}",
+                value=_number(member, each, signed=signed),
+                doc=c_text.comment_line(member.doc),
+            )
             for member in each.members
         ],
-    }
+    )
 
 
 def constant_type(each: Enum | Flags) -> str:

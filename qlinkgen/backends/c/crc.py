@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import assert_never
 
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Algorithm, Sum, catalogue
-from qlinkgen.model.frame import Checksum
 
 
 def algorithm_macro(algorithm: Algorithm) -> str:
@@ -15,84 +15,113 @@ def algorithm_macro(algorithm: Algorithm) -> str:
     return "".join(c if c.isalnum() else "_" for c in algorithm.name).upper()
 
 
-def render(checksum: Checksum | None) -> dict[str, Any] | None:
-    """The check value for the template."""
-    if checksum is None:
-        return None
-    if isinstance(checksum.algorithm, Sum):
-        return _render_sum(checksum.algorithm, checksum)
-    return _render_crc(checksum.algorithm, checksum)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SumView:
+    """A sum of bytes."""
+
+    name: str
+    width: int
+    type: str
+    finished: str
 
 
-def _render_sum(algorithm: Sum, checksum: Checksum) -> dict[str, Any]:
-    return {
-        "is_crc": False,
-        "name": algorithm.name,
-        "width": algorithm.width,
-        "type": unsigned_type(algorithm.width),
-        "start": "0U",
-        "finished": f"({unsigned_type(algorithm.width)})~sum" if algorithm.complement else "sum",
-        "choices": [],
-        "selectable": False,
-        "mask": _sent_mask(checksum),
-    }
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """An algorithm that a user of the header may choose."""
+
+    macro: str
+    tuple: str
+    check: str
 
 
-def _render_crc(algorithm: Algorithm, checksum: Checksum) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CrcView:
+    """A CRC, and how a byte enters its register."""
+
+    name: str
+    macro: str
+    width: int
+    type: str
+    selectable: bool
+    choices: list[Choice]
+    poly: str
+    feedback: str
+    start: str
+    xorout: str
+    reflected: int
+    shifted_down: str
+    shifted_up: str
+    top_byte: str
+    placed_byte: str
+    mask_open: str
+    mask_close: str
+    flash_read: str
+    top: str
+    nibble_shift: int
+    nibble_rows: list[str]
+    rows: list[str]
+
+
+CheckView = SumView | CrcView
+
+
+def render(algorithm: Algorithm | Sum) -> CheckView:
+    """The check value for the template.
+
+    Raises:
+        GenerationError: C has no form for the CRC.
+    """
+    match algorithm:
+        case Sum():
+            return _render_sum(algorithm)
+        case Algorithm():
+            return _render_crc(algorithm)
+        case _:
+            assert_never(algorithm)
+
+
+def _render_sum(algorithm: Sum) -> SumView:
+    kind = unsigned_type(algorithm.width)
+    finished = f"({kind})~sum" if algorithm.complement else "sum"
+    return SumView(name=algorithm.name, width=algorithm.width, type=kind, finished=finished)
+
+
+def _render_crc(algorithm: Algorithm) -> CrcView:
     if algorithm.refin != algorithm.refout or algorithm.width not in (8, 16, 24, 32, 64):
         raise GenerationError(f"{algorithm.name}: C has no form for this CRC; use one of whole bytes")
-    width = algorithm.width
-    return {
-        "is_crc": True,
-        "name": algorithm.name,
-        "macro": algorithm_macro(algorithm),
-        "width": width,
-        "type": unsigned_type(width),
-        "selectable": width == 16,
-        "choices": [_choice(each) for each in catalogue(16)] if width == 16 else [],
-        "poly": unsigned(algorithm.poly, width, hexadecimal=True),
-        "feedback": unsigned(algorithm.feedback, width, hexadecimal=True),
-        "start": unsigned(algorithm.start, width, hexadecimal=True),
-        "xorout": unsigned(algorithm.xorout, width, hexadecimal=True),
-        "reflected": int(algorithm.refin),
-        **_byte_steps(width),
-        "top": unsigned(1 << (width - 1), width, hexadecimal=True),
-        "nibble_shift": width - 4,
-        "nibble_rows": _rows(algorithm, 4),
-        "rows": _rows(algorithm, 8),
-        "mask": _sent_mask(checksum),
-    }
+    width, kind = algorithm.width, unsigned_type(algorithm.width)
+    # 24 bits lie in a wider type, and 8 bits shift out completely.
+    return CrcView(
+        name=algorithm.name,
+        macro=algorithm_macro(algorithm),
+        width=width,
+        type=kind,
+        selectable=width == 16,
+        choices=[_choice(each) for each in catalogue(16)] if width == 16 else [],
+        poly=unsigned(algorithm.poly, width, hexadecimal=True),
+        feedback=unsigned(algorithm.feedback, width, hexadecimal=True),
+        start=unsigned(algorithm.start, width, hexadecimal=True),
+        xorout=unsigned(algorithm.xorout, width, hexadecimal=True),
+        reflected=int(algorithm.refin),
+        shifted_down="" if width == 8 else "(crc >> 8) ^ ",
+        shifted_up="" if width == 8 else "(crc << 8) ^ ",
+        top_byte="crc" if width == 8 else f"(crc >> {width - 8})",
+        placed_byte="byte" if width == 8 else f"({kind})(({kind})byte << {width - 8})",
+        mask_open="(" if width == 24 else "",
+        mask_close=") & 0x00FFFFFFUL" if width == 24 else "",
+        flash_read={8: "pgm_read_byte", 16: "pgm_read_word"}.get(width, "pgm_read_dword"),
+        top=unsigned(1 << (width - 1), width, hexadecimal=True),
+        nibble_shift=width - 4,
+        nibble_rows=_rows(algorithm, 4),
+        rows=_rows(algorithm, 8),
+    )
 
 
-def _byte_steps(width: int) -> dict[str, str]:
-    """How a byte enters the register; 24 bits lie in a wider type, and 8 bits shift out completely."""
-    kind = unsigned_type(width)
-    return {
-        "shifted_down": "" if width == 8 else "(crc >> 8) ^ ",
-        "shifted_up": "" if width == 8 else "(crc << 8) ^ ",
-        "top_byte": "crc" if width == 8 else f"(crc >> {width - 8})",
-        "placed_byte": "byte" if width == 8 else f"({kind})(({kind})byte << {width - 8})",
-        "mask_open": "(" if width == 24 else "",
-        "mask_close": ") & 0x00FFFFFFUL" if width == 24 else "",
-        "flash_read": {8: "pgm_read_byte", 16: "pgm_read_word"}.get(width, "pgm_read_dword"),
-    }
-
-
-def _sent_mask(checksum: Checksum) -> str | None:
-    """A mask where not every bit is sent."""
-    width = checksum.algorithm.width
-    return None if checksum.mask == (1 << width) - 1 else unsigned(checksum.mask, width, hexadecimal=True)
-
-
-def _choice(algorithm: Algorithm) -> dict[str, str]:
+def _choice(algorithm: Algorithm) -> Choice:
     width = algorithm.width
     numbers = [unsigned(value, width, hexadecimal=True) for value in (algorithm.poly, algorithm.init)]
     numbers += [str(int(algorithm.refin)), unsigned(algorithm.xorout, width, hexadecimal=True)]
-    return {
-        "macro": algorithm_macro(algorithm),
-        "tuple": ", ".join(numbers),
-        "check": f"0x{algorithm.check:0{width // 4}X}",
-    }
+    return Choice(algorithm_macro(algorithm), ", ".join(numbers), f"0x{algorithm.check:0{width // 4}X}")
 
 
 def _rows(algorithm: Algorithm, bits: int) -> list[str]:

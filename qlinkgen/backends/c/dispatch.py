@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
-from qlinkgen.backends.c.framing import Address, checks
+from qlinkgen.backends.c.framing import Address, Expected, expected
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import handler, snake
@@ -20,61 +20,149 @@ def told_name(names: Names, message: Message) -> str:
     return handler(stem.removesuffix("_response") if message.direction == "response" else stem, names.address)
 
 
-def slave_entries(names: Names, kept: tuple[Message, ...]) -> list[dict[str, Any]]:
-    """What a slave can be asked, in schema order."""
-    entries, present = [], {message.name for message in kept}
+def handler_name(names: Names, message: Message) -> str:
+    """The member for a message that a slave handles."""
+    command = names.command_of(message)
+    return handler(snake(command.name) if command else names.stem(message), names.address)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlaveEntry:
+    """What a slave can be asked.
+
+    Attributes:
+        own: it must not be broadcast.
+        unsupported: the answer of a slave that has no function for it.
+        right: condition that holds where its payload is right.
+        unless_silent: the term of a condition that keeps a broadcast from being answered.
+    """
+
+    name: str
+    constant: str
+    function: str
+    has_struct: bool
+    answered: bool
+    answer_function: str
+    answer_constant: str
+    answer_struct: bool
+    own: bool
+    broadcast_only: bool
+    unsupported: str
+    right: str
+    unless_silent: str
+
+
+@dataclass(frozen=True, slots=True)
+class SlaveGroup:
+    """Requests by whom they may go to; ``otherwise`` is the answer to all others."""
+
+    name: str
+    text: str
+    entries: list[SlaveEntry]
+    otherwise: str
+    writes: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a master or a listener can be told of."""
+
+    name: str
+    expected: Expected
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transaction:
+    """Constants of a transaction."""
+
+    constant: str
+    answered: bool
+    bits: int
+    microseconds: int
+    addressing: str
+    repeat: str
+    counter: str
+    in_flight: int
+
+
+def slave_entries(
+    names: Names, kept: tuple[Message, ...], *, addressed: bool, reject: str
+) -> list[SlaveEntry]:
+    """What a slave can be asked, in schema order; ``reject`` is the function that refuses, "" without one."""
+    present = {message.name for message in kept}
+    entries = []
     for message in kept:
-        if message.direction == "response":
-            continue
-        command = names.command_of(message)
-        answer = command.response if command else None
-        answer = answer if answer and answer.name in present else None
-        entries.append(_entry(names, message, answer, command))
+        if message.direction != "response":
+            command = names.command_of(message)
+            answer = command.response if command and command.response else None
+            answer = answer if answer and answer.name in present else None
+            # A message of no command goes to one node.
+            addressing = command.addressing if command else "node"
+            entries.append(_entry(names, message, answer, addressing if addressed else "", reject))
     return entries
 
 
-def _entry(names: Names, message: Message, answer: Message | None, command: Command | None) -> dict[str, Any]:
-    addressing = command.addressing if command else "none"
-    return {
-        "name": handler(snake(command.name) if command else names.stem(message), names.address),
-        "constant": names.constant(message),
-        "function": names.function(message),
-        "has_struct": bool(message.values),
-        "has_bytes": bool(message.fields),
-        "answered": answer is not None,
-        "answer_function": names.function(answer) if answer else "",
-        "answer_constant": names.constant(answer) if answer else "",
-        "answer_struct": bool(answer and answer.values),
-        # A message of no command goes to one node.
-        "refuses_broadcast": addressing in ("node", "none"),
-        "broadcast_only": addressing == "broadcast",
-        "silent_broadcast": answer is not None and addressing == "either",
-    }
+def _entry(
+    names: Names, message: Message, answer: Message | None, addressing: str, reject: str
+) -> SlaveEntry:
+    function, answer_constant = names.function(message), names.constant(answer) if answer else ""
+    target = "&request, " if message.values else ""
+    decoded = f"{function}_decode({target}frame->payload, frame->size) == {names.upper}_OK"
+    refuses = bool(reject and answer)
+    return SlaveEntry(
+        name=handler_name(names, message),
+        constant=names.constant(message),
+        function=function,
+        has_struct=bool(message.values),
+        answered=answer is not None,
+        answer_function=names.function(answer) if answer else "",
+        answer_constant=answer_constant,
+        answer_struct=bool(answer and answer.values),
+        own=addressing in {"node", "none"},
+        broadcast_only=addressing == "broadcast",
+        unsupported=f"{reject}({answer_constant}_MIN_SIZE, wire, capacity)" if refuses else "0",
+        right=decoded if message.fields else "frame->size == 0U",
+        unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
+    )
 
 
-def master_entries(names: Names, address: Address, kept: Sequence[MessagePlan]) -> list[dict[str, Any]]:
-    """What a master can be told, in schema order."""
-    told = [message for message in kept if message.direction != "request"]
+def slave_groups(entries: list[SlaveEntry], prefix: str) -> list[SlaveGroup]:
+    """The last group passes on what it does not have."""
+    own = [entry for entry in entries if entry.own]
+    writes = any(entry.answered for entry in own or entries)
+    if not own:
+        return [SlaveGroup("any", "All requests.", entries, "0", writes)]
+    others = [entry for entry in entries if not entry.own]
+    call = f"{prefix}_handle_own_(slave, frame, wire, capacity)"
+    rest = "Requests that all nodes may get; the others must not be broadcast."
     return [
-        {**check, "name": told_name(names, message.message)}
-        for message, check in zip(told, checks(names, address, told), strict=True)
+        SlaveGroup("own", "Requests that go to one node.", own, "0", writes),
+        SlaveGroup("any", rest, others, f"slave->broadcast ? 0 : {call}", writes=True),
     ]
 
 
-def transactions(protocol: Protocol, upper: str, commands: tuple[Command, ...]) -> list[dict[str, Any]]:
+def told(names: Names, address: Address, kept: Sequence[MessagePlan]) -> list[Told]:
+    """What a master or a listener can be told of, in schema order."""
+    return [
+        Told(told_name(names, message.message), expected(names, address, message))
+        for message in kept
+        if message.direction != "request"
+    ]
+
+
+def transactions(protocol: Protocol, upper: str, commands: tuple[Command, ...]) -> list[Transaction]:
     """Constants of each transaction."""
     return [
-        {
-            "constant": f"{upper}_{snake(command.name).upper()}",
-            "name": command.name,
-            "answered": command.response is not None,
-            "bits": _bits(command.response_within, protocol.bus),
-            "microseconds": _microseconds(command.response_within),
-            "addressing": command.addressing.upper(),
-            "repeat": _repeat(command.repeat),
-            "counter": command.repeat.counter,
-            "in_flight": command.in_flight,
-        }
+        Transaction(
+            constant=f"{upper}_{snake(command.name).upper()}",
+            answered=command.response is not None,
+            bits=_bits(command.response_within, protocol.bus),
+            microseconds=_microseconds(command.response_within),
+            addressing=command.addressing.upper(),
+            repeat=_repeat(command.repeat),
+            counter=command.repeat.counter,
+            in_flight=command.in_flight,
+        )
         for command in commands
     ]
 

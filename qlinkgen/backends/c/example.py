@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from qlinkgen.backends.c.crc import CheckView, CrcView
 from qlinkgen.backends.c.dispatch import told_name
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.naming import file_stem, handler, member, snake
@@ -19,15 +20,15 @@ if TYPE_CHECKING:
 _BREAK = "\n *     "
 
 
-def option_lines(upper: str, check: dict[str, Any] | None) -> list[str]:
+def option_lines(upper: str, check: CheckView | None) -> list[str]:
     """Macros that a user may define."""
     options = [
         (f"{upper}_ENABLE_FLOAT=1", "conversions between raw and physical values, in double"),
         (f"{upper}_ENABLE_NAMES=1", "names of enum values as text"),
     ]
-    if check and check["is_crc"]:
+    if isinstance(check, CrcView):
         options.append((f"{upper}_CRC_FORM=FORM", f"{upper}_CRC_FORM_LOOP (as it is), _NIBBLE or _TABLE"))
-    if check and check["selectable"]:
+    if isinstance(check, CrcView) and check.selectable:
         options.append((f"{upper}_CRC=NAME", f"another 16-bit algorithm, such as {upper}_CRC_16_XMODEM"))
     width = max(len(name) for name, _ in options)
     return [f"{name:<{width}}  {what}" for name, what in options]
@@ -62,7 +63,7 @@ def _slave(
     parameters = [f"{p}_slave_t *own"]
     parameters += [f"const {names.function(request.message)}_t *request"] if request.payload.settable else []
     parameters += [f"{names.function(response.message)}_t *response"] if response.payload.settable else []
-    echo, address = _echo(request, response), section.view["address"]
+    echo, address = _echo(request, response), section.view.address
     ignored = request.payload.settable and not any("request->" in line for line in echo)
     unused = [f"    (void){each};" for each in ["own", *(["request"] if ignored else [])]]
     return [
@@ -98,9 +99,9 @@ def _slave(
 
 
 def _listener(names: Names, section: FrameSection, message: MessagePlan, role: str) -> list[str]:
-    p, address = names.prefix, section.view["address"]
+    p, address = names.prefix, section.view.address
     entry = told_name(names, message.message)
-    whose = [f"{section.view['address_type']} {address}"] if address else []
+    whose = [f"{section.view.address_type} {address}"] if address else []
     taken = [f"const {names.function(message.message)}_t *message"] if message.payload.settable else []
     parameters = [f"{p}_{role}_t *own", *whose, *taken]
     unused = [
@@ -131,7 +132,7 @@ def _start(prefix: str) -> list[str]:
 
 
 def _direction(names: Names, section: FrameSection, direction: str) -> str:
-    return f", {names.upper}_{direction}" if section.view["needs_direction"] else ""
+    return f", {names.upper}_{direction}" if section.view.needs_direction else ""
 
 
 def _echo(request: MessagePlan, response: MessagePlan) -> list[str]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 from qlinkgen.backends.c.checks import broken, refusal
 from qlinkgen.backends.c.layout import Layouts
@@ -93,15 +92,17 @@ class Learner:
         return size_text(self.payload.least_of(self.known), local)
 
 
-def extents(names: Names, messages: Iterable[MessagePlan], layouts: Layouts) -> list[dict[str, Any]]:
-    """The statements that find the size of each message."""
-    return [
-        {
-            "constant": names.constant(message.message),
-            "lines": _extent(Learner(message.payload, layouts)),
-        }
-        for message in messages
-    ]
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """The statements that find the size of a message."""
+
+    constant: str
+    lines: list[str]
+
+
+def extent(names: Names, message: MessagePlan, layouts: Layouts) -> Extent:
+    """How the size of a message is found."""
+    return Extent(names.constant(message.message), _extent(Learner(message.payload, layouts)))
 
 
 def _extent(learner: Learner) -> list[str]:

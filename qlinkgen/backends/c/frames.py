@@ -2,32 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, assert_never
+from typing import assert_never
 
 from qlinkgen.backends.c import crc, framing
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.marked import marked_view, shapes
+from qlinkgen.backends.c.marked import PLACE, MarkedView, Shapes, marked_view, shape
 from qlinkgen.backends.c.names import Names
-from qlinkgen.backends.c.packet import packet_from_frame, packet_to_frame, packet_view, sizes_by_value
-from qlinkgen.backends.c.views import judgement, parts_view
+from qlinkgen.backends.c.packet import (
+    PacketView,
+    Sized,
+    packet_from_frame,
+    packet_to_frame,
+    packet_view,
+    sizes_by_value,
+    sum_type,
+)
+from qlinkgen.backends.c.views import (
+    FrameView,
+    HuntView,
+    InsertView,
+    PartsView,
+    PlaceView,
+    PlainView,
+    StuffedView,
+    frame_view,
+    judgement,
+    parts_views,
+)
 from qlinkgen.model.message import Direction
-from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan
-from qlinkgen.plan.transparency import FrameStuffing
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 Heard = Sequence[tuple[Direction, Sequence[MessagePlan]]]
 
+#: What the templates of one kind of frame place, beside `FrameView`.
+View = (
+    PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | MarkedView | PacketView | None
+)
 
-@dataclass
+
+@dataclass(frozen=True, slots=True)
+class DispatchView:
+    """What the dispatch template needs of the frame."""
+
+    is_broadcast: str
+    slave_arguments: str
+    listener: str
+    listener_address: str
+    listener_argument: str
+
+
+@dataclass(frozen=True)
 class FrameSection:
-    """What the header places for its frame."""
+    """What the header places for its frame; ``views`` are those of its templates, by name."""
 
     plan: Plan
-    view: dict[str, Any]
-    check: dict[str, Any] | None
+    view: FrameView
+    views: Mapping[str, View]
+    check: crc.CheckView | None
     templates: tuple[str, ...]
     receiver: str
 
@@ -44,8 +78,20 @@ class FrameSection:
     @property
     def needs_ids(self) -> bool:
         """Receiving a frame needs to know the messages, so their ids come before it."""
-        by_message = self.view["bare"] or self.view["needs_extent"]
+        by_message = self.view.bare or self.view.needs_extent
         return by_message or isinstance(self.plan.frame.receiver, Marks | InStep)
+
+    @property
+    def request_sum(self) -> str:
+        """The C type of what a request adds to the check value of its answer, "" where it adds nothing."""
+        check = self.plan.frame.check
+        return sum_type(check) if self.slave_only and check else ""
+
+    @property
+    def reject(self) -> str:
+        """The function that makes the answer to a request that is not known, "" where there is none."""
+        check = self.plan.frame.check
+        return f"{self.plan.protocol.name}_reject_" if check and check.rejected is not None else ""
 
     def heard(self) -> Heard:
         """Messages that are decoded, for each direction that a receiver can wait for."""
@@ -53,105 +99,68 @@ class FrameSection:
         found = [(direction, self.plan.received(direction)) for direction in directions]
         return [(direction, messages) for direction, messages in found if messages]
 
-    def known(self, names: Names) -> dict[str, Any]:
-        """What a receiver knows of the messages."""
-        heard, receiver = self.heard(), self.plan.frame.receiver
-        match receiver:
-            case Hunt():
-                return {}
-            case Rescan():
-                return {"judgement": judgement(self.plan, [direction for direction, _ in heard])}
-            case Marks():
-                return {
-                    "shapes": [
-                        {
-                            "direction": f"{names.upper}_{direction.upper()}",
-                            "messages": shapes(names, messages),
-                        }
-                        for direction, messages in heard
-                    ]
-                }
-            case InStep():
-                requests = [message for d, messages in heard if d == "request" for message in messages]
-                return {"shapes": sizes_by_value(names, requests)}
-            case _:
-                assert_never(receiver)
+    @property
+    def judgement(self) -> str:
+        """The expression for what is wrong with what the frame received carries."""
+        return judgement(self.plan, [direction for direction, _ in self.heard()])
 
-    def to_frame(self, names: Names, address: framing.Address, message: MessagePlan) -> dict[str, Any]:
+    def shapes(self, names: Names) -> list[Shapes]:
+        """What a receiver of marked frames knows of the messages."""
+        return [
+            Shapes(f"{names.upper}_{direction.upper()}", [shape(names, message) for message in messages])
+            for direction, messages in self.heard()
+        ]
+
+    def sizes(self, names: Names) -> list[Sized]:
+        """What a receiver of packets knows of the requests."""
+        requests = [message for d, messages in self.heard() if d == "request" for message in messages]
+        return sizes_by_value(names, requests)
+
+    def to_frame(self, names: Names, address: framing.Address, message: MessagePlan) -> framing.Function:
         """The function that makes a whole frame."""
         if self.slave_only:
-            return packet_to_frame(names, message, self.view)
+            return packet_to_frame(names, message)
         return framing.to_frame(self.plan.frame, names, address, message)
 
-    def from_frame(self, names: Names, message: MessagePlan) -> dict[str, Any] | None:
+    def from_frame(self, names: Names, message: MessagePlan) -> framing.Function | None:
         """The function that takes a whole frame apart, where the frame alone does not tell its message."""
         if not self.slave_only or message.direction != "response":
             return None
-        return packet_from_frame(names, message, self.view)
+        return packet_from_frame(names, message)
 
-    def dispatch_view(self, protocol: Protocol, upper: str) -> dict[str, Any]:
+    @property
+    def dispatch(self) -> DispatchView:
         """What the dispatch template needs of the frame."""
-        name, ring = self.view["address"], protocol.directions == ("message",)
-        return {
-            "is_broadcast": f"frame->{name} == {upper}_BROADCAST"
-            if protocol.bus.broadcast is not None
-            else "false",
-            "slave_arguments": f"slave->{name}, " if name else self.view.get("slave_arguments", ""),
-            "unknown_answer": self.view.get("unknown_answer", "0"),
-            "listener": "listener" if ring else "master",
-            "listener_title": "Listener" if ring else "Master",
-            "listener_address": f", {self.view['address_type']} {name}" if name else "",
-            "listener_argument": f", frame->{name}" if name else "",
-        }
-
-    def slave_entry(self, entry: dict[str, Any], upper: str) -> dict[str, Any]:
-        """Conditions of one command of a slave."""
-        has_address = bool(self.view["address"])
-        target = "&request, " if entry["has_struct"] else ""
-        call = f"{entry['function']}_decode({target}frame->payload, frame->size)"
-        reject = self.view.get("reject") if entry["answered"] else ""
-        size = f"{entry['answer_constant']}_MIN_SIZE"
-        return {
-            "unsupported": f"{reject}({size}, wire, capacity)" if reject else "0",
-            "writes": entry["answered"],
-            "own": has_address and entry["refuses_broadcast"],
-            "broadcast_only": has_address and entry["broadcast_only"],
-            "right": f"{call} == {upper}_OK" if entry["has_bytes"] else "frame->size == 0U",
-            "unless_silent": " && !slave->broadcast" if has_address and entry["silent_broadcast"] else "",
-        }
-
-    def slave_groups(self, entries: list[dict[str, Any]], prefix: str) -> list[dict[str, Any]]:
-        """Commands by whom they may go to; the last group passes on what it does not have."""
-        own = [entry for entry in entries if entry["own"]]
-        others = [entry for entry in entries if not entry["own"]]
-        unknown = self.view.get("unknown_answer", "0")
-        if not own:
-            writes = any(entry["writes"] for entry in entries)
-            group = {"name": "any", "text": "All requests.", "entries": entries, "otherwise": unknown}
-            return [{**group, "writes": writes}]
-        call = f"{prefix}_handle_own_(slave, frame, wire, capacity)"
-        first = {"name": "own", "text": "Requests that go to one node.", "entries": own, "otherwise": unknown}
-        first["writes"] = any(entry["writes"] for entry in own)
-        rest = "Requests that all nodes may get; the others must not be broadcast."
-        second = {"name": "any", "text": rest, "entries": others}
-        return [first, {**second, "writes": True, "otherwise": f"slave->broadcast ? {unknown} : {call}"}]
+        name, protocol = self.view.address, self.plan.protocol
+        broadcast = protocol.bus.broadcast is not None
+        summed = f"{protocol.name}_frame_sum(frame), " if self.request_sum else ""
+        return DispatchView(
+            is_broadcast=f"frame->{name} == {protocol.name.upper()}_BROADCAST" if broadcast else "false",
+            slave_arguments=f"slave->{name}, " if name else summed,
+            listener="listener" if protocol.directions == ("message",) else "master",
+            listener_address=f", {self.view.address_type} {name}" if name else "",
+            listener_argument=f", frame->{name}" if name else "",
+        )
 
 
 def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
     """Choose by the way frames are received."""
     receiver, check = plan.frame.receiver, plan.frame.check
-    value = crc.render(check.value if check else None)
-    whole = isinstance(plan.frame.transparency, FrameStuffing)
-    parts = ("place", "frame_stuffed" if whole else "frame_plain", "seal", "frame_public")
     match receiver:
-        case Hunt():
-            return FrameSection(plan, parts_view(plan, layouts), value, parts, "receiver_streamed")
-        case Rescan():
-            return FrameSection(plan, parts_view(plan, layouts), value, parts, "receiver_rescan")
+        case Hunt() | Rescan():
+            views = parts_views(plan, layouts)
+            frame = "frame_stuffed" if views.stuffed else "frame_plain"
+            templates = ("place", frame, "seal", "frame_public")
+            hears = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
+            value = crc.render(check.algorithm) if check else None
+            return FrameSection(plan, views.f, views.others, value, templates, hears)
         case Marks():
-            templates = ("place", "marked", "seal")
-            return FrameSection(plan, marked_view(plan), value, templates, "receiver_marked")
+            value = crc.render(check.algorithm) if check else None
+            marked: Mapping[str, View] = {"place": PLACE, "marked": marked_view(plan)}
+            view = frame_view(plan, seal_checked=bool(check))
+            return FrameSection(plan, view, marked, value, ("place", "marked", "seal"), "receiver_marked")
         case InStep():
-            return FrameSection(plan, packet_view(plan), None, ("packet",), "receiver_packet")
+            packet = {"packet": packet_view(plan)}
+            return FrameSection(plan, frame_view(plan), packet, None, ("packet",), "receiver_packet")
         case _:
             assert_never(receiver)

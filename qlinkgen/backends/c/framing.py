@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from qlinkgen.backends.c.extents import size_terms
 from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
 from qlinkgen.model.message import Message
-from qlinkgen.model.types import Array, Blob
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import ByMark, FramePlan
+from qlinkgen.plan.payload import payload_plan
 from qlinkgen.plan.tree import MessagePlan
 
 
@@ -40,6 +38,31 @@ class AddressGroup:
     name: str
     text: str
     condition: str
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function that makes or takes a whole frame: its own parameters, and its statements."""
+
+    parameters: str
+    lines: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """What a received frame of a message has to satisfy.
+
+    Attributes:
+        allowed: condition of the address in ``frame``, "" where it may be any.
+        admits: the same for the address in a parameter.
+    """
+
+    constant: str
+    function: str
+    has_struct: bool
+    has_bytes: bool
+    allowed: str
+    admits: str
 
 
 def allowed(addresses: OneOf | None, value: str, bits: int) -> str:
@@ -74,7 +97,7 @@ def address_group(message: MessagePlan, address: Address) -> AddressGroup | None
     return AddressGroup(name, f"the {address.name} {text}", condition)
 
 
-def to_frame(frame: FramePlan, names: Names, address: Address, message: MessagePlan) -> dict[str, Any]:
+def to_frame(frame: FramePlan, names: Names, address: Address, message: MessagePlan) -> Function:
     """The function that makes the whole frame of a message."""
     stated = message.message
     struct = struct_parameter(names, stated, const=True)
@@ -83,7 +106,7 @@ def to_frame(frame: FramePlan, names: Names, address: Address, message: MessageP
     seal = f"{names.prefix}_seal_{group.name}_" if group else f"{names.prefix}_seal_"
     arguments = f"{names.constant(stated)}_ID, {address.argument}wire, capacity, {size}"
     lines.append(f"return {seal}({arguments}{_checked(frame, message)});")
-    return {"parameters": struct + address.parameter, "lines": lines}
+    return Function(struct + address.parameter, lines)
 
 
 def _checked(frame: FramePlan, message: MessagePlan) -> str:
@@ -111,25 +134,19 @@ def _payload_lines(names: Names, message: Message, has_struct: bool) -> tuple[li
 
 def is_wide(message: Message) -> bool:
     """A count that is wrong can make a size which no int holds."""
-    return any(
-        isinstance(each.type, Array | Blob) and each.type.length.maximum > 0xFF for each in message.variable
+    return any(run.length.maximum > 0xFF for run in payload_plan(message).runs)
+
+
+def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
+    """What a received frame of a message has to satisfy."""
+    return Expected(
+        constant=names.constant(message.message),
+        function=names.function(message.message),
+        has_struct=bool(message.message.values),
+        has_bytes=bool(message.message.fields),
+        allowed=allowed(message.allowed, address.name and f"frame->{address.name}", address.bits),
+        admits=allowed(message.allowed, address.name, address.bits),
     )
-
-
-def checks(names: Names, address: Address, messages: Sequence[MessagePlan]) -> list[dict[str, Any]]:
-    """What a received frame of each message has to satisfy."""
-    place = address.name and f"frame->{address.name}"
-    return [
-        {
-            "constant": names.constant(message.message),
-            "function": names.function(message.message),
-            "has_struct": bool(message.message.values),
-            "has_bytes": bool(message.message.fields),
-            "allowed": allowed(message.allowed, place, address.bits),
-            "admits": allowed(message.allowed, address.name, address.bits),
-        }
-        for message in messages
-    ]
 
 
 def address_of(frame: FramePlan, name: str) -> Address:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.backends.c.dispatch import slave_entries, told_name
+from qlinkgen.backends.c.dispatch import handler_name, told_name
 from qlinkgen.backends.c.frames import frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
@@ -83,8 +83,7 @@ class Interface:
 
     def slave_member(self, message: Message) -> str:
         """The member of the slave's struct that handles a request."""
-        (entry,) = slave_entries(self.names, (message,))
-        return str(entry["name"])
+        return handler_name(self.names, message)
 
     def told_member(self, message: Message) -> str:
         """The member of the listener's struct that is told of a message."""
@@ -113,19 +112,17 @@ def interface(protocol: Protocol) -> Interface:
     return Interface(
         names=names,
         types=Types(plan, names),
-        id=view["id"],
-        id_bits=_bits(view["id_type"]),
-        address=view["address"],
-        address_bits=_bits(view["address_type"]),
-        directed=view["needs_direction"],
-        unpacks=bool(view["body_size"]),
+        id=view.id,
+        id_bits=_bits(view.id_type),
+        address=view.address,
+        address_bits=_bits(view.address_type),
+        directed=view.needs_direction,
+        unpacks=bool(view.body_size),
         rescans=section.rescans,
         packets=section.slave_only,
-        listener=""
-        if section.slave_only
-        else section.dispatch_view(protocol, protocol.name.upper())["listener"],
-        sum_bits=_bits(view.get("sum_type", "")),
-        check_bits=_bits(unsigned_type(section.check["width"])) if section.check else 0,
+        listener="" if section.slave_only else section.dispatch.listener,
+        sum_bits=_bits(section.request_sum),
+        check_bits=_bits(unsigned_type(section.check.width)) if section.check else 0,
     )
 
 

@@ -2,43 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 from qlinkgen.backends.c.names import Names, unsigned_type
-from qlinkgen.backends.c.parts import any_of, differs, in_hex, put_check
-from qlinkgen.backends.c.views import common_view
+from qlinkgen.backends.c.parts import any_of, differs, in_hex, put_check, sender_of
+from qlinkgen.backends.c.views import PlaceView
 from qlinkgen.model.integer import Chunk
 from qlinkgen.plan.framing import ByMark, MarkPart
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
-def marked_view(plan: Plan) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkedView:
     """What the templates of marked frames place."""
+
+    marker: str
+    address_mask: str
+    head_byte: str
+    end_byte: str
+    id_of_byte: str
+    address_of_byte: str
+    end_id: str
+    check_size: int
+    put_check: list[str]
+    check_differs: str
+    buffer_size: int
+    count_type: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A message: whether a check value is sent, and whether ``count`` bytes are as many as it has."""
+
+    constant: str
+    checked: str
+    fits: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shapes:
+    """The messages of a direction."""
+
+    direction: str
+    messages: list[Shape]
+
+
+#: A marked frame has one byte before the payload and one behind it.
+PLACE = PlaceView(tailed=False, tail=1, header=1, overhead=2)
+
+
+def marked_view(plan: Plan) -> MarkedView:
+    """Name the bits and bytes of a marked frame."""
     end, check = plan.frame.end, plan.frame.check
     assert isinstance(end, ByMark)
     assert end.end.end_id is not None
-    header, size = end.header, check.size if check else 0
+    header, size, sender = end.header, check.size if check else 0, sender_of(plan.frame)
     most = plan.frame.max_payload + size
-    view = common_view(plan)
-    return view | {
-        "tailed": False,
-        "header": 1,
-        "overhead": 2,
-        "seal_checked": bool(check),
-        "marker": in_hex(header.marker),
-        "address_mask": in_hex(header.address.mask << header.address.shift),
-        "head_byte": _byte(header, view["address"], view["id"]),
-        "end_byte": _byte(header, view["address"], in_hex(end.end.end_id) if end.end.end_id else ""),
-        "id_of_byte": _taken(header.id),
-        "address_of_byte": _taken(header.address),
-        "end_id": in_hex(end.end.end_id),
-        "check_size": size,
-        "put_check": put_check(check, "end", 0, "value") if check else [],
-        "check_differs": differs(check, "end", 0, "value") if check else "",
-        "buffer_size": most,
-        "count_type": unsigned_type(max(8, most.bit_length())),
-    }
+    return MarkedView(
+        marker=in_hex(header.marker),
+        address_mask=in_hex(header.address.mask << header.address.shift),
+        head_byte=_byte(header, sender.address, sender.id),
+        end_byte=_byte(header, sender.address, in_hex(end.end.end_id) if end.end.end_id else ""),
+        id_of_byte=_taken(header.id),
+        address_of_byte=_taken(header.address),
+        end_id=in_hex(end.end.end_id),
+        check_size=size,
+        put_check=put_check(check, "end", 0, "value") if check else [],
+        check_differs=differs(check, "end", 0, "value") if check else "",
+        buffer_size=most,
+        count_type=unsigned_type(max(8, most.bit_length())),
+    )
 
 
 def _byte(header: MarkPart, address: str, number: str) -> str:
@@ -55,16 +88,10 @@ def _taken(bits: Chunk) -> str:
     return f"(uint8_t)({shifted} & {in_hex(bits.mask)})"
 
 
-def shapes(names: Names, messages: Sequence[MessagePlan]) -> list[dict[str, Any]]:
-    """For each message: whether a check value is sent, and whether ``count`` bytes are as many as it has."""
-    return [
-        {
-            "constant": names.constant(message.message),
-            "checked": "true" if message.checked else "false",
-            "fits": _fits(message),
-        }
-        for message in messages
-    ]
+def shape(names: Names, message: MessagePlan) -> Shape:
+    """What a receiver knows of a message."""
+    checked = "true" if message.checked else "false"
+    return Shape(names.constant(message.message), checked, _fits(message))
 
 
 def _fits(message: MessagePlan) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, assert_never
+from typing import assert_never
 
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.describe import field_rows, member_note, message_head
@@ -11,7 +11,7 @@ from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.framing import struct_parameter
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_literal, unsigned
-from qlinkgen.backends.c.types import Types
+from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.model import naming
 from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
 from qlinkgen.plan.tree import MessagePlan
@@ -27,6 +27,34 @@ class StructMember:
     note: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MessageView:
+    """A message, `m` in templates; a function that is left out has no statements."""
+
+    function: str
+    constant: str
+    head: list[str]
+    rows: list[str]
+    id_text: str
+    min_size: int
+    max_size: int
+    max_frame_size: int
+    max_wire_size: int
+    has_struct: bool
+    has_bytes: bool
+    same_struct: str
+    members: list[StructMember]
+    notes: list[str]
+    initialiser: str
+    encode: list[str] | None
+    decode: list[str] | None
+    scales: list[Kind]
+    encode_parameters: str
+    decode_parameters: str
+    size_text: str
+    comment_ends_at_head: bool
+
+
 class MessageWriter:
     """Lowers messages to what the template places.
 
@@ -40,42 +68,37 @@ class MessageWriter:
         self._types = types
         self._first: dict[object, str] = {}
 
-    def render(self, plan: MessagePlan) -> dict[str, Any]:
+    def render(self, plan: MessagePlan) -> MessageView:
         """The message for the template; only the directions that are kept have statements."""
         message, payload = plan.message, plan.payload
         head = message_head(self._names.command_of(message), message)
         notes = {value.name: member_note(value) for value in message.values}
         members = [member for each in payload.settable for member in self._members(each, notes[each.name])]
         shape = payload, tuple(member.declaration for member in members)
-        return {
-            "name": message.name,
-            "stem": self._names.stem(message),
-            "function": self._names.function(message),
-            "constant": self._names.constant(message),
-            "head": head,
-            "rows": field_rows(message),
-            "id_text": f"0x{message.id:02X}",
-            "min_size": payload.least,
-            "max_size": payload.most,
-            "max_frame_size": plan.frame_size,
-            "max_wire_size": plan.wire_size,
-            "has_struct": bool(payload.settable),
-            "has_bytes": bool(payload.steps),
-            "same_struct": self._same("struct", shape, plan) if members else "",
-            "members": members,
-            "notes": [f"{name}: {note}" for name, note in notes.items() if note],
-            "initialiser": ", ".join(map(_initialiser, payload.settable)),
-            "encode": self._encode(plan, self._same("encode", shape, plan)) if plan.encoded else None,
-            "decode": self._decode(plan, self._same("decode", shape, plan)) if plan.decoded else None,
-            "scales": [scale for each in payload.settable if (scale := self._scale(plan, each))],
-            "early_id": False,
-            "encode_parameters": struct_parameter(self._names, message, const=True),
-            "decode_parameters": struct_parameter(self._names, message, const=False),
-            "size_text": _size_text(payload.least, payload.most),
-            "comment_ends_at_head": not payload.steps and len(head) == 1,
-            "to_frame": None,
-            "from_frame": None,
-        }
+        return MessageView(
+            function=self._names.function(message),
+            constant=self._names.constant(message),
+            head=head,
+            rows=field_rows(message),
+            id_text=f"0x{message.id:02X}",
+            min_size=payload.least,
+            max_size=payload.most,
+            max_frame_size=plan.frame_size,
+            max_wire_size=plan.wire_size,
+            has_struct=bool(payload.settable),
+            has_bytes=bool(payload.steps),
+            same_struct=self._same("struct", shape, plan) if members else "",
+            members=members,
+            notes=[f"{name}: {note}" for name, note in notes.items() if note],
+            initialiser=", ".join(map(_initialiser, payload.settable)),
+            encode=self._encode(plan, self._same("encode", shape, plan)) if plan.encoded else None,
+            decode=self._decode(plan, self._same("decode", shape, plan)) if plan.decoded else None,
+            scales=[scale for each in payload.settable if (scale := self._scale(plan, each))],
+            encode_parameters=struct_parameter(self._names, message, const=True),
+            decode_parameters=struct_parameter(self._names, message, const=False),
+            size_text=_size_text(payload.least, payload.most),
+            comment_ends_at_head=not payload.steps and len(head) == 1,
+        )
 
     def _same(self, what: str, shape: object, plan: MessagePlan) -> str:
         """The first message that has the same, "" where this one is the first."""
@@ -117,7 +140,7 @@ class MessageWriter:
                     assert_never(each)
         return lines
 
-    def _scale(self, plan: MessagePlan, each: Settable) -> object:
+    def _scale(self, plan: MessagePlan, each: Settable) -> Kind | None:
         """Conversions that no named type has."""
         if isinstance(each, BytesStep | ItemsStep):
             return None
@@ -163,7 +186,17 @@ def _size_text(least: int, most: int) -> str:
     return f"{most} byte{'s' if most > 1 else ''}" if least == most else f"{least}..{most} bytes"
 
 
-def nearest_helpers(types: Types, messages: tuple[MessagePlan, ...]) -> list[dict[str, str]]:
+@dataclass(frozen=True, slots=True)
+class Rounding:
+    """A C type that physical values are rounded to, and two of its constants."""
+
+    name: str
+    type: str
+    zero: str
+    one: str
+
+
+def nearest_helpers(types: Types, messages: tuple[MessagePlan, ...]) -> list[Rounding]:
     """The C types that physical values are rounded to."""
     kinds = (
         types.conversions(message.message, each.name, each.number)
@@ -172,11 +205,6 @@ def nearest_helpers(types: Types, messages: tuple[MessagePlan, ...]) -> list[dic
         if isinstance(each, ValueStep | Member)
     )
     return [
-        {
-            "name": plain.removesuffix("_t"),
-            "type": plain,
-            "zero": "0U" if plain.startswith("u") else "0",
-            "one": "1U" if plain.startswith("u") else "1",
-        }
+        Rounding(plain.removesuffix("_t"), plain, *(("0U", "1U") if plain.startswith("u") else ("0", "1")))
         for plain in dict.fromkeys(kind.plain for kind in kinds if kind)
     ]

@@ -3,52 +3,82 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
-from qlinkgen.backends.c.framing import struct_parameter
+from qlinkgen.backends.c.framing import Function, struct_parameter
 from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
 from qlinkgen.backends.c.parts import differs, put_check, refusal
-from qlinkgen.backends.c.views import common_view
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Sum
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
-def packet_view(plan: Plan) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PacketCheckView:
+    """The check value of an answer."""
+
+    sum_type: str
+    word_type: str
+    word_size: int
+    finished: str
+    size: int
+    put: list[str]
+    differs: str
+    has_rejected: bool
+    rejected: str
+    refused: str
+
+
+@dataclass(frozen=True, slots=True)
+class PacketView:
     """What the templates of packets place."""
-    prefix, check, most = plan.protocol.name, plan.frame.check, plan.frame.max_payload
-    view = common_view(plan) | {
-        "buffer_size": max(1, most),
-        "reject": f"{prefix}_reject_" if check and check.rejected is not None else "",
-        "has_check": check is not None,
-        "slave_arguments": f"{prefix}_frame_sum(frame), " if check else "",
-        "check_name": "request_check",
-        "count_type": unsigned_type(max(8, most.bit_length())),
-    }
-    return view | (_check(check) if check else {})
+
+    buffer_size: int
+    count_type: str
+    check: PacketCheckView | None
 
 
-def _check(check: Check) -> dict[str, Any]:
-    algorithm = check.algorithm
+@dataclass(frozen=True, slots=True)
+class Sized:
+    """Requests whose payload has the same size."""
+
+    size: int
+    constants: list[str]
+
+
+def packet_view(plan: Plan) -> PacketView:
+    """Describe packets to their templates."""
+    check, most = plan.frame.check, plan.frame.max_payload
+    return PacketView(
+        max(1, most), unsigned_type(max(8, most.bit_length())), _check(check) if check else None
+    )
+
+
+def sum_type(check: Check) -> str:
+    """The C type of a sum over request and answer."""
+    return unsigned_type(check.algorithm.width)
+
+
+def _check(check: Check) -> PacketCheckView:
+    algorithm, kind = check.algorithm, sum_type(check)
     if not isinstance(algorithm, Sum):
         raise GenerationError(f"{algorithm.name}: the check value of a packet is a sum")
-    kind = unsigned_type(algorithm.width)
-    return {
-        "sum_type": kind,
-        "word_type": unsigned_type(max(algorithm.width, 8 * check.word)),
-        "word_size": check.word,
-        "finished": f"({kind})~sum" if algorithm.complement else "sum",
-        "check_size": check.size,
-        "put_check": put_check(check, "end", 0, "value"),
-        "check_differs": differs(check, "end", 0, "value"),
-        "has_rejected": check.rejected is not None,
-        "rejected": unsigned(check.rejected or 0, algorithm.width),
-        "refused": differs(check, "end", 0, "refused"),
-    }
+    return PacketCheckView(
+        sum_type=kind,
+        word_type=unsigned_type(max(algorithm.width, 8 * check.word)),
+        word_size=check.word,
+        finished=f"({kind})~sum" if algorithm.complement else "sum",
+        size=check.size,
+        put=put_check(check, "end", 0, "value"),
+        differs=differs(check, "end", 0, "value"),
+        has_rejected=check.rejected is not None,
+        rejected=unsigned(check.rejected or 0, algorithm.width),
+        refused=differs(check, "end", 0, "refused"),
+    )
 
 
-def packet_to_frame(names: Names, message: MessagePlan, view: dict[str, Any]) -> dict[str, Any]:
+def packet_to_frame(names: Names, message: MessagePlan) -> Function:
     """The function that makes a packet."""
     stated, upper, check = message.message, names.upper, message.envelope.check
     struct = struct_parameter(names, stated, const=True)
@@ -62,17 +92,17 @@ def packet_to_frame(names: Names, message: MessagePlan, view: dict[str, Any]) ->
         if stated.fields:
             lines.append(f"size = {encode}({call}&wire[1], capacity - 1U);")
         lines.append("return (size < 0) ? size : (size + 1);" if stated.fields else "return 1;")
-        return {"parameters": struct, "lines": lines}
+        return Function(struct, lines)
     size = "(size_t)size" if stated.fields else "0U"
     whole = f"{names.prefix}_close_(request_sum, {size}, wire, capacity)" if check else "size"
     if stated.fields:
         lines = [f"const int size = {encode}({call}wire, capacity);", f"return (size < 0) ? size : {whole};"]
     else:
         lines = [f"return {whole};"] if check else ["(void)wire;", "(void)capacity;", "return 0;"]
-    return {"parameters": struct + (f"{view['sum_type']} request_sum, " if check else ""), "lines": lines}
+    return Function(struct + (f"{sum_type(check.check)} request_sum, " if check else ""), lines)
 
 
-def packet_from_frame(names: Names, message: MessagePlan, view: dict[str, Any]) -> dict[str, Any]:
+def packet_from_frame(names: Names, message: MessagePlan) -> Function:
     """The function that takes an answer apart; schemas allow answers of fixed size alone."""
     stated, check = message.message, message.envelope.check
     struct = struct_parameter(names, stated, const=False)
@@ -83,12 +113,12 @@ def packet_from_frame(names: Names, message: MessagePlan, view: dict[str, Any]) 
         size = f"size - {check.size}U" if check else "size"
         lines = [f"const int status = {opened};", *refusal(f"status != {names.upper}_OK", "status")]
         lines.append(f"return {names.function(stated)}_decode({'message, ' if struct else ''}wire, {size});")
-    return {"parameters": struct + (f"{view['sum_type']} request_sum, " if check else ""), "lines": lines}
+    return Function(struct + (f"{sum_type(check.check)} request_sum, " if check else ""), lines)
 
 
-def sizes_by_value(names: Names, messages: Sequence[MessagePlan]) -> list[dict[str, Any]]:
+def sizes_by_value(names: Names, messages: Sequence[MessagePlan]) -> list[Sized]:
     """Requests grouped by the size of their payload."""
     groups: dict[int, list[str]] = {}
     for message in messages:
         groups.setdefault(message.payload.most, []).append(names.constant(message.message))
-    return [{"size": size, "constants": constants} for size, constants in sorted(groups.items())]
+    return [Sized(size, constants) for size, constants in sorted(groups.items())]

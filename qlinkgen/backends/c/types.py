@@ -17,6 +17,18 @@ from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, ValueStep
 from qlinkgen.plan.tree import Plan
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """The numbers of a conversion, and what the function is called that rounds."""
+
+    factor: str
+    bias: str
+    divisor: str
+    helper: str
+    minimum: str
+    maximum: str
+
+
 @dataclass(frozen=True, slots=True)
 class Kind:
     """A named type, or a scaled value of a type without a name.
@@ -49,19 +61,19 @@ class Kind:
         return self.stem.upper()
 
     @property
-    def scale(self) -> Mapping[str, str] | None:
+    def scale(self) -> Scale | None:
         """Its conversions, None where raw values are the physical ones."""
         number = self.number
         if number.scaling is None:
             return None
-        return {
-            "factor": _whole(number.scaling.factor),
-            "bias": _whole(number.scaling.bias),
-            "divisor": _whole(number.scaling.divisor),
-            "helper": self.plain.removesuffix("_t"),
-            "minimum": scalar_literal(number, number.minimum),
-            "maximum": scalar_literal(number, number.maximum),
-        }
+        return Scale(
+            factor=_whole(number.scaling.factor),
+            bias=_whole(number.scaling.bias),
+            divisor=_whole(number.scaling.divisor),
+            helper=self.plain.removesuffix("_t"),
+            minimum=scalar_literal(number, number.minimum),
+            maximum=scalar_literal(number, number.maximum),
+        )
 
 
 class Types:

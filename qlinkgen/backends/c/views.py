@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, assert_never
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import assert_never
 
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
@@ -13,29 +14,61 @@ from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing
 from qlinkgen.plan.tree import Plan
 
 
-def common_view(plan: Plan) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameView:
+    """What every frame has, `f` in templates.
+
+    Attributes:
+        bare: message id and address alone tell a frame from noise.
+        needs_extent: the end of a frame follows from its message.
+        body_size: bytes of the buffer that taking a frame apart needs.
+        seal_checked: a message says whether a check value follows.
+        max_wire: bytes of a receiver that holds whole frames, 0 for another one.
+    """
+
+    id: str
+    id_type: str
+    address: str
+    address_type: str
+    parameters: str
+    arguments: str
+    needs_direction: bool
+    scan_direction: str
+    init_direction: str
+    pass_direction: str
+    pass_decode_direction: str
+    check_name: str
+    bare: bool
+    needs_extent: bool
+    body_size: int
+    seal_checked: bool
+    max_wire: int
+
+
+def frame_view(plan: Plan, *, body_size: int = 0, seal_checked: bool = False, max_wire: int = 0) -> FrameView:
     """What every frame has."""
-    prefix, sender = plan.protocol.name, sender_of(plan.frame)
+    prefix, sender, receiver = plan.protocol.name, sender_of(plan.frame), plan.frame.receiver
     ring, directed = plan.protocol.directions == ("message",), _directed(plan)
-    return {
-        "id": sender.id,
-        "id_type": sender.id_type,
-        "address": sender.address,
-        "address_type": sender.address_type,
-        "parameters": sender.parameters,
-        "arguments": sender.arguments,
-        "needs_direction": directed,
-        "scan_direction": f"{prefix}_direction_t direction, " if directed else "",
-        "init_direction": f", {prefix}_direction_t direction" if directed else "",
-        "pass_direction": "receiver->direction, " if directed else "",
-        "pass_decode_direction": "direction, " if directed else "",
-        "check_name": "message_check" if ring else "request_check or _response_check",
-        "bare": False,
-        "needs_extent": False,
-        "body_size": 0,
-        "seal_checked": False,
-        "max_wire": 0,
-    }
+    answered = "request_check" if isinstance(receiver, InStep) else "request_check or _response_check"
+    return FrameView(
+        id=sender.id,
+        id_type=sender.id_type,
+        address=sender.address,
+        address_type=sender.address_type,
+        parameters=sender.parameters,
+        arguments=sender.arguments,
+        needs_direction=directed,
+        scan_direction=f"{prefix}_direction_t direction, " if directed else "",
+        init_direction=f", {prefix}_direction_t direction" if directed else "",
+        pass_direction="receiver->direction, " if directed else "",
+        pass_decode_direction="direction, " if directed else "",
+        check_name="message_check" if ring else answered,
+        bare=isinstance(receiver, Rescan) and receiver.bare,
+        needs_extent=isinstance(receiver, Hunt | Rescan) and isinstance(plan.frame.end, ByMessage),
+        body_size=body_size,
+        seal_checked=seal_checked,
+        max_wire=max_wire,
+    )
 
 
 def _directed(plan: Plan) -> bool:
@@ -54,66 +87,197 @@ def _directed(plan: Plan) -> bool:
     return needed and plan.protocol.directions != ("message",)
 
 
-def parts_view(plan: Plan, layouts: Layouts) -> dict[str, Any]:
-    """The view of a frame of parts, whatever stuffs it."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlaceView:
+    """A payload is written ``header`` bytes from the front, or ``tail`` bytes from the end of a buffer."""
+
+    tailed: bool
+    tail: int
+    header: int
+    overhead: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartsView:
+    """What every frame of parts has.
+
+    Attributes:
+        late_insert: an inserted byte may follow the last one.
+        judged: without a check value the contents alone prove a frame.
+    """
+
+    late_insert: bool
+    judged: bool
+    head: int
+    tail: int
+    header: int
+    overhead: int
+    max_frame: int
+    index_type: str
+    id_value: str
+    address_value: str
+    wrong_tail: str
+    check_differs: str
+
+    @property
+    def reads_tail(self) -> bool:
+        """Bytes behind the payload are compared."""
+        return bool(self.wrong_tail or self.check_differs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlainView:
+    """Seal and scan where the header is on the wire as it is; all lists are statements."""
+
+    put_header: list[str]
+    put_trailer: list[str]
+    put_check: list[str]
+    update_sent: list[str]
+    update_received: list[str]
+    head_checks: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StuffedView:
+    """Seal and scan where the finished frame is stuffed; ``lead_checks`` are conditions and bytes needed."""
+
+    lead: int
+    lead_bytes: list[str]
+    head_and_tail: int
+    covers_body: bool
+    check_from_end: int
+    put_header: list[str]
+    put_trailer: list[str]
+    put_check: list[str]
+    update_before: list[str]
+    update_lead: list[str]
+    update_received: list[str]
+    lead_checks: list[tuple[str, int]]
+    head_checks: list[str]
+    stuffed_when_sent: str
+    stuffed_when_received: str
+    due_when_sent: str
+    due_when_received: str
+    hunts: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InsertView:
+    """The rule by which bytes are inserted; each condition holds where one is due."""
+
+    insert: str
+    mark: str
+    pattern: bool
+    due_in_payload: str
+    due_at_end: str
+    due_in_sent: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HuntView:
+    """The receiver that looks at each byte once; the length is the body's first byte."""
+
+    mark: str
+    insert: str
+    position_type: str
+    length_bounds: str
+    length_value: str
+    whole: str
+    before_check: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartsViews:
+    """All views of a frame of parts, by their names in templates; None where one has nothing to describe."""
+
+    f: FrameView
+    place: PlaceView
+    parts: PartsView
+    plain: PlainView | None
+    stuffed: StuffedView | None
+    inserted: InsertView | None
+    hunt: HuntView | None
+
+    @property
+    def others(
+        self,
+    ) -> Mapping[str, PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | None]:
+        """All but `f`."""
+        return {
+            "place": self.place,
+            "parts": self.parts,
+            "plain": self.plain,
+            "stuffed": self.stuffed,
+            "inserted": self.inserted,
+            "hunt": self.hunt,
+        }
+
+
+def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
+    """The views of a frame of parts, whatever stuffs it."""
     writer = PartWriter(plan.protocol.name, plan.frame, sender_of(plan.frame), layouts)
     envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
-    bare = isinstance(receiver, Rescan) and receiver.bare
-    view = common_view(plan) | {
-        "bare": bare,
-        "late_insert": False,
-        "judged": isinstance(receiver, Rescan) and not receiver.verified,
-        "has_length": envelope.length is not None,
-        "needs_extent": isinstance(plan.frame.end, ByMessage),
-        "lead": len(writer.lead),
-        "lead_bytes": [in_hex(byte) for byte in writer.lead],
-        "head": writer.head,
-        "tail": envelope.trailer_size,
-        "head_and_tail": writer.head + envelope.trailer_size,
-        "header": envelope.header_size,
-        "overhead": envelope.overhead,
-        "tailed": not isinstance(transparency, Plain),
-        "max_frame": envelope.max_frame,
-        "max_wire": plan.frame.max_wire,
-        "index_type": unsigned_type(max(16, plan.frame.max_wire.bit_length())),
-        "id_value": writer.get(envelope.id),
-        "address_value": writer.get(envelope.address),
-        "wrong_tail": writer.wrong_tail("end"),
-        "check_differs": writer.check_differs("end", "value"),
-    }
-    view["reads_tail"] = bool(view["wrong_tail"] or view["check_differs"])
-    directed = view["pass_decode_direction"]
+    rule, body_size = None, 0
     match transparency:
         case Plain():
-            return view | _unstuffed(writer, directed) | {"stuffed_payload": False}
+            pass
         case PayloadStuffing():
-            more = {"body_size": envelope.payload.most_sent, "stuffed_payload": True}
-            return view | _unstuffed(writer, directed) | _inserted(transparency.rule) | more
+            rule, body_size = transparency.rule, envelope.payload.most_sent
         case FrameStuffing():
-            view |= _stuffed(writer, transparency, directed) | _inserted(transparency.rule)
+            rule, body_size = transparency.rule, writer.head + envelope.trailer_size + envelope.payload.most
         case SevenBit():
             raise AssertionError("a marked frame has no parts that a length or its message ends")
         case _:
             assert_never(transparency)
-    return view | _hunted(writer, receiver) if isinstance(receiver, Hunt) else view
+    stuffing, frame = writer.stuffing, frame_view(plan, body_size=body_size, max_wire=plan.frame.max_wire)
+    directed = frame.pass_decode_direction
+    return PartsViews(
+        f=frame,
+        place=PlaceView(
+            tailed=rule is not None,
+            tail=envelope.trailer_size,
+            header=envelope.header_size,
+            overhead=envelope.overhead,
+        ),
+        parts=_parts(writer, plan.frame.max_wire),
+        plain=None if stuffing else _plain(writer, directed),
+        stuffed=_stuffed(writer, stuffing, directed) if stuffing else None,
+        inserted=_inserted(rule) if rule else None,
+        hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
+    )
 
 
-def _unstuffed(writer: PartWriter, directed: str) -> dict[str, Any]:
-    """Seal and scan where the header is on the wire as it is."""
+def _parts(writer: PartWriter, max_wire: int) -> PartsView:
+    envelope, receiver, stuffing = writer.envelope, writer.frame.receiver, writer.stuffing
+    return PartsView(
+        late_insert=isinstance(receiver, Rescan) and stuffing is not None and not stuffing.back,
+        judged=isinstance(receiver, Rescan) and not receiver.verified,
+        head=writer.head,
+        tail=envelope.trailer_size,
+        header=envelope.header_size,
+        overhead=envelope.overhead,
+        max_frame=envelope.max_frame,
+        index_type=unsigned_type(max(16, max_wire.bit_length())),
+        id_value=writer.get(envelope.id),
+        address_value=writer.get(envelope.address),
+        wrong_tail=writer.wrong_tail("end"),
+        check_differs=writer.check_differs("end", "value"),
+    )
+
+
+def _plain(writer: PartWriter, directed: str) -> PlainView:
     header = writer.envelope.header_size
-    return {
-        "put_header": writer.put_header("wire", "sent"),
-        "put_trailer": writer.put_trailer("end"),
-        "put_check": writer.put_check("end", "value"),
-        "update_sent": writer.covered_loops("wire", "0", f"{header}U + sent"),
-        "update_received": writer.covered_loops("wire", "0", f"payload + {header}U"),
-        "head_checks": list(writer.head_checks("size", directed, all_there=True)),
-    }
+    return PlainView(
+        put_header=writer.put_header("wire", "sent"),
+        put_trailer=writer.put_trailer("end"),
+        put_check=writer.put_check("end", "value"),
+        update_sent=writer.covered_loops("wire", "0", f"{header}U + sent"),
+        update_received=writer.covered_loops("wire", "0", f"payload + {header}U"),
+        head_checks=list(writer.head_checks("size", directed, all_there=True)),
+    )
 
 
-def _stuffed(writer: PartWriter, stuffing: FrameStuffing, directed: str) -> dict[str, Any]:
-    """Seal and scan where the finished frame is stuffed."""
-    trailer, check = writer.put_trailer("trailer"), writer.put_check("trailer", "value")
+def _stuffed(writer: PartWriter, stuffing: FrameStuffing, directed: str) -> StuffedView:
     tail, both = writer.envelope.trailer_size, writer.head + writer.envelope.trailer_size
     front, back = stuffing.front - len(writer.lead), stuffing.back
     part = writer.envelope.check
@@ -121,44 +285,43 @@ def _stuffed(writer: PartWriter, stuffing: FrameStuffing, directed: str) -> dict
     received = writer.covered_loops("body", "0", f"payload + {writer.head}U")
     sent_from = f"(from > (capacity - {both - front}U - size))" if front else ""
     rule = stuffing.rule
-    return {
-        "body_size": both + writer.envelope.payload.most,
-        "stuffed_payload": False,
-        "covers_body": writer.covers_body,
-        "check_from_end": writer.envelope.from_end(part) if part else 0,
-        "put_header": writer.put_header("head", "size"),
-        "put_trailer": trailer,
-        "put_check": check,
-        "seal_trailer": bool(trailer or check),
-        "update_before": writer.lead_updates + ([] if writer.covers_body else sent),
-        "update_lead": writer.lead_updates,
-        "update_received": [] if writer.covers_body else received,
-        "lead_checks": [(f"wire[{i}] != {in_hex(byte)}", i + 1) for i, byte in enumerate(writer.lead)],
-        "head_checks": list(writer.head_checks("at", directed, all_there=False)),
-        "stuffed_when_sent": _both(sent_from, f"(from <= (capacity - {back}U))" if back else ""),
-        "stuffed_when_received": _both(
+    return StuffedView(
+        lead=len(writer.lead),
+        lead_bytes=[in_hex(byte) for byte in writer.lead],
+        head_and_tail=both,
+        covers_body=writer.covers_body,
+        check_from_end=writer.envelope.from_end(part) if part else 0,
+        put_header=writer.put_header("head", "size"),
+        put_trailer=writer.put_trailer("trailer"),
+        put_check=writer.put_check("trailer", "value"),
+        update_before=writer.lead_updates + ([] if writer.covers_body else sent),
+        update_lead=writer.lead_updates,
+        update_received=[] if writer.covers_body else received,
+        lead_checks=[(f"wire[{i}] != {in_hex(byte)}", i + 1) for i, byte in enumerate(writer.lead)],
+        head_checks=list(writer.head_checks("at", directed, all_there=False)),
+        stuffed_when_sent=_both(sent_from, f"(from <= (capacity - {back}U))" if back else ""),
+        stuffed_when_received=_both(
             f"(at > {front}U)" if front else "", f"(at <= (total - {back}U))" if back else ""
         ),
-        "due_when_sent": _due(rule, "wire", "to", "byte"),
-        "due_when_received": _due(rule, "body", "at", "byte"),
-        "late_insert": isinstance(writer.frame.receiver, Rescan) and not back,
-        "hunts": isinstance(writer.frame.receiver, Hunt),
-    }
+        due_when_sent=_due(rule, "wire", "to", "byte"),
+        due_when_received=_due(rule, "body", "at", "byte"),
+        hunts=isinstance(writer.frame.receiver, Hunt),
+    )
 
 
 def _both(*terms: str) -> str:
     return " && ".join(term for term in terms if term)
 
 
-def _inserted(rule: Insertion) -> dict[str, Any]:
-    return {
-        "insert": in_hex(rule.insert),
-        "mark": in_hex(rule.after[0]),
-        "pattern": len(rule.after) > 1,
-        "due_in_payload": _due(rule, "payload", "index + 1U", "payload[index]"),
-        "due_at_end": _due(rule, "wire", "at", "wire[at - 1U]"),
-        "due_in_sent": _due(rule, "sent", "index + 1U", "sent[index]"),
-    }
+def _inserted(rule: Insertion) -> InsertView:
+    return InsertView(
+        insert=in_hex(rule.insert),
+        mark=in_hex(rule.after[0]),
+        pattern=len(rule.after) > 1,
+        due_in_payload=_due(rule, "payload", "index + 1U", "payload[index]"),
+        due_at_end=_due(rule, "wire", "at", "wire[at - 1U]"),
+        due_in_sent=_due(rule, "sent", "index + 1U", "sent[index]"),
+    )
 
 
 def _due(rule: Insertion, array: str, end: str, last: str) -> str:
@@ -170,22 +333,21 @@ def _due(rule: Insertion, array: str, end: str, last: str) -> str:
     return " && ".join([f"(since >= {size}U)", *reversed(terms)])
 
 
-def _hunted(writer: PartWriter, receiver: Hunt) -> dict[str, Any]:
-    """The receiver that looks at each byte once; the length is the body's first byte."""
+def _hunted(writer: PartWriter, receiver: Hunt) -> HuntView:
     envelope = writer.envelope
     assert envelope.length is not None
     assert envelope.check is not None
     length, both = envelope.length, writer.head + envelope.trailer_size
     whole = both - length.bias
-    return {
-        "mark": in_hex(receiver.mark),
-        "insert": in_hex(receiver.insert),
-        "position_type": unsigned_type(max(8, (both + envelope.payload.most).bit_length())),
-        "length_bounds": length_bounds(length, "byte") or "false",
-        "length_value": writer.payload_size(length),
-        "whole": _plus(writer.get(length), whole),
-        "before_check": _plus(writer.get(length), whole - envelope.check.size),
-    }
+    return HuntView(
+        mark=in_hex(receiver.mark),
+        insert=in_hex(receiver.insert),
+        position_type=unsigned_type(max(8, (both + envelope.payload.most).bit_length())),
+        length_bounds=length_bounds(length, "byte") or "false",
+        length_value=writer.payload_size(length),
+        whole=_plus(writer.get(length), whole),
+        before_check=_plus(writer.get(length), whole - envelope.check.size),
+    )
 
 
 def _plus(value: str, constant: int) -> str:
