@@ -41,6 +41,11 @@ class Field:
         return self.type.size
 
     @property
+    def quantity(self) -> str:
+        """What the number of its items is called, "" where it is an integer."""
+        return self.type.quantity if isinstance(self.type, Blob | Array) else ""
+
+    @property
     def fixed(self) -> bool:
         """The size is always the same."""
         return not isinstance(self.type, Blob | Array) or self.type.length.fixed

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import assert_never
 
 from qlinkgen.backends import c_text
-from qlinkgen.model.message import Field, Message, Value
+from qlinkgen.model.integer import Integer
+from qlinkgen.model.message import Message, Value
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import (
-    Array,
-    Bits,
-    Blob,
-    Constant,
-    Count,
-    Enum,
-    Flags,
-    Reserved,
-    Role,
-    Scalar,
-    Settable,
+from qlinkgen.model.types import Enum, Flags, Length, Scalar
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ConstantStep,
+    CountStep,
+    ItemsStep,
+    Member,
+    PayloadPlan,
+    ReservedStep,
+    RunStep,
+    Step,
+    ValueStep,
 )
 
 #: Characters of a line of a comment.
@@ -38,60 +41,64 @@ def message_head(command: Command | None, message: Message) -> list[str]:
     return [piece for line in lines for piece in c_text.comment(line, WIDTH)]
 
 
-def field_rows(message: Message) -> list[str]:
+def field_rows(payload: PayloadPlan) -> list[str]:
     """The layout: offset, type and name of each field, in wire order."""
     rows: list[tuple[str, str, str]] = []
-    for field in message.fields:
-        offset = message.offset(field.name)
+    for step in payload.steps:
+        offset = step.place.offset
         place = "..." if offset is None else str(offset)
-        rows.append((place, _wire_type(field), field.name if not isinstance(field.type, Bits) else ""))
-        if isinstance(field.type, Bits):
-            rows += [
-                ("", f"  bits {m.shift}..{m.shift + m.type.bits - 1}", m.name) for m in field.type.members
-            ]
+        if isinstance(step, BitsStep):
+            rows.append((place, _wire_type(step), ""))
+            rows += [("", f"  bits {m.shift}..{m.shift + m.bits - 1}", m.name) for m in step.members]
+        else:
+            rows.append((place, _wire_type(step), step.name))
     width = max((len(kind) for _, kind, _ in rows), default=0)
     return [f"{place:>4}  {kind:<{width}}  {name}".rstrip() for place, kind, name in rows]
 
 
-_ROLES: dict[type[Role], str] = {Settable: "", Constant: " const", Reserved: " reserved", Count: " count"}
+def _wire_type(step: Step) -> str:
+    match step:
+        case BytesStep():
+            return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]"
+        case ItemsStep():
+            return f"{_integer(step.item)}[{_length(step.length)}]{_order(step.item)}"
+        case ValueStep() | BitsStep():
+            role = ""
+        case ConstantStep():
+            role = " const"
+        case ReservedStep():
+            role = " reserved"
+        case CountStep():
+            role = " count"
+        case _:
+            assert_never(step)
+    return f"{_integer(step.integer)}{_order(step.integer)}{role}"
 
 
-def _wire_type(field: Field) -> str:
-    kind = field.type
-    if isinstance(kind, Blob):
-        return f"{'text' if kind.text else 'bytes'}[{_length(kind)}]"
-    if isinstance(kind, Array):
-        return f"{_integer(kind.item)}[{_length(kind)}]{_order(kind.item)}"
-    if isinstance(kind, Bits):
-        return f"{_integer(kind.container)}{_order(kind.container)}"
-    role = _ROLES[type(kind.role)]
-    return f"{_integer(kind)}{_order(kind)}{role}"
-
-
-def _length(kind: Blob | Array) -> str:
-    length = kind.length
+def _length(length: Length) -> str:
     return str(length.maximum) if length.minimum == length.maximum else f"{length.minimum}..{length.maximum}"
 
 
-def _integer(scalar: Scalar) -> str:
-    return f"{'i' if scalar.signed else 'u'}{scalar.bits}"
+def _integer(integer: Integer) -> str:
+    return f"{'i' if integer.signed else 'u'}{integer.bits}"
 
 
-def _order(scalar: Scalar) -> str:
-    if scalar.size == 1:
+def _order(integer: Integer) -> str:
+    if integer.size == 1:
         return ""
-    return {"big": " be", "little": " le", None: f" in {scalar.size} groups"}[scalar.byteorder]
+    return {"big": " be", "little": " le", None: f" in {integer.size} groups"}[integer.byteorder]
 
 
-def member_note(value: Value) -> str:
+def member_note(value: Value, step: ValueStep | Member | RunStep) -> str:
     """What stands behind a struct member: purpose, unit, range, meaning."""
     parts = [value.doc] if value.doc else []
-    kind = value.type
-    scalar = kind.item if isinstance(kind, Array) else kind
-    if isinstance(scalar, Scalar):
-        parts += _facts(scalar)
-    elif scalar.text:
-        parts.append("7-bit characters")
+    match step:
+        case ValueStep() | Member() | ItemsStep():
+            parts += _facts(step.number)
+        case BytesStep():
+            parts += ["7-bit characters"] if step.text else []
+        case _:
+            assert_never(step)
     if not value.field.confirmed:
         parts.append("not confirmed")
     return c_text.comment_line("; ".join(parts))

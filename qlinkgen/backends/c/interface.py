@@ -11,7 +11,7 @@ from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, u
 from qlinkgen.backends.c.types import Types
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Blob, Scalar
+from qlinkgen.model.types import Scalar
 from qlinkgen.plan import plan_of
 
 __all__ = ["Interface", "count_member", "interface"]
@@ -100,8 +100,7 @@ class Interface:
 
 def count_member(field: Field) -> str:
     """The struct member that says how much of a field of variable size there is."""
-    assert isinstance(field.type, Array | Blob)
-    return f"{field.name}_{field.type.quantity}"
+    return f"{field.name}_{field.quantity}"
 
 
 def interface(protocol: Protocol) -> Interface:

@@ -72,14 +72,15 @@ class MessageWriter:
         """The message for the template; only the directions that are kept have statements."""
         message, payload = plan.message, plan.payload
         head = message_head(self._names.command_of(message), message)
-        notes = {value.name: member_note(value) for value in message.values}
+        values = zip(message.values, payload.settable, strict=True)
+        notes = {value.name: member_note(value, step) for value, step in values}
         members = [member for each in payload.settable for member in self._members(each, notes[each.name])]
         shape = payload, tuple(member.declaration for member in members)
         return MessageView(
             function=self._names.function(message),
             constant=self._names.constant(message),
             head=head,
-            rows=field_rows(message),
+            rows=field_rows(payload),
             id_text=f"0x{message.id:02X}",
             min_size=payload.least,
             max_size=payload.most,

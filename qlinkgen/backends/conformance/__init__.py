@@ -23,7 +23,7 @@ __all__ = ["Header", "Sources", "generate"]
 
 def generate(protocol: Protocol, options: Options, sources: Sources) -> Outputs:
     """The kit of a protocol: path below the output folder to text."""
-    text = _template().render(Kit(plan_of(protocol, options), sources).view())
+    text = _template().render(vars(Kit(plan_of(protocol, options), sources).view()))
     return {f"conformance/{file_stem(protocol.name)}_conformance.c": text}
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 from qlinkgen.backends.base import banner
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import numbers, wrapped
-from qlinkgen.backends.conformance.messages import ERRORS, Entries
+from qlinkgen.backends.conformance.messages import ERRORS, Entries, Entry
 from qlinkgen.backends.conformance.rows import Right, kinds_in, most_values, rows_of
 from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
@@ -18,6 +18,81 @@ from qlinkgen.plan.framing import Rescan
 
 #: Bits of a row's first byte that name kinds; the two above them say "by hand" and "refused".
 _KINDS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class CheckView:
+    """The check value of the nine characters 123456789, as text and as a literal."""
+
+    name: str
+    bits: int
+    value: str
+    literal: str
+
+
+@dataclass(frozen=True, slots=True)
+class KindView:
+    """A kind of vectors, and the bit of a row's first byte that says so."""
+
+    name: str
+    bit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class KitView:
+    """What the templates place, each by its name. Types are the least that hold every number of the kit.
+
+    Attributes:
+        place_type: holds the places of a struct's members; 16 bits where they do, for small targets.
+        empty_wires: an answer has no payload, and nothing frames or checks it.
+    """
+
+    about: list[str]
+    p: str
+    header: str
+    P: str
+    id: str
+    address: str
+    directed: bool
+    unpacks: bool
+    listener: str
+    sum_bits: int
+    address_type: str
+    address_bytes: int
+    rescans: bool
+    packets: bool
+    broadcast: bool
+    size_bytes: int
+    place_type: str
+    id_type: str
+    number_type: str
+    member_type: str
+    printed_type: str
+    printed_digits: int
+    check: CheckView | None
+    kinds: list[KindView]
+    kind_mask: str
+    kind_size: int
+    errors: tuple[str, ...]
+    error_size: int
+    noise: list[str]
+    noise_size: int
+    most_wire: int
+    empty_wires: bool
+    most_request: int
+    most_values: int
+    most_events: int
+    entries: list[Entry]
+    last: int
+    tests: int
+    has_requests: bool
+    refuses: bool
+    encodes: bool
+    decodes: bool
+    receives: bool
+    asks: bool
+    tells: bool
+    checks: list[str]
 
 
 class Kit:
@@ -31,66 +106,64 @@ class Kit:
         self._every = [row for each in self._rows.values() for row in each]
         self._entries = Entries(plan, sources.header, self._rows)
 
-    def view(self) -> dict[str, Any]:
+    def view(self) -> KitView:
         """What the templates place."""
         header, entries = self._header, self._entries.views()
         check, kinds, noise = self._check(), self._kinds(), streams.noise(self._plan)
-        tests = bool(check) + sum(entry[key] for entry in entries for key in _COUNTED)
+        tests = bool(check) + sum(each.tests + each.asked_tests + each.told_tests for each in entries)
         most_wire = max(len(row.wire) for row in self._every)
-        return {
-            "about": [piece for line in banner(self._plan.protocol) for piece in wrapped(line)],
-            "p": header.prefix,
-            "header": file_stem(header.prefix),
-            "P": header.upper,
-            **{name: getattr(header, name) for name in _HABITS},
-            "address_type": f"uint{header.address_bits}_t",
-            "address_bytes": header.address_bits // 8,
-            "rescans": isinstance(self._plan.frame.receiver, Rescan),
-            "packets": self._plan.frame.needs_request,
-            "broadcast": header.address and self._plan.protocol.bus.broadcast is not None,
-            "size_bytes": self._entries.size_bytes,
-            **self._types(entries, most_wire, tests),
-            "check": check,
-            "kinds": [{"name": kind, "bit": f"0x{1 << bit:02X}"} for bit, kind in enumerate(kinds)],
-            "kind_mask": f"0x{(1 << _KINDS) - 1:02X}",
-            "kind_size": max(map(len, kinds)) + 1,
-            "errors": ERRORS,
-            "error_size": max(map(len, ERRORS)) + 1,
-            "noise": [numbers((len(piece), *piece)) for piece in noise],
-            "noise_size": max(map(len, noise)) + 1,
-            "most_wire": most_wire,
-            # An answer without a payload that nothing frames or checks.
-            "empty_wires": not all(row.wire for row in self._every if isinstance(row, Right)),
-            "most_request": max(len(row.request) for row in self._every),
-            "most_values": max(1, *(most_values(header, each.message) for each in self._plan.messages)),
-            "most_events": self._entries.most_events + 1,
-            "entries": entries,
-            "last": len(entries) - 1,
-            "tests": tests,
-            "has_requests": bool(header.sum_bits and any(row.request for row in self._every)),
-            "refuses": any(entry["unsent_lines"] for entry in entries),
-            "encodes": any(entry["encoded"] for entry in entries),
-            "decodes": any(entry["decoded"] for entry in entries),
-            "receives": any(entry["received"] for entry in entries),
-            "asks": any(entry["slave_member"] for entry in entries),
-            "tells": any(entry["told_member"] for entry in entries),
-            "checks": sorted({entry["taken_as"] for entry in entries if entry["framed"]}),
-        }
-
-    def _types(self, entries: list[dict[str, Any]], most_wire: int, tests: int) -> dict[str, Any]:
-        """Unsigned types that hold every number of the kit; 16 bits where they do, for small targets."""
-        members = max(len(entry["members"]) for entry in entries)
-        values = max(most_values(self._header, each.message) for each in self._plan.messages)
-        printed = max(tests, most_wire, (1 << self._header.address_bits) - 1)
-        return {
+        members = max(len(each.members) for each in entries)
+        values = max(most_values(header, each) for each in self._plan.messages)
+        printed = max(tests, most_wire, (1 << header.address_bits) - 1)
+        return KitView(
+            about=[piece for line in banner(self._plan.protocol) for piece in wrapped(line)],
+            p=header.prefix,
+            header=file_stem(header.prefix),
+            P=header.upper,
+            id=header.id,
+            address=header.address,
+            directed=header.directed,
+            unpacks=header.unpacks,
+            listener=header.listener,
+            sum_bits=header.sum_bits,
+            address_type=f"uint{header.address_bits}_t",
+            address_bytes=header.address_bits // 8,
+            rescans=isinstance(self._plan.frame.receiver, Rescan),
+            packets=self._plan.frame.needs_request,
+            broadcast=bool(header.address) and self._plan.protocol.bus.broadcast is not None,
+            size_bytes=self._entries.size_bytes,
             # A number in a struct is followed by up to seven bytes of padding.
-            "place_type": _unsigned(values + 8 * members),
-            "id_type": _unsigned((1 << self._header.id_bits) - 1),
-            "number_type": _unsigned(tests),
-            "member_type": "uint8_t" if members <= 0xFF else "uint16_t",
-            "printed_type": _unsigned(printed),
-            "printed_digits": len(str(printed)) if printed > 0xFFFF else 5,
-        }
+            place_type=_unsigned(values + 8 * members),
+            id_type=_unsigned((1 << header.id_bits) - 1),
+            number_type=_unsigned(tests),
+            member_type="uint8_t" if members <= 0xFF else "uint16_t",
+            printed_type=_unsigned(printed),
+            printed_digits=len(str(printed)) if printed > 0xFFFF else 5,
+            check=check,
+            kinds=[KindView(kind, f"0x{1 << bit:02X}") for bit, kind in enumerate(kinds)],
+            kind_mask=f"0x{(1 << _KINDS) - 1:02X}",
+            kind_size=max(map(len, kinds)) + 1,
+            errors=ERRORS,
+            error_size=max(map(len, ERRORS)) + 1,
+            noise=[numbers((len(piece), *piece)) for piece in noise],
+            noise_size=max(map(len, noise)) + 1,
+            most_wire=most_wire,
+            empty_wires=not all(row.wire for row in self._every if isinstance(row, Right)),
+            most_request=max(len(row.request) for row in self._every),
+            most_values=max(1, values),
+            most_events=self._entries.most_events + 1,
+            entries=entries,
+            last=len(entries) - 1,
+            tests=tests,
+            has_requests=bool(header.sum_bits and any(row.request for row in self._every)),
+            refuses=any(each.unsent_lines for each in entries),
+            encodes=any(each.encoded for each in entries),
+            decodes=any(each.decoded for each in entries),
+            receives=any(each.received for each in entries),
+            asks=any(each.slave_member for each in entries),
+            tells=any(each.told_member for each in entries),
+            checks=sorted({each.taken_as for each in entries if each.framed}),
+        )
 
     def _kinds(self) -> tuple[str, ...]:
         kinds = tuple(kinds_in(self._rows))
@@ -100,7 +173,7 @@ class Kit:
             )
         return kinds
 
-    def _check(self) -> dict[str, Any] | None:
+    def _check(self) -> CheckView | None:
         """The check value of the nine characters 123456789, where it is a CRC."""
         check, bits = self._plan.frame.check, self._header.check_bits
         if check is None or not bits or not isinstance(check.algorithm, Algorithm):
@@ -108,14 +181,8 @@ class Kit:
         algorithm = check.algorithm
         suffix = {8: "u", 16: "u", 32: "ul", 64: "ull"}[bits]
         value = f"0x{algorithm.check:0{bits // 4}X}"
-        return {"name": algorithm.name, "bits": bits, "value": value, "literal": value + suffix}
+        return CheckView(algorithm.name, bits, value, value + suffix)
 
 
 def _unsigned(most: int) -> str:
     return next(f"uint{bits}_t" for bits in (16, 32, 64) if most < 1 << bits)
-
-
-#: What the templates ask of the header under its own name.
-_HABITS = ("id", "address", "directed", "unpacks", "listener", "sum_bits")
-#: Numbers of tests of a message.
-_COUNTED = ("tests", "asked_tests", "told_tests")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import assert_never
 
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import call, comment, folded, numbers, row_lines
@@ -12,9 +13,9 @@ from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.backends.conformance.streams import INTACT, Stream
 from qlinkgen.backends.conformance.unsent import Unsent, unsent
 from qlinkgen.model import naming
-from qlinkgen.model.message import Message, Value
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.message import Value
 from qlinkgen.plan import MessagePlan, Plan
+from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
 
 #: Words for the errors of a header, in the order of their numbers.
 ERRORS = (
@@ -22,6 +23,79 @@ ERRORS = (
     *("crc", "stuffing", "truncated", "frame", "illegal"),
 )
 _RANGE = "range"
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a slave sends for a message."""
+
+    number: int
+    stem: str
+    function: str
+    has_struct: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """A message.
+
+    Attributes:
+        members: those of its struct, in the order of the vectors' values.
+        framed: it is taken apart without being told which message it is.
+        taken_as: the direction in which it is heard.
+        received: it has a stream, which may be ``noisy``.
+        lines: its rows.
+        unsent_lines: rows that an encoder refuses.
+        tests: their number; ``asked_tests`` and ``told_tests`` are those of slave and listener.
+        slave_member: the member of the slave's struct that handles it, "" where none does.
+        told_member: the member of the listener's struct that is told of it, "" where none is.
+    """
+
+    number: int
+    name: str
+    stem: str
+    function: str
+    constant: str
+    is_response: bool
+    has_struct: bool
+    has_bytes: bool
+    members: list[str]
+    encoded: bool
+    decoded: bool
+    framed: bool
+    taken_as: str
+    received: bool
+    noisy: bool
+    lines: list[str]
+    unsent_lines: list[str]
+    tests: int
+    asked_tests: int
+    told_tests: int
+    encode_lines: list[str]
+    decode_lines: list[str]
+    slave_member: str
+    told_member: str
+    answer: Answer | None
+
+    @property
+    def entry_lines(self) -> list[str]:
+        """The message in the table of messages."""
+        stem, answer = self.stem, self.answer or self
+        numbers_of = (answer.number, self.tests, self.asked_tests, self.told_tests, len(self.members))
+        facts = (self.is_response, self.received, self.noisy)
+        groups = (
+            [f"{stem}_name", f"{stem}_members" if self.members else "NULL"],
+            [f"{stem}_vectors", f"sizeof({stem}_vectors)"],
+            [f"{stem}_unsent", f"sizeof({stem}_unsent)"] if self.unsent_lines else ["NULL", "0u"],
+            [
+                f"{self.constant}_ID",
+                *(f"{number}u" for number in numbers_of),
+                *("true" if fact else "false" for fact in facts),
+            ],
+            [f"{stem}_encode" if self.encoded else "NULL", f"{stem}_decode" if self.decoded else "NULL"],
+        )
+        lines = [line for group in groups for line in folded(", ".join(group) + ",")]
+        return ["{" + lines[0], *(f" {line}" for line in lines[1:-1]), f" {lines[-1].removesuffix(',')}}},"]
 
 
 class Entries:
@@ -44,7 +118,7 @@ class Entries:
         found = [each.events for each in self._streams.values() if each]
         return max((len(events) for each in found for events in each if events is not None), default=0)
 
-    def views(self) -> list[dict[str, Any]]:
+    def views(self) -> list[Entry]:
         """Each message for the templates."""
         return [self._view(message) for message in self._plan.messages]
 
@@ -59,74 +133,56 @@ class Entries:
         listens = self._plan.heard != ("request",)
         return bool(self._header.listener) and listens and message.direction != "request"
 
-    def _answer(self, message: MessagePlan) -> Message | None:
-        command = self._plan.protocol.command_of(message.message)
+    def _answer(self, message: MessagePlan) -> Answer | None:
+        header, command = self._header, self._plan.protocol.command_of(message.message)
         answer = command.response if command else None
-        return answer if answer and answer.name in self._numbers else None
+        if answer is None or answer.name not in self._numbers:
+            return None
+        stem, number = naming.member(header.stem(answer)), self._numbers[answer.name]
+        return Answer(number, stem, header.function(answer), bool(answer.values))
 
     # A message
 
-    def _view(self, plan: MessagePlan) -> dict[str, Any]:
+    def _view(self, plan: MessagePlan) -> Entry:
         header, message = self._header, plan.message
         rows, found = self._rows[plan.name], self._streams[plan.name]
         framed = plan.decoded and not (self._plan.frame.needs_request and plan.direction == "response")
-        refused = self._unsent(message) if plan.encoded else []
-        view = {
-            "number": self._numbers[message.name],
-            "name": message.name,
-            "stem": naming.member(header.stem(message)),
-            "function": header.function(message),
-            "constant": header.constant(message),
-            "has_struct": bool(message.values),
-            "has_bytes": bool(message.fields),
-            "members": [line for value in message.values for line in self._members(message, value)],
-            "encoded": plan.encoded,
-            "decoded": plan.decoded,
-            "framed": framed,
-            "taken_as": self._plan.hears(plan),
-            "received": found is not None,
-            "lines": [line for index, row in enumerate(rows) for line in self._lines(row, found, index)],
-            "unsent_lines": [line for row in refused for line in self._unsent_lines(row)],
-            "tests": len(refused) + self._tests(plan, rows, found),
-            "asked_tests": 0,
-            "told_tests": 0,
-        }
-        view |= self._calls(message, view)
-        view |= self._dispatched(plan, rows)
-        return view | {"entry_lines": _entry(message, view, found)}
-
-    def _calls(self, message: Message, view: Mapping[str, Any]) -> dict[str, Any]:
-        """The lines that make a frame, and take its payload (or that of an answer: all of it) apart."""
-        header, function = self._header, view["function"]
-        store = f"&store.{view['stem']}, " if message.values else ""
+        refused = self._unsent(plan) if plan.encoded else []
+        function, stem = header.function(message), naming.member(header.stem(message))
+        store = f"&store.{stem}, " if message.values else ""
         address = "address, " if header.address else ""
-        part = "request_sum, " if header.sum_bits and message.direction == "response" else ""
-        decode = "decode" if view["framed"] else "from_frame"
-        decode_part = "" if view["framed"] else part
-        return {
-            "encode_lines": call(f"return {function}_to_frame({store}{address}{part}bytes, capacity);"),
-            "decode_lines": call(f"return {function}_{decode}({store}{decode_part}bytes, size);"),
-        }
-
-    def _dispatched(self, plan: MessagePlan, rows: Sequence[Row]) -> dict[str, Any]:
-        header, message = self._header, plan.message
-        refused = sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
-        view: dict[str, Any] = {"slave_member": "", "told_member": "", "answer": None}
-        if self._asked(plan):
-            answer = self._answer(plan)
-            view["slave_member"] = header.slave_member(message)
-            view["asked_tests"] = refused + sum(isinstance(row, Right) and bool(row.kinds) for row in rows)
-            if answer:
-                view["answer"] = {
-                    "number": self._numbers[answer.name],
-                    "stem": naming.member(header.stem(answer)),
-                    "function": header.function(answer),
-                    "has_struct": bool(answer.values),
-                }
-        if self._told(plan):
-            view["told_member"] = header.told_member(message)
-            view["told_tests"] = refused + sum(isinstance(row, Right) for row in rows)
-        return view
+        part = "request_sum, " if header.sum_bits and plan.direction == "response" else ""
+        decode = f"decode({store}" if framed else f"from_frame({store}{part}"
+        asked, told = self._asked(plan), self._told(plan)
+        ranges = sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
+        right = [row for row in rows if isinstance(row, Right)]
+        return Entry(
+            number=self._numbers[message.name],
+            name=message.name,
+            stem=stem,
+            function=function,
+            constant=header.constant(message),
+            is_response=plan.direction == "response",
+            has_struct=bool(message.values),
+            has_bytes=bool(message.fields),
+            members=self._members(plan),
+            encoded=plan.encoded,
+            decoded=plan.decoded,
+            framed=framed,
+            taken_as=self._plan.hears(plan),
+            received=found is not None,
+            noisy=found is not None and found.noisy,
+            lines=[line for index, row in enumerate(rows) for line in self._lines(row, found, index)],
+            unsent_lines=[line for row in refused for line in self._unsent_lines(row)],
+            tests=len(refused) + self._tests(plan, rows, found),
+            asked_tests=ranges + sum(bool(row.kinds) for row in right) if asked else 0,
+            told_tests=ranges + len(right) if told else 0,
+            encode_lines=call(f"return {function}_to_frame({store}{address}{part}bytes, capacity);"),
+            decode_lines=call(f"return {function}_{decode}bytes, size);"),
+            slave_member=header.slave_member(message) if asked else "",
+            told_member=header.told_member(message) if told else "",
+            answer=self._answer(plan) if asked else None,
+        )
 
     def _tests(self, plan: MessagePlan, rows: Sequence[Row], found: Stream | None) -> int:
         """Tests of making, taking apart and receiving."""
@@ -134,21 +190,31 @@ class Entries:
         fed = sum(each is not None for each in found.events) if found else 0
         return fed + (sent if plan.encoded else 0) + (len(rows) if plan.decoded else 0)
 
-    def _unsent(self, message: Message) -> list[Unsent]:
+    def _unsent(self, message: MessagePlan) -> list[Unsent]:
         rows = self._rows[message.name]
         right = next(row for row in rows if isinstance(row, Right) and not row.decode_only)
         return list(unsent(self._header, message, right))
 
-    def _members(self, message: Message, value: Value) -> list[str]:
-        """Members of the struct in the order of the vectors' values."""
-        kind, struct = value.type, f"{self._header.function(message)}_t"
+    def _members(self, message: MessagePlan) -> list[str]:
+        struct, values = f"{self._header.function(message.message)}_t", message.message.values
+        return [
+            line
+            for value, step in zip(values, message.payload.settable, strict=True)
+            for line in self._member(struct, value, step)
+        ]
+
+    def _member(self, struct: str, value: Value, step: ValueStep | Member | RunStep) -> list[str]:
         name = naming.member(value.name)
-        if isinstance(kind, Scalar):
-            return [f"NUMBER({struct}, {name}),"]
-        if kind.length.fixed:
-            return [f"ITEMS({struct}, {name}),"]
-        count = self._header.count_member(value.field)
-        return [f"NUMBER({struct}, {count}),", f"COUNTED({struct}, {name}),"]
+        match step:
+            case ValueStep() | Member():
+                return [f"NUMBER({struct}, {name}),"]
+            case BytesStep() | ItemsStep() if step.fixed:
+                return [f"ITEMS({struct}, {name}),"]
+            case BytesStep() | ItemsStep():
+                count = self._header.count_member(value.field)
+                return [f"NUMBER({struct}, {count}),", f"COUNTED({struct}, {name}),"]
+            case _:
+                assert_never(step)
 
     # Rows
 
@@ -184,32 +250,6 @@ class Entries:
     def _sized(self, data: bytes) -> str:
         size = f"SIZE({len(data)})" if self.size_bytes > 1 else str(len(data))
         return ", ".join([size, *([numbers(data)] if data else [])]) + ","
-
-
-def _entry(message: Message, view: Mapping[str, Any], found: Stream | None) -> list[str]:
-    """The message in the table of messages."""
-    stem, answer = view["stem"], view["answer"] or view
-    facts = (message.direction == "response", found is not None, found is not None and found.noisy)
-    numbers_of = (
-        answer["number"],
-        view["tests"],
-        view["asked_tests"],
-        view["told_tests"],
-        len(view["members"]),
-    )
-    groups = (
-        [f"{stem}_name", f"{stem}_members" if view["members"] else "NULL"],
-        [f"{stem}_vectors", f"sizeof({stem}_vectors)"],
-        [f"{stem}_unsent", f"sizeof({stem}_unsent)"] if view["unsent_lines"] else ["NULL", "0u"],
-        [
-            f"{view['constant']}_ID",
-            *(f"{number}u" for number in numbers_of),
-            *("true" if fact else "false" for fact in facts),
-        ],
-        [f"{stem}_{verb}" if view[f"{verb}d"] else "NULL" for verb in ("encode", "decode")],
-    )
-    lines = [line for group in groups for line in folded(", ".join(group) + ",")]
-    return ["{" + lines[0], *(f" {line}" for line in lines[1:-1]), f" {lines[-1].removesuffix(',')}}},"]
 
 
 def _sizes(row: Row) -> tuple[int, ...]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Any
+from typing import assert_never
 
-from qlinkgen.backends.conformance.sources import Header, Sources
+from qlinkgen.backends.conformance.sources import Header, JsonObject, Sources
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.naming import record_key
-from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.model.values import Native, default_of, from_json, raw_from_native
-from qlinkgen.plan import Plan
+from qlinkgen.plan import MessagePlan, Plan
+from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +83,16 @@ def _mixed(right: Sequence[Right], wrong: Sequence[Wrong]) -> list[Row]:
     return mixed
 
 
-def _right(plan: Plan, header: Header, entry: Mapping[str, Any]) -> Right:
-    message = plan.by_name[entry["message"]].message
+def _right(plan: Plan, header: Header, entry: JsonObject) -> Right:
+    planned = plan.by_name[entry["message"]]
+    message = planned.message
+    values = zip(message.values, planned.payload.settable, strict=True)
     by_hand = "kinds" not in entry
     return Right(
         message=message,
         kinds=() if by_hand else tuple(entry["kinds"]),
         address=entry.get(record_key(plan.frame.address), message.default_address),
-        values=b"".join(_value(header, value, entry) for value in message.values),
+        values=b"".join(_value(header, value, step, entry) for value, step in values),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),
         request=bytes.fromhex(entry.get("request", "")),
@@ -99,7 +101,7 @@ def _right(plan: Plan, header: Header, entry: Mapping[str, Any]) -> Right:
     )
 
 
-def _wrong(plan: Plan, entry: Mapping[str, Any]) -> Wrong:
+def _wrong(plan: Plan, entry: JsonObject) -> Wrong:
     return Wrong(
         message=plan.by_name[entry["message"]].message,
         kind=entry["kind"],
@@ -110,57 +112,82 @@ def _wrong(plan: Plan, entry: Mapping[str, Any]) -> Wrong:
     )
 
 
-def _source(entry: Mapping[str, Any]) -> str:
+def _source(entry: JsonObject) -> str:
     return ": ".join(str(entry[key]) for key in ("source", "work") if entry.get(key))
 
 
 # Values
 
 
-def most_values(header: Header, message: Message) -> int:
+def most_values(header: Header, message: MessagePlan) -> int:
     """Most bytes that the values of a message have."""
-    return sum(_most(header, value) for value in message.values)
+    return sum(_most(header, step) for step in message.payload.settable)
 
 
-def value_sizes(header: Header, message: Message, right: Right) -> list[int]:
+def value_sizes(header: Header, message: MessagePlan, right: Right) -> list[int]:
     """Bytes of each value in a vector of a message."""
     sizes: list[int] = []
-    for value in message.values:
-        kind, at = value.type, sum(sizes)
-        if isinstance(kind, Scalar):
-            sizes.append(header.width(kind))
-            continue
-        width = header.width(kind.item) if isinstance(kind, Array) else 1
-        counted = 0 if kind.length.fixed else header.count_width(kind.length.maximum)
-        count = int.from_bytes(right.values[at : at + counted], "big") if counted else kind.length.maximum
-        sizes.append(counted + width * count)
+    for step in message.payload.settable:
+        match step:
+            case ValueStep() | Member():
+                sizes.append(header.width(step.number))
+            case BytesStep() | ItemsStep():
+                at, counted = sum(sizes), _counted(header, step)
+                most = step.length.maximum
+                count = int.from_bytes(right.values[at : at + counted], "big") if counted else most
+                sizes.append(counted + _item(header, step) * count)
+            case _:
+                assert_never(step)
     return sizes
 
 
-def _most(header: Header, value: Value) -> int:
-    kind = value.type
-    if isinstance(kind, Scalar):
-        return header.width(kind)
-    width = header.width(kind.item) if isinstance(kind, Array) else 1
-    count = 0 if kind.length.fixed else header.count_width(kind.length.maximum)
-    return count + width * kind.length.maximum
+def _most(header: Header, step: ValueStep | Member | RunStep) -> int:
+    match step:
+        case ValueStep() | Member():
+            return header.width(step.number)
+        case BytesStep() | ItemsStep():
+            return _counted(header, step) + _item(header, step) * step.length.maximum
+        case _:
+            assert_never(step)
 
 
-def _value(header: Header, value: Value, entry: Mapping[str, Any]) -> bytes:
+def _counted(header: Header, run: RunStep) -> int:
+    """Bytes of the struct member that counts a run, 0 where its size is always the same."""
+    return 0 if run.fixed else header.count_width(run.length.maximum)
+
+
+def _item(header: Header, run: RunStep) -> int:
+    """Bytes of an item of a run in the struct."""
+    match run:
+        case BytesStep():
+            return 1
+        case ItemsStep():
+            return header.width(run.number)
+        case _:
+            assert_never(run)
+
+
+def _value(header: Header, value: Value, step: ValueStep | Member | RunStep, entry: JsonObject) -> bytes:
     """One value: a number, or a count where it varies and the items."""
-    kind, native = value.type, _native(value, entry)
-    if isinstance(kind, Scalar):
-        raw = entry.get("raw", {}).get(value.name)
-        return number_bytes(raw_from_native(value, native) if raw is None else raw, header.width(kind))
-    assert isinstance(native, bytes | str | list)
-    count = b"" if kind.length.fixed else number_bytes(len(native), header.count_width(kind.length.maximum))
-    if isinstance(kind, Blob):
-        return count + (native.encode("ascii") if isinstance(native, str) else bytes(native))
-    assert isinstance(native, list)
-    return count + b"".join(number_bytes(item, header.width(kind.item)) for item in native)
+    native = _native(value, entry)
+    match step:
+        case ValueStep() | Member():
+            raw = entry.get("raw", {}).get(value.name)
+            raw = raw_from_native(value, native) if raw is None else raw
+            return number_bytes(raw, header.width(step.number))
+        case BytesStep():
+            assert isinstance(native, bytes | str)
+            items = native.encode("ascii") if isinstance(native, str) else native
+        case ItemsStep():
+            assert isinstance(native, list)
+            items = b"".join(number_bytes(item, _item(header, step)) for item in native)
+        case _:
+            assert_never(step)
+    counted = _counted(header, step)
+    return (number_bytes(len(native), counted) if counted else b"") + items
 
 
-def _native(value: Value, entry: Mapping[str, Any]) -> Native:
+def _native(value: Value, entry: JsonObject) -> Native:
     """What the entry says, or else the default."""
     if value.name not in entry["fields"]:
         return default_of(value)

@@ -10,6 +10,9 @@ from typing import Any
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Scalar
 
+#: A document of vectors or one line of it. Any: what an entry holds depends on its message.
+JsonObject = Mapping[str, Any]
+
 
 class Header(typing.Protocol):
     """The header that the kit is compiled with: its names, and the habits of its frame."""
@@ -113,5 +116,5 @@ class Sources:
     """
 
     header: Header
-    generated: Mapping[str, Any]
-    by_hand: Mapping[str, Any]
+    generated: JsonObject
+    by_hand: JsonObject

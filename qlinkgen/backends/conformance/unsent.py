@@ -9,6 +9,8 @@ from qlinkgen.backends.conformance.rows import Right, number_bytes, value_sizes
 from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Scalar
+from qlinkgen.plan import MessagePlan
+from qlinkgen.plan.payload import Member, ValueStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,16 +22,16 @@ class Unsent:
     values: bytes
 
 
-def unsent(header: Header, message: Message, right: Right) -> Iterator[Unsent]:
+def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsent]:
     """Each number of a message, and its address, out of range by one; all else is as in a right vector."""
     at = 0
-    for value, size in zip(message.values, value_sizes(header, message, right), strict=True):
-        if isinstance(value.type, Scalar):
-            for number in _outside(value.type, size):
+    for step, size in zip(message.payload.settable, value_sizes(header, message, right), strict=True):
+        if isinstance(step, ValueStep | Member):
+            for number in _outside(step.number, size):
                 values = right.values[:at] + number_bytes(number, size) + right.values[at + size :]
-                yield Unsent(f"{value.name} is {number}", right.address, values)
+                yield Unsent(f"{step.name} is {number}", right.address, values)
         at += size
-    for address in _addresses(header, message):
+    for address in _addresses(header, message.message):
         yield Unsent(f"sent to {address}", address, right.values)
 
 
