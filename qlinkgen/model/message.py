@@ -67,6 +67,12 @@ class Value:
         """The caller has to choose the value; its default is for vectors alone."""
         return self.type.required
 
+    @property
+    def unit(self) -> str:
+        """The unit of its numbers, "" for bytes and text."""
+        kind = self.type.item if isinstance(self.type, Array) else self.type
+        return kind.unit if isinstance(kind, Scalar) else ""
+
 
 @dataclass(frozen=True)
 class Message:

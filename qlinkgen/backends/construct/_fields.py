@@ -14,15 +14,17 @@ import copy
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from decimal import Context, Decimal
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 from construct import (
     Adapter,
     Construct,
     Container,
     Default,
+    FlagsEnum,
     IntegerError,
     RangeError,
+    Renamed,
     StringError,
     Subconstruct,
     ValidationError,
@@ -32,6 +34,11 @@ from construct import (
 )
 
 _EXACT = Context(prec=100)
+
+#: What is sent and received, by name. Any: each field has values of its own, and checks them.
+Values = Mapping[str, Any]
+#: The items of a run: a list, bytes or text.
+Row = Sequence[object]
 
 
 class Groups(Construct):
@@ -52,20 +59,20 @@ class Groups(Construct):
         value = sum((byte & (1 << bits) - 1) << shift for byte, (shift, bits) in pairs)
         return _signed(value, self.bits) if self.signed else value
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> int:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
         data = stream_read(stream, len(self.chunks), path)
         for byte, (_, bits) in zip(data, self.chunks, strict=True):
             if byte >> bits:
                 raise ValidationError(f"byte {byte:#04x} has more than {bits} bits set", path=path)
         return self.number(data)
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: object, stream: BinaryIO, context: Container, path: str) -> object:
         value = _unsigned(obj, self.bits, self.signed, path)
         data = bytes(value >> shift & (1 << bits) - 1 for shift, bits in self.chunks)
         stream_write(stream, data, len(data), path)
         return obj
 
-    def _sizeof(self, context: Any, path: Any) -> int:
+    def _sizeof(self, context: Container, path: str) -> int:
         return len(self.chunks)
 
 
@@ -78,11 +85,11 @@ class Bits(Construct):
         self.bits = last + 1 - first
         self.signed = signed
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> int:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
         value = context.bits >> self.first & (1 << self.bits) - 1
         return int(_signed(value, self.bits) if self.signed else value)
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: object, stream: BinaryIO, context: Container, path: str) -> object:
         context.bits |= _unsigned(obj, self.bits, self.signed, path) << self.first
         return obj
 
@@ -90,24 +97,24 @@ class Bits(Construct):
 class BitFields(Construct):
     """An integer divided into fields; bits of no field are sent as zero and ignored when received."""
 
-    def __init__(self, integer: Any, *fields: Any) -> None:
+    def __init__(self, integer: Construct, *fields: Renamed) -> None:
         super().__init__()
         self.integer = integer
         self.fields = fields
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         inner = Container(bits=self.integer._parsereport(stream, context, path))
         found = [(field, field._parsereport(stream, inner, path)) for field in self.fields]
         return Container({field.name: value for field, value in found if isinstance(field.subcon, Default)})
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
         inner = Container(bits=0)
         for field in self.fields:
             field._build(obj.get(field.name), stream, inner, path)
         self.integer._build(inner.bits, stream, context, path)
         return obj
 
-    def _sizeof(self, context: Any, path: Any) -> int:
+    def _sizeof(self, context: Container, path: str) -> int:
         return int(self.integer.sizeof())
 
 
@@ -115,7 +122,7 @@ def _signed(value: int, bits: int) -> int:
     return value - (value >> (bits - 1) << bits)
 
 
-def _unsigned(value: Any, bits: int, signed: bool, path: Any) -> int:
+def _unsigned(value: object, bits: int, signed: bool, path: str) -> int:
     low = -(1 << bits - 1) if signed else 0
     if not isinstance(value, int) or not low <= value < low + (1 << bits):
         raise IntegerError(f"{value!r} is no integer of {bits} bits", path=path)
@@ -125,12 +132,12 @@ def _unsigned(value: Any, bits: int, signed: bool, path: Any) -> int:
 class Ranged(Adapter):
     """An integer from minimum to maximum."""
 
-    def __init__(self, subcon: Any, minimum: int, maximum: int) -> None:
+    def __init__(self, subcon: Construct, minimum: int, maximum: int) -> None:
         super().__init__(subcon)
         self.minimum = minimum
         self.maximum = maximum
 
-    def _decode(self, obj: Any, context: Any, path: Any) -> Any:
+    def _decode(self, obj: object, context: Container, path: str) -> int:
         if not isinstance(obj, int) or not self.minimum <= obj <= self.maximum:
             raise ValidationError(f"{obj!r} is not in {self.minimum}..{self.maximum}", path=path)
         return obj
@@ -141,11 +148,11 @@ class Ranged(Adapter):
 class Clear(Adapter):
     """Bits of which none of the mask may be set."""
 
-    def __init__(self, subcon: Any, mask: int) -> None:
+    def __init__(self, subcon: Construct, mask: int) -> None:
         super().__init__(subcon)
         self.mask = mask
 
-    def _decode(self, obj: Any, context: Any, path: Any) -> Any:
+    def _decode(self, obj: object, context: Container, path: str) -> int:
         if not isinstance(obj, int) or obj & self.mask:
             raise ValidationError(f"{obj!r} has bits of {self.mask:#x}", path=path)
         return obj
@@ -156,10 +163,10 @@ class Clear(Adapter):
 class Boolean(Adapter):
     """0 or 1 as False or True."""
 
-    def _decode(self, obj: Any, context: Any, path: Any) -> bool:
+    def _decode(self, obj: int, context: Container, path: str) -> bool:
         return bool(obj)
 
-    def _encode(self, obj: Any, context: Any, path: Any) -> Any:
+    def _encode(self, obj: object, context: Container, path: str) -> object:
         return obj
 
 
@@ -170,7 +177,7 @@ class Member(NamedTuple):
     value: int
 
 
-def like(named: Any, subcon: Any) -> Any:
+def like(named: Construct, subcon: Construct) -> Construct:
     """The Enum or FlagsEnum with another integer."""
     other = copy.copy(named)
     other.subcon = subcon
@@ -188,16 +195,16 @@ class Flags(Container):
 class Whole(Adapter):
     """A FlagsEnum that keeps bits without a name: it is parsed to Flags."""
 
-    def __init__(self, named: Any) -> None:
+    def __init__(self, named: FlagsEnum) -> None:
         super().__init__(named.subcon)
         self.named = named
 
-    def _decode(self, obj: int, context: Any, path: Any) -> Flags:
+    def _decode(self, obj: int, context: Container, path: str) -> Flags:
         bits = self.named.flags
         hidden = {"_flagsenum": True, "_bits": bits, "_rest": obj & ~sum(bits.values())}
         return Flags({name: bool(obj & bit) for name, bit in bits.items()} | hidden)
 
-    def _encode(self, obj: Any, context: Any, path: Any) -> int:
+    def _encode(self, obj: object, context: Container, path: str) -> int:
         rest = obj.get("_rest", 0) if isinstance(obj, Mapping) else 0
         return int(self.named._encode(obj, context, path)) | int(rest)
 
@@ -210,7 +217,7 @@ class Scaled(Adapter):
     """
 
     def __init__(
-        self, subcon: Any, *, factor: int = 1, bias: int = 0, divisor: int = 1, exact: bool = False
+        self, subcon: Construct, *, factor: int = 1, bias: int = 0, divisor: int = 1, exact: bool = False
     ) -> None:
         super().__init__(subcon)
         self.factor = factor
@@ -218,13 +225,13 @@ class Scaled(Adapter):
         self.divisor = divisor
         self.exact = exact
 
-    def _decode(self, obj: int, context: Any, path: Any) -> int | float | Decimal:
+    def _decode(self, obj: int, context: Container, path: str) -> int | float | Decimal:
         value = obj * self.factor + self.bias
         if self.exact:
             return _EXACT.divide(Decimal(value), Decimal(self.divisor))
         return value if self.divisor == 1 else value / self.divisor
 
-    def _encode(self, obj: Any, context: Any, path: Any) -> int:
+    def _encode(self, obj: float | Decimal | str, context: Container, path: str) -> int:
         try:
             return round((Fraction(obj) * self.divisor - self.bias) / self.factor)
         except (TypeError, ValueError, OverflowError):
@@ -237,7 +244,7 @@ class Scaled(Adapter):
 class Count(Subconstruct):
     """How many items the field ``of`` has; ``step`` is the size of an item where bytes are counted."""
 
-    def __init__(self, subcon: Any, of: str, step: int = 1) -> None:
+    def __init__(self, subcon: Construct, of: str, step: int = 1) -> None:
         super().__init__(subcon)
         self.of = of
         self.step = step
@@ -247,31 +254,31 @@ class Count(Subconstruct):
         """The integer in these bytes; whether each byte is one of it shows later."""
         return int(self.subcon.number(data) if isinstance(self.subcon, Groups) else self.subcon.parse(data))
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: object, stream: BinaryIO, context: Container, path: str) -> object:
         return self.subcon._build(len(context[self.of]) * self.step, stream, context, path)
 
 
 class Items(Construct):
     """A list of minimum to maximum items. It takes all bytes: the Message knows how many these are."""
 
-    def __init__(self, item: Any, minimum: int, maximum: int) -> None:
+    def __init__(self, item: Construct, minimum: int, maximum: int) -> None:
         super().__init__()
         self.item = item
         self.size = int(item.sizeof())
         self.minimum = minimum
         self.maximum = maximum
 
-    def checked(self, number: int, path: Any) -> int:
+    def checked(self, number: int, path: str) -> int:
         """The number of items, if it is one that is allowed."""
         if not self.minimum <= number <= self.maximum:
             raise RangeError(f"{number} items are not {self.minimum}..{self.maximum}", path=path)
         return number
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> Row:
         data = stream_read_entire(stream, path)
         return [self.item.parse(data[at : at + self.size]) for at in range(0, len(data), self.size)]
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
         self.checked(len(obj), path)
         for item in obj:
             self.item._build(item, stream, context, path)
@@ -284,10 +291,11 @@ class Octets(Items):
     def __init__(self, minimum: int, maximum: int) -> None:
         super().__init__(Groups((0, 8)), minimum, maximum)
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
-        return stream_read_entire(stream, path)
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> bytes | str:
+        data: bytes = stream_read_entire(stream, path)
+        return data
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
         stream_write(stream, obj, self.checked(len(obj), path), path)
         return obj
 
@@ -295,20 +303,20 @@ class Octets(Items):
 class Characters(Octets):
     """Text of minimum to maximum 7-bit characters, otherwise like Items."""
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> str:
-        data: bytes = super()._parse(stream, context, path)
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:
+        data: bytes = stream_read_entire(stream, path)
         if not data.isascii():
             raise StringError(f"{data!r} is not of 7-bit characters", path=path)
         return data.decode("ascii")
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
         if not isinstance(obj, str) or not obj.isascii():
             raise StringError(f"{obj!r} is not text of 7-bit characters", path=path)
         super()._build(obj.encode("ascii"), stream, context, path)
         return obj
 
 
-def _run(field: Any) -> Items | None:
+def _run(field: Renamed) -> Items | None:
     """The items of a field, None where it is of fixed size."""
     inner = field.subcon.subcon if isinstance(field.subcon, Default) else field.subcon
     return inner if isinstance(inner, Items) else None
@@ -325,7 +333,7 @@ class Message(Construct):
         self,
         name: str,
         message_id: int,
-        *fields: Any,
+        *fields: Renamed,
         addresses: Sequence[tuple[int, int]] = (),
         checksum: bool = True,
         empty_is_default: bool = False,
@@ -348,12 +356,12 @@ class Message(Construct):
         self.least = self.size({name: run.minimum for name, run in self.runs.items()})
         self.most = self.size({name: run.maximum for name, run in self.runs.items()})
 
-    def _settable(self) -> Iterator[Any]:
+    def _settable(self) -> Iterator[Renamed]:
         for field in self.fields:
             inside = field.subcon.fields if isinstance(field.subcon, BitFields) else (field,)
             yield from (each for each in inside if isinstance(each.subcon, Default))
 
-    def _counts(self) -> Iterator[Any]:
+    def _counts(self) -> Iterator[Renamed]:
         return (field for field in self.fields if isinstance(field.subcon, Count))
 
     def fits(self, size: int) -> bool:
@@ -364,7 +372,7 @@ class Message(Construct):
         """Bytes of payload; a run that has no number of items yet is left out."""
         return sum(self._size(field, counts) for field in self.fields)
 
-    def _size(self, field: Any, counts: Mapping[str, int]) -> int:
+    def _size(self, field: Renamed, counts: Mapping[str, int]) -> int:
         run = self.runs.get(field.name)
         return run.size * counts.get(field.name, 0) if run else int(field.sizeof())
 
@@ -379,7 +387,7 @@ class Message(Construct):
             at += size
         return data + take(at - len(data))
 
-    def _learned(self, field: Any, data: bytes, path: Any) -> int:
+    def _learned(self, field: Renamed, data: bytes, path: str) -> int:
         """How many items a count tells."""
         cell, of = data[: field.sizeof()], field.subcon.of
         if len(cell) < field.sizeof():
@@ -389,7 +397,7 @@ class Message(Construct):
             raise RangeError(f"{field.name} is no whole number of {of}", path=path)
         return self.runs[of].checked(number, path)
 
-    def _cells(self, data: bytes, path: Any) -> list[tuple[Any, bytes]]:
+    def _cells(self, data: bytes, path: str) -> list[tuple[Renamed, bytes]]:
         """The fields with their bytes. All sizes are right, or RangeError is raised."""
         if not self.least <= len(data) <= self.most:
             raise RangeError(f"{len(data)} bytes, {self.name} has {self.least}..{self.most}", path=path)
@@ -412,7 +420,7 @@ class Message(Construct):
             raise RangeError(f"{len(data)} bytes, the counts of {self.name} tell {at}", path=path)
         return cells
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         data = stream_read_entire(stream, path)
         if not data and self.empty_is_default:
             data = self.build({})
@@ -425,7 +433,7 @@ class Message(Construct):
                 values[field.name] = found
         return values
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
         if unknown := sorted(set(obj) - set(self.defaults)):
             raise ValidationError(f"{self.name} has no field {', '.join(map(str, unknown))}", path=path)
         values = Container(self.defaults)

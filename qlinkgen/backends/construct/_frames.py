@@ -10,7 +10,7 @@ fills in and checks lengths, inserted bytes and check values.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from construct import (
     Construct,
@@ -22,7 +22,7 @@ from construct import (
     stream_write,
 )
 
-from ._fields import Message
+from ._fields import Message, Values
 
 
 class FrameError(ConstructError):
@@ -87,7 +87,7 @@ class Length(NamedTuple):
     """The payload's bytes as they are sent, plus ``bias``; from ``least`` to ``most``."""
 
     name: str
-    integer: Any
+    integer: Construct
     bias: int
     least: int
     most: int
@@ -97,14 +97,14 @@ class Id(NamedTuple):
     """The message id."""
 
     name: str
-    integer: Any
+    integer: Construct
 
 
 class Address(NamedTuple):
     """The address."""
 
     name: str
-    integer: Any
+    integer: Construct
 
 
 class Mark(NamedTuple):
@@ -146,7 +146,7 @@ class Check(NamedTuple):
 
     name: str
     algorithm: CRC | Sum
-    integer: Any
+    integer: Construct
     mask: int
     over: Sequence[str]
     word: int = 0
@@ -183,7 +183,7 @@ def _size(part: Part) -> int:
             return 1
         case Payload():
             return 0
-        case _:
+        case Length() | Id() | Address() | Check():
             return int(part.integer.sizeof())
 
 
@@ -277,7 +277,7 @@ class Frame(Construct):
             case Check():
                 return b""
 
-    def _build(self, obj: Any, stream: Any, context: Any, path: Any) -> Any:
+    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
         message = self.by_name.get(obj["message"])
         if message is None:
             raise ValidationError(f"there is no message {obj['message']!r} in this direction", path=path)
@@ -289,13 +289,13 @@ class Frame(Construct):
         stream_write(stream, wire, len(wire), path)
         return obj
 
-    def _parse(self, stream: Any, context: Any, path: Any) -> Any:
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         wire = stream_read_entire(stream, path)
         if not wire:
             raise FrameError("truncated", "there are no bytes")
         return self._frame(wire, context._params.get("request", b""))
 
-    def _frame(self, wire: bytes, request: bytes) -> Any:
+    def _frame(self, wire: bytes, request: bytes) -> Container:
         raise NotImplementedError
 
     def _known(self, number: int) -> Message:
@@ -305,7 +305,7 @@ class Frame(Construct):
 
     def _judged(
         self, cells: Mapping[str, bytes], number: int, payload: bytes, address: int = 0, request: bytes = b""
-    ) -> Any:
+    ) -> Container:
         """The message of a frame in cells: check value, message, sizes, values, address."""
         found = self.by_id.get(number)
         if self.check and (found is None or found.checksum):
@@ -333,7 +333,7 @@ def messages_of(*frames: Frame) -> dict[str, Message]:
     return {name: message for frame in frames for name, message in frame.by_name.items()}
 
 
-def _allowed(message: Message, address: Any) -> bool:
+def _allowed(message: Message, address: object) -> bool:
     if not message.addresses:
         return True
     return isinstance(address, int) and any(first <= address <= last for first, last in message.addresses)
@@ -393,7 +393,7 @@ class DelimitedFrame(Frame):
     address that is not known shows first.
     """
 
-    def _frame(self, wire: bytes, request: bytes) -> Any:
+    def _frame(self, wire: bytes, request: bytes) -> Container:
         source = _Wire(wire, self.stuffing, hunt=self.hunt)
         cells: dict[str, bytes] = {}
         numbers: dict[type, int] = {}
@@ -452,7 +452,7 @@ class DelimitedFrame(Frame):
 class MarkedFrame(Frame):
     """A frame between a header and an end byte that carry a marker bit, which no other byte has."""
 
-    def _frame(self, wire: bytes, request: bytes) -> Any:
+    def _frame(self, wire: bytes, request: bytes) -> Container:
         header, end = self.parts[0], self.parts[-1]
         assert isinstance(header, Mark)
         assert isinstance(end, Mark)
@@ -480,7 +480,7 @@ class Packet(Frame):
     Without an id it is an answer: parse and build are given ``request``, the packet that is answered.
     """
 
-    def _frame(self, wire: bytes, request: bytes) -> Any:
+    def _frame(self, wire: bytes, request: bytes) -> Container:
         has_id = isinstance(self.parts[0], Id)
         if not has_id and not request:
             raise FrameError("unknown", "an answer needs its request: pass request=packet to build and parse")

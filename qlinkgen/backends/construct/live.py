@@ -5,10 +5,9 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from decimal import Decimal
-from typing import Any
 
 from qlinkgen.backends.construct.module import definitions
-from qlinkgen.backends.construct.tree import evaluate
+from qlinkgen.backends.construct.tree import Value, evaluate
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import Options, plan_of
 
@@ -22,13 +21,13 @@ class Live:
         frames: frame structures by direction.
     """
 
-    def __init__(self, names: Mapping[str, Any]) -> None:
+    def __init__(self, names: Mapping[str, Value]) -> None:
         self.names = names
-        self.messages: Mapping[str, Any] = names["MESSAGES"]
+        self.messages: Mapping[str, Value] = names["MESSAGES"]
         known = {"request": "REQUEST_FRAME", "response": "RESPONSE_FRAME", "message": "FRAME"}
         self.frames = {direction: names[name] for direction, name in known.items() if name in names}
 
-    def payload(self, message: str, fields: Mapping[str, Any]) -> bytes:
+    def payload(self, message: str, fields: Mapping[str, Value]) -> bytes:
         """The payload of a message; fields that are not given have their defaults."""
         return bytes(self.messages[message].build(fields))
 
@@ -39,7 +38,7 @@ class Live:
         frame = next(each for each in self.frames.values() if message in each.by_name)
         return bytes(frame.seal(self.messages[message], payload, address, request, number))
 
-    def parse(self, direction: str, wire: bytes, request: bytes = b"") -> Any:
+    def parse(self, direction: str, wire: bytes, request: bytes = b"") -> Value:
         """Message, address and fields of exactly one frame. Raises construct's ConstructError."""
         return self.frames[direction].parse(wire, request=request)
 
@@ -47,7 +46,7 @@ class Live:
 def live(protocol: Protocol, options: Options | None = None) -> Live:
     """The structures of a protocol."""
     modules = ("construct", f"{__package__}._fields", f"{__package__}._frames")
-    names: dict[str, Any] = {"Decimal": Decimal}
+    names: dict[str, Value] = {"Decimal": Decimal}
     for module in modules:
         names |= vars(importlib.import_module(module))
     return Live(evaluate(definitions(plan_of(protocol, options)), names))

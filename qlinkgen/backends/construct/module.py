@@ -90,8 +90,16 @@ def _frames(plan: Plan, messages: Mapping[str, str]) -> Iterator[Definition]:
 
 
 def _algorithm(algorithm: catalogue.Algorithm | catalogue.Sum) -> Call:
-    if isinstance(algorithm, catalogue.Sum):
-        return Call("Sum", (algorithm.width,), (("complement", True),) if algorithm.complement else ())
+    match algorithm:
+        case catalogue.Sum():
+            return Call("Sum", (algorithm.width,), (("complement", True),) if algorithm.complement else ())
+        case catalogue.Algorithm():
+            return _crc(algorithm)
+        case _:
+            assert_never(algorithm)
+
+
+def _crc(algorithm: catalogue.Algorithm) -> Call:
     digits = (algorithm.width + 3) // 4
     return Call(
         "CRC",

@@ -124,13 +124,21 @@ class Types:
 
     def of(self, number: Scalar, raw: Node) -> Node:
         """What turns an integer into the native value."""
-        node, name = _converted(number, raw), _name(number)
-        same = self._usual.get(name) == node
-        if not isinstance(number.meaning, Enum | Flags):
-            return Ref(self._names[name]) if same else node
+        node, meaning = _converted(number, raw), number.meaning
+        same = self._usual.get(name := _name(number)) == node
+        match meaning:
+            case "bool" | None:
+                return Ref(self._names[name]) if same else node
+            case Enum():
+                return self._labels(name, node, same=same)
+            case Flags():
+                return Call("Whole", (self._labels(name, node, same=same),))
+            case _:
+                assert_never(meaning)
+
+    def _labels(self, name: str, node: Node, *, same: bool) -> Node:
         known = Ref(self._names[name])
-        named: Node = known if same else Call("like", (known, node))
-        return Call("Whole", (named,)) if isinstance(number.meaning, Flags) else named
+        return known if same else Call("like", (known, node))
 
 
 def comment(doc: str, section: str, *, confirmed: bool = True) -> str:
@@ -200,7 +208,14 @@ class _Field:
 
 def _name(number: Scalar) -> str:
     """Name of a number's type, "" where it has none."""
-    return number.meaning.name if isinstance(number.meaning, Enum | Flags) else number.type_name
+    meaning = number.meaning
+    match meaning:
+        case Enum() | Flags():
+            return meaning.name
+        case "bool" | None:
+            return number.type_name
+        case _:
+            assert_never(meaning)
 
 
 def _bits(member: Member) -> Node:

@@ -57,7 +57,11 @@ class Sequence:
 
 
 #: Besides these, what `repr` prints as it is written: numbers, text, bytes, and tuples of them.
-Node = Ref | Number | Call | Named | Sequence | int | float | str | bytes | bool | None | tuple[Any, ...]
+Node = Ref | Number | Call | Named | Sequence | int | float | str | bytes | bool | None | tuple["Node", ...]
+
+
+#: What a node comes to. Any: construct tells no types of its classes, nor of what they make.
+Value = Any
 
 
 def hexadecimal(value: int, digits: int = 2) -> Number:
@@ -79,13 +83,13 @@ class Definition:
 # Evaluation
 
 
-def evaluate(definitions: tuple[Definition, ...], names: Mapping[str, Any]) -> dict[str, Any]:
+def evaluate(definitions: tuple[Definition, ...], names: Mapping[str, Value]) -> dict[str, Value]:
     """What the definitions define, given what they may refer to."""
     known = dict(names)
     return {each.name: known.setdefault(each.name, _value(each.node, known)) for each in definitions}
 
 
-def _value(node: Node, known: Mapping[str, Any]) -> Any:
+def _value(node: Node, known: Mapping[str, Value]) -> Value:
     match node:
         case Call():
             args = [_value(each, known) for each in node.args]
@@ -187,7 +191,7 @@ def _flat(node: Node) -> str:
             return _literal(node)
 
 
-def _literal(value: Any) -> str:
+def _literal(value: Node) -> str:
     """As `repr`, in double quotes."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_literal, value))}{',' if len(value) == 1 else ''})"

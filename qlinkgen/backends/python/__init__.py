@@ -11,10 +11,8 @@ from types import ModuleType
 from qlinkgen.backends.base import Outputs, copied
 from qlinkgen.backends.python._support import BaseMessage, Rule
 from qlinkgen.backends.python.module import render
-from qlinkgen.model.message import Value
 from qlinkgen.model.naming import file_stem
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Scalar
 from qlinkgen.plan import Options, plan_of
 
 __all__ = ["generate", "load", "package"]
@@ -63,7 +61,7 @@ def load(protocol: Protocol, options: Options | None = None) -> ModuleType:
 def _tell_units(protocol: Protocol, classes: Mapping[str, type[BaseMessage]]) -> None:
     """Let the rules of each message name the units of its values."""
     for name, each in classes.items():
-        units = {value.name: _unit(value) for value in protocol.by_name[name].values}
+        units = {value.name: value.unit for value in protocol.by_name[name].values}
         each.RULES = tuple(_in_unit(rule, units.get(rule.name, "")) for rule in each.RULES)
 
 
@@ -72,8 +70,3 @@ def _in_unit(rule: Rule, unit: str) -> Rule:
     found = copy.copy(rule)
     found.legal += f" {unit}" if unit else ""
     return found
-
-
-def _unit(value: Value) -> str:
-    kind = value.type.item if isinstance(value.type, Array) else value.type
-    return kind.unit if isinstance(kind, Scalar) else ""

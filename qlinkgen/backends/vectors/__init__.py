@@ -14,14 +14,14 @@ from qlinkgen.backends.vectors import choice, writer
 from qlinkgen.backends.vectors.choice import Chance
 from qlinkgen.backends.vectors.faults import Faults, Good
 from qlinkgen.backends.vectors.writer import Json
-from qlinkgen.model.message import Direction, Value
+from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.model.values import Native, native_from_raw, to_json
 from qlinkgen.plan import MessagePlan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import Raw, pack
+from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
 
 __all__ = ["KINDS", "generate"]
 
@@ -98,27 +98,27 @@ def _shown(good: Good) -> Mapping[str, Json]:
     """Values as a decoder prints them, and the integers on the wire of those that differ from them."""
     fields: dict[str, Json] = {}
     raw: dict[str, Json] = {}
-    for value in good.message.message.values:
+    for value, step in zip(good.message.message.values, good.message.payload.settable, strict=True):
         number = good.values[value.name]
-        shown = fields[value.name] = to_json(value, _native(value, number))
+        shown = fields[value.name] = to_json(value, _native(step, number))
         if isinstance(number, int) and (type(shown) is not int or shown != number):
             raw[value.name] = number
     return {"fields": fields, "raw": raw} if raw else {"fields": fields}
 
 
-def _native(value: Value, raw: Raw) -> Native:
+def _native(step: ValueStep | Member | RunStep, raw: Raw) -> Native:
     """A value on the wire as Python holds it."""
-    match value.type:
-        case Scalar():
+    match step:
+        case ValueStep() | Member():
             assert isinstance(raw, int)
-            return native_from_raw(value.type, raw)
-        case Blob(text=True):
+            return native_from_raw(step.number, raw)
+        case BytesStep(text=True):
             assert isinstance(raw, bytes)
             return raw.decode("ascii")
-        case Blob() | Array():
+        case BytesStep() | ItemsStep():
             return raw
         case _:
-            assert_never(value.type)
+            assert_never(step)
 
 
 def _values(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:
