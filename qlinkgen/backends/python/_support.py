@@ -15,10 +15,15 @@ TYPE_CHECKING = (
 )
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-    from typing import Any, ClassVar, TypeVar
+    from typing import Any, ClassVar, Literal, TypeVar
 
     AnyMessage = TypeVar("AnyMessage", bound="BaseMessage")
 
+    #: What a field may be given, or holds. Any: each rule asks of it what it needs, and the TypeError that
+    #: other values raise is how they are refused.
+    Value = Any
+    #: Class of a message. Any: each has a constructor and rules of its own.
+    MessageClass = type[Any]
     #: Checksum of some bytes, beginning with a register.
     Crc = Callable[[bytes, int], int]
     #: What a decoder takes.
@@ -178,11 +183,11 @@ class Rule:
         self.name = name
         self.legal = legal
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: Value) -> bool:
         """The value can be sent. May raise any of REFUSALS instead."""
         raise NotImplementedError
 
-    def plain(self, value: Any) -> Any:
+    def plain(self, value: Value) -> Value:
         """The value as encoders take it: an int for what only has the value of one."""
         return value
 
@@ -215,12 +220,12 @@ class Whole(Rule):
         )
         super().__init__(name, f"a whole number, {words}{unit and ' '}{unit}")
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: Value) -> bool:
         """The value is an integer (or has the value of one) in range."""
         number = index(value)
         return any(first <= number <= last for first, last in self.ranges)
 
-    def plain(self, value: Any) -> int:
+    def plain(self, value: Value) -> int:
         """An int."""
         return index(value)
 
@@ -234,11 +239,11 @@ class Mask(Rule):
         self.mask = mask
         super().__init__(name, f"bits of {mask:#x} only")
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: Value) -> bool:
         """The value has no other bits."""
         return index(value) & ~self.mask == 0
 
-    def plain(self, value: Any) -> int:
+    def plain(self, value: Value) -> int:
         """An int."""
         return index(value)
 
@@ -282,13 +287,13 @@ class Items(Rule):
             name, f"a list of {_span(fewest, most)} items, each {self.item.legal}"
         )
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: Value) -> bool:
         """The value has so many items, all in range."""
         return self.fewest <= len(value) <= self.most and all(
             self.item.allows(item) for item in value
         )
 
-    def plain(self, value: Any) -> Any:
+    def plain(self, value: Value) -> Value:
         """A list of ints."""
         numbers = [index(item) for item in value]
         same = all(new is old for new, old in zip(numbers, value, strict=True))
@@ -305,7 +310,7 @@ class Octets(Rule):
         self.most = most
         super().__init__(name, f"{_span(fewest, most)} bytes")
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: Value) -> bool:
         """The value is bytes-like and has so many bytes."""
         return self.fewest <= memoryview(value).nbytes <= self.most
 
@@ -319,7 +324,7 @@ class Text(Octets):
         super().__init__(name, fewest, most)
         self.legal = f"text of {_span(fewest, most)} seven-bit characters"
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: Value) -> bool:
         """The value is text and has so many characters."""
         return (
             isinstance(value, str)
@@ -347,12 +352,12 @@ class Scale:
         self.floor = (first - abs(factor)) // divisor
         self.ceiling = -((-last - abs(factor)) // divisor)
 
-    def value(self, raw: int) -> Any:
+    def value(self, raw: int) -> Value:
         """The value that a number on the wire stands for, correctly rounded."""
         value = raw * self.factor + self.bias
         return value if self.divisor == 1 else value / self.divisor
 
-    def raw(self, value: Any) -> int:
+    def raw(self, value: Value) -> int:
         """The nearest step, computed exactly; a tie goes to the even one."""
         # The bounds come first: they keep infinity, NaN and 1E+999999 from being spelt out.
         if not self.floor <= value <= self.ceiling or _too_fine(value):
@@ -369,7 +374,7 @@ class DecimalScale(Scale):
 
     __slots__ = ()
 
-    def value(self, raw: int) -> Any:
+    def value(self, raw: int) -> Value:
         """The value that a number on the wire stands for, exactly."""
         # Only protocols with such values pay for the import.
         from decimal import Context, Decimal
@@ -388,17 +393,17 @@ class Scaled(Rule):
         low, high = sorted((scale.value(scale.low), scale.value(scale.high)))
         super().__init__(name, f"a number, {low}..{high}{unit and ' '}{unit}")
 
-    def allows(self, value: Any) -> bool:
+    def allows(self, value: Value) -> bool:
         """The value has a nearest step, and that is in range."""
         self.scale.raw(self.plain(value))
         return True
 
-    def plain(self, value: Any) -> Any:
+    def plain(self, value: Value) -> Value:
         """A number with an exact ratio."""
         return value if hasattr(value, "as_integer_ratio") else index(value)
 
 
-def _too_fine(value: Any) -> bool:
+def _too_fine(value: Value) -> bool:
     """A Decimal like 1E-999999, whose exact ratio would fill the memory."""
     return hasattr(value, "as_tuple") and bool(value.as_tuple().exponent < -400)
 
@@ -538,7 +543,7 @@ class OpenEnum(int):
     """A named number. Decoding keeps a number without a name as a plain int."""
 
     #: Members by number.
-    members: ClassVar[dict[int, Any]]
+    members: ClassVar[dict[int, OpenEnum]]
 
     def __init_subclass__(cls) -> None:
         """Turn the numbers in the class body into members."""
@@ -570,6 +575,7 @@ class OpenEnum(int):
 
 def named(number: int) -> Any:
     """A number in the body of an OpenEnum: the class makes a member of it."""
+    # Any: what it becomes is annotated where it stands.
     return number
 
 
@@ -688,8 +694,8 @@ class Command:
         self,
         name: str,
         id: int,
-        request: type[Any],
-        response: type[Any] | None,
+        request: MessageClass,
+        response: MessageClass | None,
         *,
         addressing: str = "none",
         response_byte_times: float = 0,
@@ -817,7 +823,7 @@ class Checksum:
         self.compute = compute
         self.start = start
 
-    def verifier(self, size: int, order: Any = "big") -> Crc:
+    def verifier(self, size: int, order: Literal["big", "little"] = "big") -> Crc:
         """A function over data and its checksum (its last bytes) that gives 0 where the checksum is right."""
         compute = self.compute
         if compute is crc_hqx and order == "big":
