@@ -94,21 +94,18 @@ class Header:
         )
 
     def _frame_part(self, template: str) -> str:
-        section, names = self._section, self._names
-        more: dict[str, object] = {}
-        match template:
-            case "place":
-                more["wide"] = any(map(framing.is_wide, self._kept))
-            case "seal":
-                more["address_groups"] = self._address_groups()
-            case "marked":
-                more["shapes"] = section.shapes(names)
-            case "packet":
-                more["sizes"] = section.sizes(names)
-            case "receiver_rescan":
-                more["judgement"] = section.judgement
+        section = self._section
         return self._place(
-            template, f=section.view, crc=section.check, unused=self._unheard(), **section.views, **more
+            template,
+            f=section.view,
+            crc=section.check,
+            unused=self._unheard(),
+            wide=any(map(framing.is_wide, self._kept)),
+            address_groups=self._address_groups(),
+            shapes=section.shapes(self._names),
+            sizes=section.sizes(self._names),
+            judgement=section.judgement,
+            **section.views,
         )
 
     def _address_groups(self) -> list[framing.AddressGroup]:
