@@ -63,6 +63,27 @@ class Imports:
     typing: Sequence[str]
 
 
+@dataclass(frozen=True, kw_only=True)
+class ModuleView:
+    """What the templates of a module place, each by its name; `f` is its frame."""
+
+    f: FrameView
+    heard: Sequence[frames.Heard]
+    direction_type: str
+    direction_default: str
+    stream_decoder: Sequence[str]
+    doc: Sequence[str]
+    enums: Sequence[tables.ConstantsModel]
+    flags: Sequence[tables.ConstantsModel]
+    messages: Sequence[MessageRow]
+    bus: Sequence[str]
+    commands: Sequence[Sequence[str]]
+    scales: Sequence[str]
+    classes: str
+    public: Sequence[str]
+    imports: Imports
+
+
 class Module:
     """Collects what the templates place."""
 
@@ -79,31 +100,26 @@ class Module:
         view = frames.view_of(plan, one_line(plan.protocol.title), sizes)
         heard = frames.heard(plan)
         quoted = [f'"{each.direction}"' for each in heard]
-        context: dict[str, object] = {
-            "f": view,
-            "heard": heard,
-            "direction_type": f"Literal[{', '.join(quoted)}]",
-            "direction_default": f" = {quoted[0]}" if len(quoted) == 1 else "",
-            "stream_decoder": _stream_decoder(quoted),
-            "doc": self._doc(),
-            "enums": [tables.enum_model(each, self.place.classes[each.name]) for each in plan.enums],
-            "flags": [tables.flags_model(each, self.place.classes[each.name]) for each in plan.flags],
-            "messages": [MessageRow(each.name, class_name(each)) for each in plan.messages],
-            "bus": tables.bus(plan.protocol.bus),
-            "commands": tables.command_rows(plan),
-            "scales": self.builder.scales,
-            "classes": self._classes(models, view),
-            "public": self._public(view, heard),
-            "imports": self._imports(view, models),
-        }
-        context |= {
-            "frame": self._place(f"{view.template}.j2", context).strip(),
-            "decoder": self._place(f"{view.template}_decoder.j2", context).strip(),
-        }
-        return _tidy(self._place("module.j2", context))
-
-    def _place(self, template: str, context: dict[str, object]) -> str:
-        return templates().get_template(f"templates/{template}").render(context)
+        module = ModuleView(
+            f=view,
+            heard=heard,
+            direction_type=f"Literal[{', '.join(quoted)}]",
+            direction_default=f" = {quoted[0]}" if len(quoted) == 1 else "",
+            stream_decoder=_stream_decoder(quoted),
+            doc=self._doc(),
+            enums=[tables.enum_model(each, self.place.classes[each.name]) for each in plan.enums],
+            flags=[tables.flags_model(each, self.place.classes[each.name]) for each in plan.flags],
+            messages=[MessageRow(each.name, class_name(each)) for each in plan.messages],
+            bus=tables.bus(plan.protocol.bus),
+            commands=tables.command_rows(plan),
+            scales=self.builder.scales,
+            classes=self._classes(models, view),
+            public=self._public(view, heard),
+            imports=self._imports(view, models),
+        )
+        frame = _placed(f"{view.template}.j2", module).strip()
+        decoder = _placed(f"{view.template}_decoder.j2", module).strip()
+        return _tidy(_placed("module.j2", module, frame=frame, decoder=decoder))
 
     def _doc(self) -> list[str]:
         protocol = self.plan.protocol
@@ -209,3 +225,8 @@ def _tidy(text: str) -> str:
     """Without blanks at line ends, and never more than two empty lines in a row."""
     text = re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
     return re.sub(r"\n{4,}", "\n\n\n", text).rstrip("\n") + "\n"
+
+
+def _placed(template: str, module: ModuleView, **parts: str) -> str:
+    """A template filled in; ``parts`` are texts made of other ones."""
+    return templates().get_template(f"templates/{template}").render(vars(module), **parts)
