@@ -104,6 +104,20 @@ class Transaction:
         return method(self.command.name)
 
 
+@dataclass(frozen=True, kw_only=True)
+class BusView:
+    """What the template places, each by its name."""
+
+    doc: Sequence[str]
+    table: Sequence[str]
+    imports: Sequence[str]
+    decimals: bool
+    public: Sequence[str]
+    callers: Sequence[Caller]
+    handlers: Sequence[Method]
+    nodes: str
+
+
 class BusModule:
     """Collects what the template places."""
 
@@ -126,23 +140,23 @@ class BusModule:
         first, *others = banner(self._protocol)
         head = one_line(f"{first}: {title}, a method for each command.")
         lines = [line for other in others for line in textwrap.wrap(one_line(other), WIDTH)]
-        context = {
-            "doc": python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines]),
-            "table": [f'{self._class(t.request)}: "{t.name}"' for t in self._transactions],
-            "imports": wrapped(
+        view = BusView(
+            doc=python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines]),
+            table=[f'{self._class(t.request)}: "{t.name}"' for t in self._transactions],
+            imports=wrapped(
                 f"from .{file_stem(self._protocol.name)} import (",
                 sorted(self._classes, key=imported),
                 ")",
                 0,
             ),
-            "decimals": "Decimal" in self._place.used,
-            "public": sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),
-            "callers": callers,
-            "handlers": handlers,
-            "nodes": f", {self._nodes()}" if self._nodes() else "",
-        }
+            decimals="Decimal" in self._place.used,
+            public=sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),
+            callers=callers,
+            handlers=handlers,
+            nodes=f", {self._nodes()}" if self._nodes() else "",
+        )
         template = templates().get_template("templates/bus.j2")
-        return template.render(context).rstrip("\n") + "\n"
+        return template.render(vars(view)).rstrip("\n") + "\n"
 
     def _class(self, message: MessagePlan) -> str:
         """The class of a message, which the module has to import."""
