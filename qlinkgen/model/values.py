@@ -13,11 +13,13 @@ import re
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
+from typing import TypeAlias
 
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
 
+#: A value as JSON has it; numbers with a point are read as Decimal.
+Json: TypeAlias = "str | int | float | Decimal | Sequence[Json] | Mapping[str, Json] | None"
 Native = int | bool | float | Decimal | bytes | str | list[int]
 
 
@@ -63,7 +65,7 @@ def raw_from_native(value: Value, native: Native) -> int:
     return raw
 
 
-def to_json(value: Value, native: Native) -> Any:
+def to_json(value: Value, native: Native) -> str | int | float | Decimal | list[int]:
     """A native value for JSON; a Decimal stays one, so that the writer can print all its digits."""
     kind = value.type
     if isinstance(kind, Blob):
@@ -75,10 +77,14 @@ def to_json(value: Value, native: Native) -> Any:
     if isinstance(kind.meaning, Enum):
         assert isinstance(native, int)
         return kind.meaning.name_of(native) or int(native)
-    return int(native) if isinstance(kind.meaning, Flags) else native  # type: ignore[arg-type]
+    if isinstance(kind.meaning, Flags):
+        assert not isinstance(native, list)
+        return int(native)  # that of construct is a class of its own
+    assert not isinstance(native, bytes)
+    return native
 
 
-def from_json(value: Value, given: Any) -> Native:
+def from_json(value: Value, given: Json) -> Native:
     """A JSON value (or text of a command line) as the native one.
 
     Accepts what :func:`to_json` gives, and enum numbers, flag names as a list, numbers in text (0x and 0b
@@ -128,7 +134,7 @@ def whole_number(text: str) -> int | None:
     return -number if text.startswith("-") else number
 
 
-def _shown(given: Any) -> str:
+def _shown(given: Json) -> str:
     """What was given, as JSON has it."""
     if isinstance(given, str):
         return f"'{given}'"
@@ -141,7 +147,7 @@ def _shown(given: Any) -> str:
     return given.hex() if isinstance(given, bytes) else json.dumps(given)
 
 
-def _blob(name: str, kind: Blob, given: Any) -> bytes | str:
+def _blob(name: str, kind: Blob, given: Json) -> bytes | str:
     if not isinstance(given, str):
         fix = "the characters" if kind.text else "hex digits"
         raise BadValue(f"{name}: {_shown(given)} is not text; write {fix}")
@@ -153,7 +159,7 @@ def _blob(name: str, kind: Blob, given: Any) -> bytes | str:
         raise BadValue(f"{name}: '{given}' is not a byte string; write pairs of hex digits") from None
 
 
-def _listed(name: str, given: Any) -> Sequence[Any]:
+def _listed(name: str, given: Json) -> Sequence[Json]:
     if isinstance(given, str):
         return _split(name, given)
     if isinstance(given, Sequence):
@@ -175,14 +181,14 @@ def _split(name: str, given: str) -> list[str]:
     return [item[1:-1] if len(item) > 1 and item[0] == item[-1] == '"' else item for item in items]
 
 
-def _whole(name: str, given: Any) -> int:
+def _whole(name: str, given: Json) -> int:
     number = whole_number(given) if isinstance(given, str) else given
     if isinstance(number, bool) or not isinstance(number, int):
         raise BadValue(f"{name}: {_shown(given)} is not a whole number")
     return number
 
 
-def _number(name: str, given: Any, *, exact: bool) -> int | float | Decimal:
+def _number(name: str, given: Json, *, exact: bool) -> int | float | Decimal:
     number = given
     if isinstance(given, str):
         whole = whole_number(given)
@@ -194,25 +200,24 @@ def _number(name: str, given: Any, *, exact: bool) -> int | float | Decimal:
     return float(number) if isinstance(number, Decimal) and not exact else number
 
 
-def _bool(name: str, given: Any) -> bool:
-    known: Mapping[Any, bool] = {"true": True, "false": False, "1": True, "0": False, 1: True, 0: False}
+def _bool(name: str, given: Json) -> bool:
+    known: Mapping[str | int, bool] = {"true": True, "false": False, "1": True, "0": False, 1: True, 0: False}
     key = given.lower() if isinstance(given, str) else given
     if isinstance(key, str | int) and key in known:
         return known[key]
     raise BadValue(f"{name}: {_shown(given)} is neither true nor false")
 
 
-def _named_or_number(name: str, given: Any, names: Mapping[str, int]) -> int:
+def _named_or_number(name: str, given: Json, names: Mapping[str, int]) -> int:
     number = whole_number(given) if isinstance(given, str) else given
     if isinstance(number, bool) or not isinstance(number, int):
         raise BadValue(f"{name}: {_shown(given)} is unknown; one of {', '.join(names)}, or a number")
     return number
 
 
-def _flags(name: str, flags: Flags, given: Any) -> int:
+def _flags(name: str, flags: Flags, given: Json) -> int:
     bits = {member.name: 1 << member.value for member in flags.members}
     total = 0
     for item in _listed(name, given.replace("|", ",") if isinstance(given, str) else given):
-        known = isinstance(item, str) and item in bits
-        total |= bits[item] if known else _named_or_number(name, item, bits)
+        total |= bits[item] if isinstance(item, str) and item in bits else _named_or_number(name, item, bits)
     return total
