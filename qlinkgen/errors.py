@@ -28,7 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal, TypedDict, Unpack
 
 __all__ = [
     "BadReply",
@@ -153,6 +153,15 @@ class DecodeError(CodecError):
     """These bytes are not what the description allows."""
 
 
+class Particulars(TypedDict, total=False):
+    """What a LinkError may be given beside its text; see there."""
+
+    node: int | None
+    attempts: int
+    elapsed: float
+    received: bytes
+
+
 class LinkError(QlinkgenError):
     """A transaction failed on the wire. The port is in order and the bus can be used again.
 
@@ -202,7 +211,7 @@ class CommandError(LinkError):
         status: the status word that says so.
     """
 
-    def __init__(self, message: str, *, status: int = 0, **particulars: Any) -> None:
+    def __init__(self, message: str, *, status: int = 0, **particulars: Unpack[Particulars]) -> None:
         super().__init__(message, **particulars)
         self.status = status
 
@@ -219,7 +228,9 @@ class LoadError(LinkError):
         total: bytes of the program's text.
     """
 
-    def __init__(self, message: str, *, acknowledged: int = 0, total: int = 0, **particulars: Any) -> None:
+    def __init__(
+        self, message: str, *, acknowledged: int = 0, total: int = 0, **particulars: Unpack[Particulars]
+    ) -> None:
         super().__init__(message, **particulars)
         self.acknowledged = acknowledged
         self.total = total

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import ModuleType
-from typing import Any
+from typing import Protocol as Shape
 
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import did_you_mean
+from qlinkgen.link import codec as link
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import address_attribute, attribute
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import BadValue, check_items, from_json, to_json
+from qlinkgen.model.values import BadValue, Json, check_items, from_json, to_json
+
+
+class MessageObject(link.Message, Shape):
+    """A message of a generated module of any kind of protocol."""
+
+    @property
+    def to_frame(self) -> Callable[..., bytes]:
+        """Function that returns the whole frame; that of a packet's answer takes the request."""
+        ...
 
 
 def load_codec(protocol: Protocol) -> ModuleType:
@@ -21,7 +31,9 @@ def load_codec(protocol: Protocol) -> ModuleType:
     return load(protocol)
 
 
-def build(codec: ModuleType, message: Message, given: Mapping[str, Any], address: Mapping[str, int]) -> Any:
+def build(
+    codec: ModuleType, message: Message, given: Mapping[str, Json], address: Mapping[str, int]
+) -> MessageObject:
     """A message object from values as JSON or a command line has them."""
     values = {value.name: value for value in message.values}
     for name in given:
@@ -37,15 +49,16 @@ def build(codec: ModuleType, message: Message, given: Mapping[str, Any], address
     except BadValue as error:
         raise Failure(f"{message.name}: {error}") from None
     try:
-        return codec.MESSAGES[message.name](
+        built: MessageObject = codec.MESSAGES[message.name](
             **{address_attribute(name): number for name, number in address.items()},
             **{attribute(name): native for name, native in natives.items()},
         )
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
+    return built
 
 
-def fields(message: Message, found: Any) -> dict[str, Any]:
+def fields(message: Message, found: link.Message) -> dict[str, Json]:
     """The values of a message object, for JSON."""
     return {value.name: to_json(value, getattr(found, attribute(value.name))) for value in message.values}
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
+from qlinkgen.cli.codec import MessageObject
 from qlinkgen.cli.streams import Bad, Event, OneWay
+from qlinkgen.link.codec import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.sizes import max_frame_size
 
@@ -25,6 +26,10 @@ class OutOfRange:
         return self.payload
 
 
+#: What an answer belongs to.
+Asked = Message | OutOfRange
+
+
 class Conversation:
     """Both sides on one line: behind a request, a response if its check value fits, else the next request.
 
@@ -38,7 +43,7 @@ class Conversation:
         self._requests = OneWay(codec, "request")
         self._names = {message.id: message.name for message in protocol.received("request")}
         self._offset = 0
-        self._asked: Any = None
+        self._asked: Asked | None = None
         self._waiting = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Event]:
@@ -82,7 +87,7 @@ class Conversation:
             return None
         return OutOfRange(self._names[bad.raw[0]], bad.raw[0], bad.raw[1:])
 
-    def _is_answer(self, found: Event, asked: Any) -> bool:
+    def _is_answer(self, found: Event, asked: Asked) -> bool:
         """A check value fits, or nothing else can be meant.
 
         That is an answer saying that the command is unknown, and whatever follows a request that the device
@@ -96,7 +101,7 @@ class Conversation:
 class Answers:
     """Responses to one and the same request, one after the other."""
 
-    def __init__(self, protocol: Protocol, codec: ModuleType, asked: Any) -> None:
+    def __init__(self, protocol: Protocol, codec: ModuleType, asked: Asked) -> None:
         """Every response answers ``asked``."""
         self._size = answer_size(protocol, asked)
         self._codec, self._asked = codec, asked
@@ -119,15 +124,16 @@ class Answers:
             yield Bad("truncated", self._offset, bytes(self._waiting), text)
 
 
-def answer_size(protocol: Protocol, asked: Any) -> int:
+def answer_size(protocol: Protocol, asked: Asked) -> int:
     """Bytes of the response to a request object, check value included; 0 if nothing answers."""
     command = protocol.command_of(protocol.by_name[asked.NAME])
     return max_frame_size(protocol.frame, command.response) if command and command.response else 0
 
 
-def decode_answer(codec: ModuleType, raw: bytes, asked: Any, offset: int) -> Event:
+def decode_answer(codec: ModuleType, raw: bytes, asked: Asked, offset: int) -> Event:
     """The response in these bytes, or what is wrong with them."""
     try:
-        return codec.decode_response(raw, asked)
+        answer: MessageObject = codec.decode_response(raw, asked)
     except codec.DecodeError as error:
         return Bad(error.kind, offset, raw, str(error))
+    return answer

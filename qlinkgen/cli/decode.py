@@ -7,7 +7,8 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from io import BufferedReader
 from itertools import chain
-from typing import Any, cast
+from types import ModuleType
+from typing import cast
 
 import click
 
@@ -19,9 +20,11 @@ from qlinkgen.cli.conversations import Answers, Conversation
 from qlinkgen.cli.encode import asked
 from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
+from qlinkgen.link.codec import Fault, Message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_attribute, record_key
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import Json
 from qlinkgen.plan.framing import frame_plan
 
 CHUNK = 65536
@@ -74,7 +77,9 @@ def command(  # noqa: PLR0917  # click passes them by name
     return printer.result()
 
 
-def _stream(protocol: Protocol, codec: Any, direction: Direction | None, request: str | None) -> Stream:
+def _stream(
+    protocol: Protocol, codec: ModuleType, direction: Direction | None, request: str | None
+) -> Stream:
     if direction and direction not in protocol.directions:
         raise Failure(
             f"{protocol.name} has neither requests nor responses; leave out --direction {direction}"
@@ -144,7 +149,7 @@ class _Printer:
             warn(f"{seen}; `qlinkgen explain {self._protocol.name} HEX` looks for the reason")
         return FINE if self._good and not self._bad else WRONG
 
-    def _record(self, event: Event) -> Mapping[str, Any]:
+    def _record(self, event: Event) -> Mapping[str, Json]:
         if isinstance(event, Bad):
             self._bad += 1
             return error_record(event)
@@ -155,10 +160,10 @@ class _Printer:
         return message_record(self._protocol, event)
 
 
-def message_record(protocol: Protocol, found: Any) -> dict[str, Any]:
+def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
     """A message as decode prints it."""
     message = protocol.by_name[found.NAME]
-    record: dict[str, Any] = {"message": message.name}
+    record: dict[str, Json] = {"message": message.name}
     name = protocol.address_name
     if name and message.addresses:
         record[record_key(name)] = getattr(found, address_attribute(name))
@@ -166,6 +171,6 @@ def message_record(protocol: Protocol, found: Any) -> dict[str, Any]:
     return record
 
 
-def error_record(bad: Bad) -> dict[str, Any]:
+def error_record(bad: Fault) -> dict[str, Json]:
     """A bad frame as decode prints it."""
     return {"error": {"kind": bad.kind, "offset": bad.offset, "raw": bad.raw.hex(), "message": bad.message}}

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 import click
 
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import Failure
-from qlinkgen.cli.codec import build, load_codec
+from qlinkgen.cli.codec import MessageObject, build, load_codec
 from qlinkgen.cli.common import (
     addressed,
     crc_option,
@@ -24,7 +23,7 @@ from qlinkgen.cli.describe import addresses_text
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import whole_number
+from qlinkgen.model.values import Json, whole_number
 from qlinkgen.plan.framing import frame_plan
 
 address_option = click.option(
@@ -90,7 +89,7 @@ def compose(
     object_: str | None,
     *,
     codec: ModuleType | None = None,
-) -> tuple[ModuleType, Message, Any]:
+) -> tuple[ModuleType, Message, MessageObject]:
     """The codec, the message that a command line means, and the object with its values.
 
     The codec is made of the protocol unless one is given.
@@ -110,12 +109,12 @@ def compose(
 class _Record:
     """What --json says: fields alone, or the whole object that decode prints."""
 
-    fields: Mapping[str, Any]
+    fields: Mapping[str, Json]
     message: str | None = None
     address: str | None = None
 
 
-def _record(protocol: Protocol, given: Mapping[str, Any]) -> _Record:
+def _record(protocol: Protocol, given: Mapping[str, Json]) -> _Record:
     known = {"message", "fields", "node", "address", record_key(protocol.address_name or "")}
     message, fields = given.get("message"), given.get("fields")
     if not (isinstance(message, str) and isinstance(fields, Mapping) and set(given) <= known):
@@ -195,24 +194,29 @@ def _only_address(message: Message, name: str) -> int:
     return first
 
 
-def _frame(protocol: Protocol, codec: Any, message: Message, built: Any, request: str | None) -> bytes:
+def _frame(
+    protocol: Protocol, codec: ModuleType, message: Message, built: MessageObject, request: str | None
+) -> bytes:
     answer = frame_plan(protocol.frame).needs_request and message.direction == "response"
     if not answer:
         if request is not None:
             raise Failure(f"{message.name} does not depend on a request; leave out --request")
-        return bytes(built.to_frame())
-    return bytes(built.to_frame(asked(protocol, codec, request, message)))
+        return built.to_frame()
+    return built.to_frame(asked(protocol, codec, request, message))
 
 
-def asked(protocol: Protocol, codec: Any, request: str | None, answer: Message | None = None) -> Any:
+def asked(
+    protocol: Protocol, codec: ModuleType, request: str | None, answer: Message | None = None
+) -> MessageObject:
     """The request object behind ``--request``; without one, a request that has no fields to choose."""
     if request is None:
         command = protocol.command_of(answer) if answer else None
         if command is None or command.request.fields:
             raise Failure("the check value of a response covers its request too; give it with --request HEX")
-        return codec.MESSAGES[command.request.name]()
+        default: MessageObject = codec.MESSAGES[command.request.name]()
+        return default
     try:
-        found = codec.decode_request(parse_hex(request, "--request"))
+        found: MessageObject = codec.decode_request(parse_hex(request, "--request"))
     except codec.DecodeError as error:
         raise Failure(f"--request {request}: {error}") from None
     if answer is not None and answer.id != found.ID:

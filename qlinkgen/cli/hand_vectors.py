@@ -2,21 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Literal, NotRequired, TypedDict
 
 import yaml
 
 from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
-from qlinkgen.cli.codec import build, load_codec
+from qlinkgen.cli.codec import MessageObject, build, load_codec
 from qlinkgen.cli.common import find_message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import Json
 
+_ADDRESSES: tuple[Literal["node"], Literal["address"]] = ("node", "address")
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Given(TypedDict):
+    message: str
+    wire: str  # hex, like all bytes here
+    request: NotRequired[str]
+
+
+class Vector(_Given):
+    """A message and its bytes."""
+
+    fields: dict[str, Json]
+    payload: str
+    node: NotRequired[int]
+    address: NotRequired[int]
+    decode_only: NotRequired[bool]
+
+
+class BadVector(_Given):
+    """Bytes that are refused."""
+
+    kind: str
+
+
+class Vectors(TypedDict, total=False):
+    """A file of vectors."""
+
+    vectors: list[Vector]
+    faults: list[BadVector]
 
 
 def file_of(protocol: Protocol) -> Path:
@@ -24,9 +56,9 @@ def file_of(protocol: Protocol) -> Path:
     return schemas_dir() / "vectors" / f"{protocol.name}.yaml"
 
 
-def read(protocol: Protocol) -> Mapping[str, Any]:
+def read(protocol: Protocol) -> Vectors:
     """The vectors of a shipped protocol."""
-    found: Mapping[str, Any] = yaml.load(file_of(protocol).read_text("utf-8"), _Loader)
+    found: Vectors = yaml.load(file_of(protocol).read_text("utf-8"), _Loader)
     return found
 
 
@@ -43,16 +75,20 @@ def _misfits(protocol: Protocol) -> Iterator[tuple[int, str]]:
     codec = load_codec(protocol)
     lines = _lines(yaml.compose(file_of(protocol).read_text("utf-8"), _Loader))
     found = read(protocol)
-    for kind, misfit in (("vectors", _misfit), ("faults", _fault_misfit)):
-        for line, row in zip(lines.get(kind, ()), found.get(kind, ()), strict=True):
-            try:
-                why = misfit(protocol, codec, row)
-            except Failure as error:
-                why = error.text
-            except codec.CodecError as error:
-                why = str(error)
-            if why:
-                yield line, why
+    checks = [
+        *(partial(_misfit, protocol, codec, row) for row in found.get("vectors", ())),
+        *(partial(_fault_misfit, protocol, codec, row) for row in found.get("faults", ())),
+    ]
+    places = (*lines.get("vectors", ()), *lines.get("faults", ()))
+    for line, check in zip(places, checks, strict=True):
+        try:
+            why = check()
+        except Failure as error:
+            why = error.text
+        except codec.CodecError as error:
+            why = str(error)
+        if why:
+            yield line, why
 
 
 def _lines(document: yaml.Node | None) -> dict[str, list[int]]:
@@ -65,14 +101,16 @@ def _lines(document: yaml.Node | None) -> dict[str, list[int]]:
     }
 
 
-def _misfit(protocol: Protocol, codec: ModuleType, row: Mapping[str, Any]) -> str:
+def _misfit(protocol: Protocol, codec: ModuleType, row: Vector) -> str:
     """Why a vector does not fit, "" if it does."""
     message = find_message(protocol, row["message"])
     name = protocol.address_name
     key = record_key(name) if name else ""
-    if wrong := [each for each in ("node", "address") if each in row and each != key]:
+    addresses: dict[str, int] = {each: row[each] for each in _ADDRESSES if each in row}
+    if wrong := [each for each in addresses if each != key]:
         return f"frames have no {wrong[0]}"
-    built = build(codec, message, row["fields"], {name: row[key]} if name and key in row else {})
+    given = {name: addresses[key]} if name and key in addresses else {}
+    built = build(codec, message, row["fields"], given)
     request = [codec.decode_request(bytes.fromhex(row["request"]))] if "request" in row else []
     payload, wire = bytes.fromhex(row["payload"]), bytes.fromhex(row["wire"])
     if row.get("decode_only"):
@@ -87,7 +125,7 @@ def _misfit(protocol: Protocol, codec: ModuleType, row: Mapping[str, Any]) -> st
     return ""
 
 
-def _fault_misfit(protocol: Protocol, codec: ModuleType, row: Mapping[str, Any]) -> str:
+def _fault_misfit(protocol: Protocol, codec: ModuleType, row: BadVector) -> str:
     message = find_message(protocol, row["message"])
     request = [codec.decode_request(bytes.fromhex(row["request"]))] if "request" in row else []
     try:
@@ -97,6 +135,7 @@ def _fault_misfit(protocol: Protocol, codec: ModuleType, row: Mapping[str, Any])
     return "it is a right frame now"
 
 
-def _decode(codec: ModuleType, direction: str, wire: bytes, request: list[Any]) -> Any:
+def _decode(codec: ModuleType, direction: str, wire: bytes, request: list[MessageObject]) -> MessageObject:
     suffix = "" if direction == "message" else f"_{direction}"
-    return getattr(codec, f"decode{suffix}")(wire, *request)
+    found: MessageObject = getattr(codec, f"decode{suffix}")(wire, *request)
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import assert_never
 
 import click
 
@@ -13,11 +13,11 @@ from qlinkgen.cli import jsonlines
 from qlinkgen.cli.codec import fields
 from qlinkgen.cli.common import on_terminal
 from qlinkgen.cli.decode import error_record, message_record
-from qlinkgen.cli.streams import Bad
-from qlinkgen.link.codec import address_of
+from qlinkgen.link.codec import Message, address_of
 from qlinkgen.link.events import Damaged, Stray
 from qlinkgen.link.monitor import Asked, Heard, Replied, Unanswered
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import Json
 
 MASTER = "master"
 EVERYBODY = "all"
@@ -38,7 +38,7 @@ class Telling:
         wrong: there is something to look at.
     """
 
-    record: Mapping[str, Any]
+    record: Mapping[str, Json]
     who: str
     what: str
     values: str = ""
@@ -79,13 +79,19 @@ class Teller:
 
     def tell(self, heard: Heard) -> Telling:
         """Put one thing into words."""
-        if isinstance(heard, Asked):
-            return self._asked(heard)
-        if isinstance(heard, Replied):
-            return self._replied(heard)
-        if isinstance(heard, Unanswered):
-            return self._unanswered(heard)
-        return self._stray(heard) if isinstance(heard, Stray) else self._damaged(heard)
+        match heard:
+            case Asked():
+                return self._asked(heard)
+            case Replied():
+                return self._replied(heard)
+            case Unanswered():
+                return self._unanswered(heard)
+            case Stray():
+                return self._stray(heard)
+            case Damaged():
+                return self._damaged(heard)
+            case _:
+                assert_never(heard)
 
     def seconds(self, at: float) -> float:
         """Seconds since the start."""
@@ -93,13 +99,16 @@ class Teller:
 
     def _asked(self, heard: Asked) -> Telling:
         whom = address_of(heard.request)
-        record = {**self._head(heard.at, MASTER, self._whom(whom)), **self._message(heard.request)}
+        record: dict[str, Json] = {
+            **self._head(heard.at, MASTER, self._whom(whom)),
+            **self._message(heard.request),
+        }
         record["repeat"] = heard.repeat
         remarks = ["repeat"] if heard.repeat else []
         return self._told(record, heard.request, heard.frame, remarks, wrong=heard.repeat)
 
     def _replied(self, heard: Replied) -> Telling:
-        record = {
+        record: dict[str, Json] = {
             **self._head(heard.at, address_of(heard.response), MASTER),
             **self._message(heard.response),
             "delay": round(heard.delay, 6),
@@ -112,7 +121,7 @@ class Teller:
     def _stray(self, heard: Stray) -> Telling:
         direction = self._protocol.by_name[heard.message.NAME].direction
         speaker: int | str | None = address_of(heard.message) if direction == "response" else None
-        record = {
+        record: dict[str, Json] = {
             **self._head(heard.at, speaker, MASTER if direction == "response" else None),
             **self._message(heard.message),
             "stray": True,
@@ -125,28 +134,28 @@ class Teller:
 
     def _unanswered(self, heard: Unanswered) -> Telling:
         node = address_of(heard.request)
-        record = {"at": self.seconds(heard.at), "unanswered": self._message(heard.request)}
+        record: dict[str, Json] = {"at": self.seconds(heard.at), "unanswered": self._message(heard.request)}
         return Telling(
             record, f"{_name(node)} silent", heard.request.NAME, remarks=["not answered"], wrong=True
         )
 
     def _damaged(self, heard: Damaged) -> Telling:
-        fault: Bad = heard.fault
-        record = {"at": self.seconds(heard.at), "asked": heard.node, **error_record(fault)}
+        fault = heard.fault
+        record: dict[str, Json] = {"at": self.seconds(heard.at), "asked": heard.node, **error_record(fault)}
         text = f"{fault.message}: {fault.raw.hex(' ')}"
         return Telling(record, "?", f"damaged ({fault.kind})", text, wrong=True)
 
-    def _head(self, at: float, speaker: int | str | None, whom: int | str | None) -> dict[str, Any]:
+    def _head(self, at: float, speaker: int | str | None, whom: int | str | None) -> dict[str, Json]:
         return {"at": self.seconds(at), "from": speaker, "to": whom}
 
     def _whom(self, address: int | None) -> int | str | None:
         return EVERYBODY if address is not None and address == self._broadcast else address
 
-    def _message(self, message: Any) -> dict[str, Any]:
+    def _message(self, message: Message) -> dict[str, Json]:
         return message_record(self._protocol, message)
 
     def _told(
-        self, record: dict[str, Any], message: Any, frame: bytes, remarks: list[str], *, wrong: bool
+        self, record: dict[str, Json], message: Message, frame: bytes, remarks: list[str], *, wrong: bool
     ) -> Telling:
         if self._raw:
             record["raw"] = frame.hex()
@@ -156,19 +165,20 @@ class Teller:
         return Telling(record, who, message.NAME, text, remarks, wrong)
 
 
-def _name(who: int | str | None) -> str:
+def _name(who: Json) -> str:
     return "?" if who is None else who if isinstance(who, str) else f"node {who}"
 
 
-def values_text(protocol: Protocol, message: Any) -> str:
+def values_text(protocol: Protocol, message: Message) -> str:
     """The fields of a message as text."""
     values = fields(protocol.by_name[message.NAME], message)
     return " ".join(f"{name}={_shown(value)}" for name, value in values.items())
 
 
-def _shown(value: Any) -> str:
+def _shown(value: Json) -> str:
     if isinstance(value, list):
         return ",".join(map(str, value)) or "none"
     # A text with a blank has to be told from the next field; one with control characters would act.
-    plain = isinstance(value, str) and value.isprintable() and " " not in value
-    return value if plain and value else jsonlines.line(value)
+    if value and isinstance(value, str) and value.isprintable() and " " not in value:
+        return value
+    return jsonlines.line(value)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from decimal import Decimal
-from typing import Any
 
 from qlinkgen.cli.boundary import Failure
+from qlinkgen.model.values import Json
 
 
-def line(found: Any) -> str:
+def line(found: Json) -> str:
     """An object on one line; a Decimal becomes a number with all its digits."""
     try:
         return json.dumps(found)
@@ -18,7 +18,7 @@ def line(found: Any) -> str:
         return _exact(found)
 
 
-def _exact(found: Any) -> str:
+def _exact(found: Json) -> str:
     if isinstance(found, Mapping):
         return (
             "{" + ", ".join(f"{json.dumps(str(name))}: {_exact(each)}" for name, each in found.items()) + "}"
@@ -30,7 +30,7 @@ def _exact(found: Any) -> str:
     return json.dumps(found)
 
 
-def parse_object(text: str, what: str) -> dict[str, Any]:
+def parse_object(text: str, what: str) -> dict[str, Json]:
     """The object that a text holds."""
     try:
         found = json.loads(
@@ -51,7 +51,7 @@ def _refuse_constant(name: str) -> None:
     raise ValueError(f"{name} is no number that can be sent")
 
 
-def _refuse_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _refuse_doubles(pairs: list[tuple[str, Json]]) -> dict[str, Json]:
     found = dict(pairs)
     if len(found) != len(pairs):
         names = [name for name, _ in pairs]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from decimal import Decimal
-from typing import Any
 
 from qlinkgen.backends import conformance, vectors
 from qlinkgen.backends.base import Options, Outputs
@@ -22,7 +20,7 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     return conformance.generate(protocol, options, sources)
 
 
-def by_hand(protocol: Protocol) -> Mapping[str, Any]:
+def by_hand(protocol: Protocol) -> hand_vectors.Vectors:
     """The vectors that people worked out for a shipped protocol.
 
     There are none for another schema that uses its name, or where another checksum was set: their bytes are

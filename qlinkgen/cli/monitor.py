@@ -12,6 +12,7 @@ from qlinkgen.cli.common import crc_option, load_protocol
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, check_options, kind_of
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import (
+    Parity,
     baud_option,
     line_of,
     matching,
@@ -49,7 +50,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     length: float | None,
     baud: int | None,
     slack: float | None,
-    parity: str,
+    parity: Parity,
     stop_bits: str,
     crc: str | None,
 ) -> None:

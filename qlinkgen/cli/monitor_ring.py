@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import ModuleType
-from typing import Any
 
 import click
 
 from qlinkgen.cli.ring_hearing import RingPrinter, RingTeller
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import counted
+from qlinkgen.link.codec import Fault, Framed, is_message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.transport.port import Port
 
@@ -40,9 +41,8 @@ def monitor_ring(
 class _Session:
     """Feeds a decoder from a port, and prints what it finds."""
 
-    def __init__(self, codec: Any, teller: RingTeller, printer: RingPrinter) -> None:
+    def __init__(self, codec: ModuleType, teller: RingTeller, printer: RingPrinter) -> None:
         self._decoder = codec.StreamDecoder()
-        self._fault: type[Any] = codec.Fault
         self._teller = teller
         self._printer = printer
         self._bytes = 0
@@ -55,12 +55,12 @@ class _Session:
             self._print(self._decoder.feed(data), port.now())
         self._print(self._decoder.finish(), port.now())
 
-    def _print(self, found: list[Any], now: float) -> None:
+    def _print(self, found: Sequence[Framed | Fault], now: float) -> None:
         for each in found:
-            if isinstance(each, self._fault):
-                told = self._teller.broken(now, each.kind, bytes(each.raw), each.message, offset=each.offset)
-            else:
+            if is_message(each):
                 told = self._teller.message(now, each, each.to_frame())
+            else:
+                told = self._teller.broken(now, each.kind, bytes(each.raw), each.message, offset=each.offset)
             self._printer.show(now, told)
         if found:
             self._printer.flush()

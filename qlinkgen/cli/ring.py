@@ -14,6 +14,7 @@ from qlinkgen.cli.ring_hearing import RingPrinter, RingTeller
 from qlinkgen.cli.ring_place import RingPlace, netstat_text
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import (
+    Parity,
     baud_option,
     counted,
     line_of,
@@ -46,7 +47,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     count: int | None,
     length: float | None,
     baud: int | None,
-    parity: str,
+    parity: Parity,
     stop_bits: str,
     crc: str | None,
 ) -> None:

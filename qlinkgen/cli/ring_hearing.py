@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import sys
 from types import ModuleType
-from typing import Any
 
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.hearing import MOST, Telling, values_text
 from qlinkgen.cli.wire_options import counted
+from qlinkgen.link.codec import Message
 from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
 from qlinkgen.model.naming import address_attribute
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import Json
 
 
 class RingTeller:
@@ -54,10 +55,10 @@ class RingTeller:
             return self.broken(event.at, error.kind, event.frame, str(error), sent_on=True)
         return self.message(event.at, message, event.frame, sent_on=True)
 
-    def message(self, at: float, message: Any, frame: bytes, *, sent_on: bool | None = None) -> Telling:
+    def message(self, at: float, message: Message, frame: bytes, *, sent_on: bool | None = None) -> Telling:
         """A message; `sent_on` is None where nobody is there to send anything on."""
         name = self._protocol.address_name or "address"
-        record = {"at": self._seconds(at), **message_record(self._protocol, message)}
+        record: dict[str, Json] = {"at": self._seconds(at), **message_record(self._protocol, message)}
         remarks = []
         if sent_on is not None:
             record["sent_on"] = sent_on
@@ -79,7 +80,7 @@ class RingTeller:
     ) -> Telling:
         """Bytes that are no message."""
         fault = {"kind": kind, "offset": offset, "raw": raw.hex(), "message": text}
-        record: dict[str, Any] = {"at": self._seconds(at), "error": fault}
+        record: dict[str, Json] = {"at": self._seconds(at), "error": fault}
         if sent_on is not None:
             record["sent_on"] = sent_on
         remarks = ["sent on"] if sent_on else []

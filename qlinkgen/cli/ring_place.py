@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
-from qlinkgen.link.ring import RingNode
+from qlinkgen.link.codec import Message
+from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.link.ring_events import NetStat, RingEvent
 from qlinkgen.protocols.trio.face import paced_baud
 from qlinkgen.transport.port import Port
@@ -25,7 +26,7 @@ class RingPlace:
         node: the engine.
     """
 
-    def __init__(self, port: Port, codec: Any) -> None:
+    def __init__(self, port: Port, codec: RingCodec) -> None:
         """Begin to send on; `port` belongs to this from now on."""
         self.node = RingNode(codec, baud=paced_baud(port))
         self.node.verbose = True
@@ -50,7 +51,7 @@ class RingPlace:
         self.node.events.clear()
         return events
 
-    def send(self, message: Any) -> bool:
+    def send(self, message: Message) -> bool:
         """Put a message into the transmit buffer; False where it has no room."""
         return self._driver.act(lambda now: self.node.send(message, now))
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import click
 
@@ -25,6 +24,7 @@ from qlinkgen.codecs import qlink
 from qlinkgen.codecs.qlink import PositionType
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.events import Sent
+from qlinkgen.model.values import Json
 from qlinkgen.protocols.qlink import Bus, Found
 from qlinkgen.protocols.qlink.facts import BAUD, NODES
 
@@ -88,21 +88,21 @@ def _progress() -> Iterator[Callable[[int | None], None]]:
         yield lambda node: status.update(f"looking for nodes: {node}")
 
 
-def _record(found: Found) -> dict[str, Any]:
+def _record(found: Found) -> dict[str, Json]:
     info = found.info
     return {
         "node": found.node,
-        "version": info and _version(info),
-        "product_id": info and info.product_id,
-        "serial_number": info and info.serial_number,
-        "t1_delay": info and info.t1_delay,
-        "t2_delay": info and info.t2_delay,
-        "position_type": info and _position_type(info.position_type),
+        "version": None if info is None else _version(info),
+        "product_id": None if info is None else info.product_id,
+        "serial_number": None if info is None else info.serial_number,
+        "t1_delay": None if info is None else info.t1_delay,
+        "t2_delay": None if info is None else info.t2_delay,
+        "position_type": None if info is None else _position_type(info.position_type),
         "seconds": round(found.seconds, 6),
     }
 
 
-def _version(info: Any) -> str:
+def _version(info: qlink.NodeInfoResponse) -> str:
     return f"{info.version_major}.{info.version_minor}"
 
 

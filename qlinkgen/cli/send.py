@@ -13,6 +13,7 @@ from qlinkgen.cli.encode import address_option, compose, json_option
 from qlinkgen.cli.kinds import BUS, HOST, RING, Belongs, Kind, check_options, is_shipped, kind_of
 from qlinkgen.cli.send_bus import check_request, send_on_bus
 from qlinkgen.cli.wire_options import (
+    Parity,
     attempts_option,
     baud_option,
     echo_option,
@@ -87,7 +88,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     attempts: int,
     slack: float | None,
     echo: str | None,
-    parity: str,
+    parity: Parity,
     stop_bits: str,
     axis: int | None,
     checksum: Literal["always", "never"],

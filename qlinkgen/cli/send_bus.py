@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from types import ModuleType
 
 import click
 
@@ -13,6 +13,7 @@ from qlinkgen.cli.common import warn
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.wire_options import Line, echo_mode, open_line, speed
 from qlinkgen.errors import LinkError
+from qlinkgen.link.codec import Framed
 from qlinkgen.link.events import Event, Stray
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.transaction import Accepts, Reply
@@ -25,8 +26,8 @@ from qlinkgen.transport.port import Ability, Port
 
 def send_on_bus(
     protocol: Protocol,
-    codec: Any,
-    request: Any,
+    codec: ModuleType,
+    request: Framed,
     port: str,
     *,
     baud: int | None,
@@ -63,9 +64,9 @@ def check_request(protocol: Protocol, message: Message) -> None:
         raise Failure(f"{message.name} is what a node answers; send its request, {message.command}")
 
 
-def _transact(protocol: Protocol, master: BlockingMaster, request: Any) -> Reply:
+def _transact(protocol: Protocol, master: BlockingMaster, request: Framed) -> Reply:
     """Ask; where that fails, show the good frames that came and were no answer."""
-    strays: list[Any] = []
+    strays: list[Framed] = []
 
     def note(event: Event) -> None:
         if isinstance(event, Stray):

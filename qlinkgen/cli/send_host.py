@@ -11,7 +11,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.wire_options import Line, open_free
 from qlinkgen.codecs.mc1231a_bus import AxisCalls
-from qlinkgen.link.host_rules import Packet
+from qlinkgen.link.transaction import Packet
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.protocols.mc1231a import Host

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from types import ModuleType
 
 import click
 
@@ -12,6 +12,7 @@ from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.ring_place import RingPlace, netstat_text
 from qlinkgen.cli.stopping import StopSignals
 from qlinkgen.cli.wire_options import Line, counted, open_free
+from qlinkgen.link.codec import Framed
 from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.protocols.trio.errors import NoRoom
@@ -23,8 +24,8 @@ STAY = 0.2
 
 def send_into_ring(
     protocol: Protocol,
-    codec: Any,
-    message: Any,
+    codec: ModuleType,
+    message: Framed,
     port: str,
     *,
     seconds: float | None,
@@ -66,7 +67,7 @@ class _Sender:
         round_trip: what is known of the ring by that.
     """
 
-    def __init__(self, protocol: Protocol, codec: Any, message: Any) -> None:
+    def __init__(self, protocol: Protocol, codec: ModuleType, message: Framed) -> None:
         self._protocol = protocol
         self._marking = codec.MARKING
         self._own: bytes = message.to_frame()

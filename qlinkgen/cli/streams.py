@@ -12,8 +12,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, Protocol, assert_never
+from typing import Protocol, assert_never
 
+from qlinkgen.cli.codec import MessageObject
+from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
 from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, FramePlan, frame_plan
@@ -33,7 +35,7 @@ class Bad:
 
 
 #: A generated message object, or bytes that are none.
-Event = Any
+Event = MessageObject | Bad
 
 
 class Stream(Protocol):
@@ -52,7 +54,6 @@ class OneWay:
     def __init__(self, codec: ModuleType, direction: Direction, base: int = 0) -> None:
         """``base`` is the place of the first byte in the whole stream."""
         self._decoder = codec.StreamDecoder() if direction == "message" else codec.StreamDecoder(direction)
-        self._fault = codec.Fault
         self._base = base
 
     def feed(self, data: bytes) -> list[Event]:
@@ -63,10 +64,8 @@ class OneWay:
         """The end of the stream."""
         return [self._placed(event) for event in self._decoder.finish()]
 
-    def _placed(self, event: Event) -> Event:
-        if isinstance(event, self._fault):
-            return _bad(event, self._base)
-        return event
+    def _placed(self, event: Framed | Fault) -> Event:
+        return event if is_message(event) else _bad(event, self._base)
 
 
 class InStep:
@@ -79,8 +78,7 @@ class InStep:
     def __init__(self, codec: ModuleType) -> None:
         """Hunt in both directions."""
         self._requests, self._responses = codec.StreamDecoder("request"), codec.StreamDecoder("response")
-        self._fault: type[Any] = codec.Fault
-        self._asked: tuple[str, object] | None = None
+        self._asked: tuple[str, int | None] | None = None
 
     def feed(self, data: bytes) -> Iterator[Event]:
         """Take bytes."""
@@ -90,15 +88,15 @@ class InStep:
         """The end of the stream."""
         return self._merged(self._requests.finish(), self._responses.finish())
 
-    def _merged(self, requests: Iterable[Event], responses: Iterable[Event]) -> Iterator[Event]:
+    def _merged(
+        self, requests: Iterable[Framed | Fault], responses: Iterable[Framed | Fault]
+    ) -> Iterator[Event]:
         # Most frames fit one direction alone: the other's fault is thrown away without a look at it.
-        fault = self._fault
         for request, response in zip(requests, responses, strict=True):
             asked, self._asked = self._asked, None
-            if isinstance(request, fault):
-                refused = isinstance(response, fault)
-                yield _further(_bad(request), _bad(response)) if refused else response
-            elif asked and not isinstance(response, fault) and asked == _transaction(response):
+            if not is_message(request):
+                yield response if is_message(response) else _further(_bad(request), _bad(response))
+            elif asked and is_message(response) and asked == _transaction(response):
                 yield response
             else:
                 self._asked = _transaction(request)
@@ -114,7 +112,7 @@ class EitherWay:
         self._ways: dict[Direction, OneWay] = {way: OneWay(codec, way) for way in ("request", "response")}
         self._held: dict[Direction, list[Event]] = {"request": [], "response": []}
         self._offset = 0
-        self._asked: tuple[str, object] | None = None
+        self._asked: tuple[str, int | None] | None = None
 
     def feed(self, data: bytes) -> Iterator[Event]:
         """Take bytes, one at a time: both directions must be asked about the same frame."""
@@ -159,22 +157,23 @@ class EitherWay:
         return events
 
 
-def _bad(fault: Any, base: int = 0) -> Bad:
+def _bad(fault: Fault, base: int = 0) -> Bad:
     return Bad(fault.kind, fault.offset + base, bytes(fault.raw), fault.message)
 
 
-def _last_message(events: list[Event]) -> Any:
+def _last_message(events: list[Event]) -> MessageObject | None:
     return next((event for event in reversed(events) if not isinstance(event, Bad)), None)
 
 
-def _further(request: Bad, response: Bad) -> Bad:
+def _further(request: Event, response: Event) -> Bad:
+    assert isinstance(request, Bad)  # a message is not held
+    assert isinstance(response, Bad)
     return max(request, response, key=lambda bad: PROGRESS.index(bad.kind))
 
 
-def _transaction(message: Any) -> tuple[str, object]:
+def _transaction(message: Message | None) -> tuple[str, int | None] | None:
     """Command and address: what a response has in common with its request."""
-    address = getattr(message, message.ADDRESS) if message.ADDRESS else None
-    return message.NAME.rpartition(".")[0], address
+    return None if message is None else (message.NAME.rpartition(".")[0], address_of(message))
 
 
 def open_stream(protocol: Described, codec: ModuleType, direction: Direction | None) -> Stream:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import ModuleType
-from typing import Any, NamedTuple, cast
+from typing import Literal, NamedTuple, cast
 
 import click
 
@@ -65,11 +65,14 @@ echo_option = click.option(
 )
 
 
+Parity = Literal["none", "even", "odd"]
+
+
 class Line(NamedTuple):
     """How bytes are framed on the line."""
 
-    parity: Any = "none"
-    stop_bits: Any = 1
+    parity: Parity = "none"
+    stop_bits: Literal[1, 2] = 1
 
 
 parity_option = click.option(
@@ -88,9 +91,9 @@ stop_bits_option = click.option(
 )
 
 
-def line_of(parity: str, stop_bits: str) -> Line:
+def line_of(parity: Parity, stop_bits: str) -> Line:
     """The options of a byte, as a port takes them."""
-    return Line(parity, int(stop_bits))
+    return Line(parity, 2 if stop_bits == "2" else 1)
 
 
 def open_line(name: str, baud: int, line: Line = Line()) -> Port:  # noqa: B008  # immutable

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from qlinkgen.link.codec import Fault, Framed, Message
+from qlinkgen.link.host_events import Filled, InStep, OutOfStep
 
 #: Events that an engine keeps for one who does not fetch them after each transaction.
 EVENTS_KEPT = 4096
@@ -14,7 +17,7 @@ class Sent(NamedTuple):
     at: float
     #: Address in the frame, None where the protocol has none.
     node: int | None
-    request: Any
+    request: Message
     #: 1 for the first try.
     attempt: int
     frame: bytes
@@ -25,8 +28,9 @@ class Answered(NamedTuple):
 
     at: float
     node: int | None
-    request: Any
-    response: Any
+    request: Message
+    #: None where only a host waits that none is sent.
+    response: Message | None
     #: How often the request had been sent.
     attempts: int
     #: Seconds from the call to the answer.
@@ -38,7 +42,7 @@ class TimedOut(NamedTuple):
 
     at: float
     node: int | None
-    request: Any
+    request: Message
     attempt: int
 
 
@@ -47,7 +51,7 @@ class Failed(NamedTuple):
 
     at: float
     node: int | None
-    request: Any
+    request: Message
     error: Exception
 
 
@@ -56,14 +60,14 @@ class Refused(NamedTuple):
 
     at: float
     node: int | None
-    request: Any
+    request: Message
 
 
 class Stray(NamedTuple):
     """A good frame that answers nothing that is asked at this moment."""
 
     at: float
-    message: Any
+    message: Framed
     #: It would have answered an earlier attempt or request.
     late: bool
 
@@ -74,7 +78,7 @@ class Damaged(NamedTuple):
     at: float
     #: Node that was being asked, None where none was.
     node: int | None
-    fault: Any
+    fault: Fault
 
 
 class EchoFound(NamedTuple):
@@ -106,6 +110,8 @@ class HealthChanged(NamedTuple):
     state: str
 
 
+#: The last three are told of host ports alone.
 Event = (
     Sent | Answered | TimedOut | Failed | Refused | Stray | Damaged | EchoFound | EchoBroken | HealthChanged
-)
+    | OutOfStep | Filled | InStep
+)  # fmt: skip

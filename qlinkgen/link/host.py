@@ -30,15 +30,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection
-from typing import Any
 
 from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
-from qlinkgen.link.events import EVENTS_KEPT, Answered, Damaged, Failed, Sent, TimedOut
-from qlinkgen.link.host_events import Filled, HostCounters, HostEvent, InStep, OutOfStep
-from qlinkgen.link.host_rules import Asked, HostCodec, HostRules, Packet, Plan, State, WayBack
+from qlinkgen.link.codec import Framed, Message
+from qlinkgen.link.events import EVENTS_KEPT, Answered, Damaged, Event, Failed, Sent, TimedOut
+from qlinkgen.link.host_events import Filled, HostCounters, InStep, OutOfStep
+from qlinkgen.link.host_rules import Asked, HostCodec, HostRules, Plan, State, WayBack
 from qlinkgen.link.host_timing import ROUNDS, SILENT_ROUNDS, HostTiming
 from qlinkgen.link.timing import check_attempts
-from qlinkgen.link.transaction import Reply, settled
+from qlinkgen.link.transaction import Packet, Question, Reply, settled
 
 
 class HostEngine:
@@ -66,11 +66,11 @@ class HostEngine:
         self.codec = codec
         self.timing = timing
         self.rules = rules
-        self.events: deque[HostEvent] = deque(maxlen=EVENTS_KEPT)
+        self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self.verbose = True
         self.count = HostCounters()
         self.in_step = True
-        self.context: type[Any] | None = None
+        self.context: type[Framed] | None = None
         self._plans = {
             command.request: Plan(command, timing, rules, check=checked is None or name in checked)
             for name, command in codec.COMMANDS.items()
@@ -84,7 +84,7 @@ class HostEngine:
         self._state = State.IDLE
         self._outcome: Reply | LinkError | None = None
         # The packet of the transaction; what is asked at this moment: the same, a context, or the proof.
-        self._packet = Packet(None)
+        self._packet = Packet(rules.proof)
         self._wanted = self._sendable(rules.proof)
         self._asked = self._wanted
         self._asked_check = True
@@ -119,7 +119,9 @@ class HostEngine:
         """Counts of what happened."""
         return self.count
 
-    def start(self, request: Any, now: float, *, attempts: int | None = None, trial: bool = False) -> None:
+    def start(
+        self, request: Question, now: float, *, attempts: int | None = None, trial: bool = False
+    ) -> None:
         """Begin a transaction.
 
         Args:
@@ -230,7 +232,7 @@ class HostEngine:
 
     # Sending ------------------------------------------------------------------------------------------------
 
-    def _sendable(self, request: Any) -> Asked:
+    def _sendable(self, request: Framed) -> Asked:
         return Asked(request, self._plans[type(request)], request.to_frame())
 
     def _send(self, now: float) -> bytes:
@@ -249,7 +251,7 @@ class HostEngine:
         self._attempt += 1
         if not check and not plan.payload:
             frame = self._send_off(wanted, now)
-            self._succeed(plan.response and plan.response(), now)
+            self._succeed(plan.response() if plan.response is not None else None, now)
             return first + frame
         self._state = State.WAITING
         if self._attempt > 1:
@@ -317,7 +319,11 @@ class HostEngine:
         plan = asked.plan
         raw, rest = (data, b"") if len(data) == size else (data[:size], data[size:])
         try:
-            response = self._decode(raw, asked) if self._asked_check else plan.response.from_bytes(raw)
+            if self._asked_check:
+                response = self._decode(raw, asked)
+            else:
+                assert plan.response is not None
+                response = plan.response.from_bytes(raw)
         except self._misfits as error:
             self._wrong_answer(getattr(error, "kind", "frame"), data, str(error), now)
             return
@@ -350,14 +356,15 @@ class HostEngine:
     # Getting back in step -----------------------------------------------------------------------------------
 
     def _out_of_step(
-        self, now: float, request: Any, reason: str, until: float = 0.0, received: bytes = b""
+        self, now: float, request: Framed | None, reason: str, until: float = 0.0, received: bytes = b""
     ) -> None:
         """Nothing that was known of the device holds any more, until it has proved otherwise."""
         if self.in_step:
             self.count.out_of_step += 1
             self.events.append(OutOfStep(now, request, reason, received))
         if self.in_step or request is not None:
-            self._way.fill = self.rules.fills.get(type(request), self.rules.fill)
+            fill = self.rules.fill
+            self._way.fill = fill if request is None else self.rules.fills.get(type(request), fill)
         self.in_step = False
         self.context = None
         self._owed = 0
@@ -400,7 +407,7 @@ class HostEngine:
         self._listening = False  # the next call of bytes_to_send asks
         self._buffer = b""
 
-    def _proving(self) -> Any:
+    def _proving(self) -> Framed:
         """The packet that is next as a proof: two different ones, so that a late answer to one is noticed."""
         context = self._packet.context if self._packet.context is not None else self.rules.context
         if context is not None and self.context is not type(context):
@@ -471,7 +478,7 @@ class HostEngine:
         else:
             self._fail(NoReply, "no answer", now)
 
-    def _succeed(self, response: Any, now: float) -> None:
+    def _succeed(self, response: Message | None, now: float) -> None:
         self._state = State.IDLE
         elapsed = now - self._started
         self._outcome = Reply(response, self._attempt, elapsed, now, now - self._sent_at)

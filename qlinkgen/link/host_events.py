@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from qlinkgen.link.codec import Message
 from qlinkgen.link.counters import LinkCounters
-from qlinkgen.link.events import Event
 
 
 class OutOfStep(NamedTuple):
@@ -13,7 +13,7 @@ class OutOfStep(NamedTuple):
 
     at: float
     #: Request that was under way, None where none was.
-    request: Any
+    request: Message | None
     reason: str
     received: bytes
 
@@ -33,9 +33,6 @@ class InStep(NamedTuple):
     fills: int
     #: An unfinished packet was filled up, and so the device has carried out something that nobody wanted.
     completed: bool
-
-
-HostEvent = Event | OutOfStep | Filled | InStep
 
 
 class HostCounters(LinkCounters):

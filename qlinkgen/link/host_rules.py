@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
-from qlinkgen.link.codec import Module
+from qlinkgen.link.codec import Command, Fault, Framed, Message, Module
 from qlinkgen.link.host_timing import HostTiming
 
 
@@ -26,24 +26,14 @@ class HostCodec(Module, Protocol):
     """A generated module of a protocol of the host kind, such as `qlinkgen.codecs.mc1231a`."""
 
     @property
-    def decode_response(self) -> Any:
+    def decode_response(self) -> Callable[[bytes, Any], Message]:  # Any: given `Asked` as the request
         """Function that decodes an answer to a request."""
         ...
 
     @property
-    def Fault(self) -> Any:  # noqa: N802  # as the generated module has it
+    def Fault(self) -> Callable[[str, int, bytes, str], Fault]:  # noqa: N802  # as the generated module has it
         """Bytes that are no message."""
         ...
-
-
-class Packet(NamedTuple):
-    """A request, and how it is to be sent."""
-
-    request: Any
-    #: Request that must be in force before, None where it does not matter.
-    context: Any = None
-    #: Read the checksum; None: as the engine does with this command.
-    check: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -60,11 +50,11 @@ class HostRules:
         refusal: checksum by which a command is refused.
     """
 
-    proof: Any
-    context: Any = None
-    contexts: Mapping[type[Any], type[Any] | None] = field(default_factory=dict)
+    proof: Framed
+    context: Framed | None = None
+    contexts: Mapping[type[Framed], type[Framed] | None] = field(default_factory=dict)
     fill: int = 0
-    fills: Mapping[type[Any], int] = field(default_factory=dict)
+    fills: Mapping[type[Framed], int] = field(default_factory=dict)
     refusal: bytes = b"\0\0"
 
 
@@ -76,7 +66,7 @@ class Plan:
         "response", "tries",
     )  # fmt: skip
 
-    def __init__(self, command: Any, timing: HostTiming, rules: HostRules, *, check: bool) -> None:
+    def __init__(self, command: Command, timing: HostTiming, rules: HostRules, *, check: bool) -> None:
         response = command.response
         self.command = command
         self.response = response
@@ -96,7 +86,7 @@ class Asked:
 
     __slots__ = ("ID", "NAME", "frame", "payload", "plan", "request")
 
-    def __init__(self, request: Any, plan: Plan, frame: bytes) -> None:
+    def __init__(self, request: Framed, plan: Plan, frame: bytes) -> None:
         self.ID = request.ID
         self.NAME = request.NAME
         self.request = request

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Self
 
-from qlinkgen.link.codec import Module
+from qlinkgen.link.codec import Command, Module
 from qlinkgen.link.timing import QUIET_BYTES, Timing
 
 #: Times that getting back in step is tried in one transaction ...
@@ -59,7 +59,7 @@ class HostTiming(Timing):
         """Time from handing over one byte until an answer of `answer` bytes must be complete."""
         return self.on_wire(1 + answer) + self.host_slack
 
-    def worst_case(self, command: Any, attempts: int | None = None) -> float:
+    def worst_case(self, command: Command, attempts: int | None = None) -> float:
         """Most seconds that a call can take, whatever is on the line.
 
         Each attempt may need a context before it, and each of them, or a round that fails, the whole way back

@@ -29,10 +29,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
 
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
-from qlinkgen.link.codec import Codec, address_getter
+from qlinkgen.link.codec import Codec, Fault, Framed, address_getter, is_message
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.echo import NOISE, PROBE, EchoCanceller, EchoMode
 from qlinkgen.link.events import (
@@ -51,7 +50,7 @@ from qlinkgen.link.events import (
 )
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.timing import Timing, check_attempts
-from qlinkgen.link.transaction import Accepts, Plan, Reply, settled
+from qlinkgen.link.transaction import Accepts, Packet, Plan, Question, Reply, settled
 
 #: On a paced line nothing that is complete before the request has left can be its answer. Clocks of the two
 #: sides may differ by some percent.
@@ -106,7 +105,7 @@ class MasterEngine:
         self._paced = timing.paced
         self._state = IDLE
         self._outcome: Reply | LinkError | None = None
-        self._request: Any = None
+        self._request: Framed  #: set by `start`
         self._plan: Plan = next(iter(self._plans.values()))
         self._node: int | None = None
         #: What was asked before, whose answer may still come.
@@ -146,7 +145,9 @@ class MasterEngine:
         whole.skipped = self._decoder.counters.skipped
         return whole
 
-    def start(self, request: Any, now: float, *, attempts: int | None = None, trial: bool = False) -> None:
+    def start(
+        self, request: Question, now: float, *, attempts: int | None = None, trial: bool = False
+    ) -> None:
         """Begin a transaction.
 
         Args:
@@ -165,8 +166,7 @@ class MasterEngine:
         """
         if self._state is not IDLE:
             raise RuntimeError("a transaction is under way; a bus does one at a time")
-        plan = self._plans.get(type(request))
-        if plan is None:
+        if type(request) is Packet or (plan := self._plans.get(type(request))) is None:
             raise TypeError(f"{type(request).__name__} was given; a request of this protocol is needed")
         tries = plan.tries if attempts is None else self._tries_of(plan, attempts)
         self._frame = self.codec.encode(request)
@@ -272,6 +272,8 @@ class MasterEngine:
     # Sending ------------------------------------------------------------------------------------------------
 
     def _send(self, now: float) -> bytes:
+        for event in self._decoder.finish():  # what a damaged frame has hidden may be a message
+            self._take_in(event, now)
         frame = self._frame
         count = self._count
         self._attempt += 1
@@ -280,8 +282,6 @@ class MasterEngine:
             count.repeats += 1
         if self._echo.mode == "expect" and self._echo.sent(frame):
             self._echo_missing(self.counters[None], None, now)
-        for fault in self._decoder.finish():
-            self._damaged(fault, now)
         self._suspect = False
         if self.verbose:
             self.events.append(Sent(now, self._node, self._request, self._attempt, frame))
@@ -348,7 +348,7 @@ class MasterEngine:
 
     # Receiving ----------------------------------------------------------------------------------------------
 
-    def _take_in(self, event: Any, now: float) -> None:
+    def _take_in(self, event: Framed | Fault, now: float) -> None:
         plan = self._plan
         if self._echo.broken and self._is_own(event):
             return
@@ -359,15 +359,15 @@ class MasterEngine:
             and self._answers(plan, event)
         ):
             self._succeed(event, now)
-        elif hasattr(event, "to_frame"):
+        elif is_message(event):
             self._stray(event, now)
         else:
             self._damaged(event, now)
 
-    def _is_own(self, event: Any) -> bool:
-        return self._echo.is_own(self.codec.encode(event) if hasattr(event, "to_frame") else event.raw)
+    def _is_own(self, event: Framed | Fault) -> bool:
+        return self._echo.is_own(self.codec.encode(event) if is_message(event) else event.raw)
 
-    def _answers(self, plan: Plan, response: Any) -> bool:
+    def _answers(self, plan: Plan, response: Framed) -> bool:
         """Whether a response of the right type answers the request."""
         request = self._request
         for name in plan.echoes:
@@ -379,7 +379,7 @@ class MasterEngine:
             plan.answers_broadcast and self._node == self._bus.broadcast
         )
 
-    def _stray(self, message: Any, now: float) -> None:
+    def _stray(self, message: Framed, now: float) -> None:
         node = self._address(message)
         count = self.counters.get(node) or self.counters[None]
         asked = self._attempt > 0 and self._may_answer(self._plan, self._node, message)
@@ -390,12 +390,12 @@ class MasterEngine:
         count.late += late
         self.events.append(Stray(now, message, late))
 
-    def _may_answer(self, plan: Plan, asked: int | None, message: Any) -> bool:
+    def _may_answer(self, plan: Plan, asked: int | None, message: Framed) -> bool:
         """Whether a message is what a node that was asked would say, if to another attempt."""
         anybody = plan.answers_broadcast and asked == self._bus.broadcast
         return type(message) is plan.response and (anybody or self._address(message) == asked)
 
-    def _damaged(self, fault: Any, now: float) -> None:
+    def _damaged(self, fault: Fault, now: float) -> None:
         waiting = self._state is WAITING
         count = self._count if waiting else self.counters[None]
         count.count_damaged(fault.kind)
@@ -405,7 +405,7 @@ class MasterEngine:
 
     # The end of a transaction -------------------------------------------------------------------------------
 
-    def _succeed(self, response: Any, now: float) -> None:
+    def _succeed(self, response: Framed | None, now: float) -> None:
         self._state = IDLE
         elapsed = now - self._started
         self._outcome = Reply(response, self._attempt, elapsed, now, now - self._sent_at)

@@ -10,19 +10,29 @@ Nothing in a frame need tell a request from a response. What does:
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
-from qlinkgen.link.codec import Codec, address_of, addresses_that_answer, answers
+from qlinkgen.link.codec import (
+    Codec,
+    Command,
+    Fault,
+    Framed,
+    address_of,
+    addresses_that_answer,
+    answers,
+    is_message,
+)
 from qlinkgen.link.events import Damaged, Stray
 from qlinkgen.link.timing import Timing
+from qlinkgen.link.transaction import Accepts
 
 
 class Asked(NamedTuple):
     """The master has sent a request."""
 
     at: float
-    request: Any
+    request: Framed
     #: The request before it was the same and was not answered.
     repeat: bool
     frame: bytes
@@ -32,8 +42,8 @@ class Replied(NamedTuple):
     """A node has answered."""
 
     at: float
-    request: Any
-    response: Any
+    request: Framed
+    response: Framed
     #: Seconds from the end of the request to the end of the answer.
     delay: float
     #: It came after the deadline.
@@ -45,7 +55,7 @@ class Unanswered(NamedTuple):
     """No answer to a request has come in time."""
 
     at: float
-    request: Any
+    request: Framed
 
 
 Heard = Asked | Replied | Unanswered | Stray | Damaged
@@ -56,7 +66,7 @@ class _Pending:
 
     __slots__ = ("answered", "at", "command", "deadline", "reported", "request")
 
-    def __init__(self, command: Any, request: Any, at: float, deadline: float) -> None:
+    def __init__(self, command: Command, request: Framed, at: float, deadline: float) -> None:
         self.command = command
         self.request = request
         self.at = at
@@ -76,9 +86,7 @@ class Monitor:
         bytes: bytes taken so far.
     """
 
-    def __init__(
-        self, codec: Codec, timing: Timing, *, accepts: Mapping[str, Callable[[Any, Any], bool]] | None = None
-    ) -> None:
+    def __init__(self, codec: Codec, timing: Timing, *, accepts: Mapping[str, Accepts] | None = None) -> None:
         """`accepts` are the checks of a `MasterEngine`: what answers, where the shape does not say it all."""
         self.heard: deque[Heard] = deque()
         self.bytes = 0
@@ -89,7 +97,7 @@ class Monitor:
         self._requests = codec.StreamDecoder("request")
         self._responses = codec.StreamDecoder("response")
         #: Faults that one of the two decoders has reported, by offset: it may be the wrong one of the two.
-        self._suspected: dict[int, Any] = {}
+        self._suspected: dict[int, Fault] = {}
         self._pending: _Pending | None = None
 
     @property
@@ -128,9 +136,11 @@ class Monitor:
             pending.reported = True
             self.heard.append(Unanswered(now, pending.request))
 
-    def _sort(self, asking: list[Any], answering: list[Any], now: float) -> None:
+    def _sort(
+        self, asking: Sequence[Framed | Fault], answering: Sequence[Framed | Fault], now: float
+    ) -> None:
         for fault in (*asking, *answering):
-            if _message_of(fault) is not None:
+            if is_message(fault):
                 continue
             if self._suspected.pop(fault.offset, None) is None:
                 self._suspected[fault.offset] = fault
@@ -146,20 +156,20 @@ class Monitor:
         waits = pending is not None and not pending.answered and now < pending.deadline
         return address_of(pending.request) if pending is not None and waits else None
 
-    def _message(self, request: Any, response: Any, now: float) -> None:
+    def _message(self, request: Framed | None, response: Framed | None, now: float) -> None:
         # The frame is the same one: each decoder has read it in its own way, or has refused it.
         pending = self._pending
-        fits = response is not None and pending is not None and self._fits(pending, response)
-        in_time = fits and pending is not None and not pending.answered and now < pending.deadline
-        if in_time or (fits and request is None):
-            assert pending is not None
-            self._replied(pending, response, now, late=not in_time)
-        elif request is not None:
+        if response is not None and pending is not None and self._fits(pending, response):
+            in_time = not pending.answered and now < pending.deadline
+            if in_time or request is None:
+                self._replied(pending, response, now, late=not in_time)
+                return
+        if request is not None:
             self._asked(request, now)
-        else:
+        elif response is not None:
             self.heard.append(Stray(now, response, late=False))
 
-    def _fits(self, pending: _Pending, response: Any) -> bool:
+    def _fits(self, pending: _Pending, response: Framed) -> bool:
         if not answers(pending.command, pending.request, response):
             return False
         if accepts := self._accepts.get(pending.command.name):
@@ -168,7 +178,7 @@ class Monitor:
             pending.command, pending.request, self._codec.BUS
         )
 
-    def _replied(self, pending: _Pending, response: Any, now: float, *, late: bool) -> None:
+    def _replied(self, pending: _Pending, response: Framed, now: float, *, late: bool) -> None:
         if pending.answered:
             self.heard.append(Stray(now, response, late=True))
             return
@@ -176,7 +186,7 @@ class Monitor:
         delay = now - pending.at
         self.heard.append(Replied(now, pending.request, response, delay, late, self._codec.encode(response)))
 
-    def _asked(self, request: Any, now: float) -> None:
+    def _asked(self, request: Framed, now: float) -> None:
         command = self._commands.get(type(request))
         if command is None:  # a message of no command: anybody may send it, and nothing answers
             self.heard.append(Stray(now, request, late=False))
@@ -191,14 +201,16 @@ class Monitor:
         self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))
 
 
-def _same_frames(asking: list[Any], answering: list[Any]) -> Iterator[tuple[Any, Any]]:
+def _same_frames(
+    asking: Sequence[Framed | Fault], answering: Sequence[Framed | Fault]
+) -> Iterator[tuple[Framed | None, Framed | None]]:
     """Pair what two decoders made of the same frames; a byte may complete several, where one was hidden."""
     if len(asking) == len(answering):  # each has taken or refused the same ones
         yield from zip(map(_message_of, asking), map(_message_of, answering), strict=True)
         return
-    responses = list(filter(_message_of, answering))
+    responses = list(filter(is_message, answering))
     frames = [response.to_frame() for response in responses]
-    for request in filter(_message_of, asking):
+    for request in filter(is_message, asking):
         frame = request.to_frame()
         same = frames.index(frame) if frame in frames else None
         yield request, None if same is None else responses.pop(same)
@@ -207,6 +219,6 @@ def _same_frames(asking: list[Any], answering: list[Any]) -> Iterator[tuple[Any,
     yield from ((None, response) for response in responses)
 
 
-def _message_of(event: Any) -> Any:
+def _message_of(event: Framed | Fault) -> Framed | None:
     """Return a decoder's event if it is a message, None for a fault."""
-    return event if hasattr(event, "to_frame") else None
+    return event if is_message(event) else None

@@ -15,15 +15,19 @@ A blocking driver runs it with `bus.run(double_check(3))`, one for asyncio with 
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 from qlinkgen.errors import LinkError
+from qlinkgen.link.transaction import Question, Reply
+
+#: What a procedure tells on the way.
+Report: TypeAlias = Any  # each procedure tells of a class of its own, which its caller knows
 
 
 class Ask(NamedTuple):
     """Do a transaction; the value of the `yield` is its Reply."""
 
-    request: Any
+    request: Question
     #: None: as often as the timing says.
     attempts: int | None = None
     #: Ask a node that is offline before its next trial is due.
@@ -39,13 +43,13 @@ class Pause(NamedTuple):
 class Tell(NamedTuple):
     """Show the user how far it is; the value is None."""
 
-    report: Any
+    report: Report
 
 
 Step = Ask | Pause | Tell
 Outcome = TypeVar("Outcome")
 #: Yields steps, gets Reply, float or None, and returns an outcome.
-Procedure = Generator[Step, Any, Outcome]
+Procedure = Generator[Step, Any, Outcome]  # Any: which of them depends on the step
 
 #: What a transaction can fail with; a procedure may catch it where it has asked.
 FAILURES = (LinkError, OSError, ValueError, TypeError)
@@ -63,12 +67,12 @@ class Steps(Generic[Outcome]):
 
     __slots__ = ("_procedure", "failure", "outcome", "result", "wanted")
 
-    wanted: Any
+    wanted: Step
     result: Outcome
 
     def __init__(self, procedure: Procedure[Outcome]) -> None:
         self._procedure = procedure
-        self.outcome: Any = None
+        self.outcome: Reply | float | None = None
         self.failure: Exception | None = None
 
     def advance(self) -> bool:

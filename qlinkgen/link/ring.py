@@ -41,6 +41,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+from qlinkgen.link.codec import Bus, Encoder, Framed, Message
 from qlinkgen.link.ring_events import (
     Blocked,
     Broken,
@@ -69,21 +70,33 @@ HUNTING = "hunting"
 _OPEN = frozenset({TAKING, PASSING, BLOCKING})
 
 
-class RingCodec(Protocol):
+class Marking(Protocol):
+    """Where header and end byte hold what; see the class of that name beside a generated module."""
+
+    marker: int
+    address_shift: int
+    address_mask: int
+    id_shift: int
+    id_mask: int
+    end: int
+    most: int
+
+
+class RingCodec(Encoder, Protocol):
     """A generated module with marked frames, such as `qlinkgen.codecs.trio`."""
 
     @property
-    def BUS(self) -> Any:  # noqa: N802  # as the generated module has it
+    def BUS(self) -> Bus:  # noqa: N802  # as the generated module has it
         """Who is on the line, and how fast it is."""
         ...
 
     @property
-    def MARKING(self) -> Any:  # noqa: N802
+    def MARKING(self) -> Marking:  # noqa: N802
         """Where header and end byte hold what."""
         ...
 
     @property
-    def MESSAGES(self) -> Mapping[str, Any]:  # noqa: N802
+    def MESSAGES(self) -> Mapping[str, type[Message]]:  # noqa: N802
         """Messages by name."""
         ...
 
@@ -92,12 +105,8 @@ class RingCodec(Protocol):
         """What `decode` raises."""
         ...
 
-    def encode(self, message: Any) -> bytes:
-        """Return the whole frame of a message as it is on the wire."""
-        ...
-
     @property
-    def decode(self) -> Callable[[bytes], Any]:
+    def decode(self) -> Callable[[bytes], Framed]:
         """Return the message of a frame."""
         ...
 
@@ -269,8 +278,8 @@ class RingNode:
         if self._on_message is not None:
             self._on_message(message, now)
 
-    def _kind(self, frame: bytes, error: Any) -> str:
-        return str(error.kind) if frame[0] & self._id_mask in self._known else "unknown"
+    def _kind(self, frame: bytes, error: Exception) -> str:
+        return str(getattr(error, "kind", "frame")) if frame[0] & self._id_mask in self._known else "unknown"
 
     # faults
 
@@ -296,7 +305,7 @@ class RingNode:
 
     # sending
 
-    def send(self, message: Any, now: float) -> bool:
+    def send(self, message: Message, now: float) -> bool:
         """Put an own message into the transmit buffer; False where it has no room, and was not taken.
 
         Raises:

@@ -6,7 +6,9 @@ Times are those that the engine was given.
 from __future__ import annotations
 
 from enum import IntFlag
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from qlinkgen.link.codec import Message
 
 
 class NetStat(IntFlag):
@@ -26,7 +28,7 @@ class Taken(NamedTuple):
     """A message to this node has come; told where the engine is verbose."""
 
     at: float
-    message: Any
+    message: Message
     frame: bytes
 
 
@@ -42,7 +44,7 @@ class Queued(NamedTuple):
     """A message of this node went into the transmit buffer; told where the engine is verbose."""
 
     at: float
-    message: Any
+    message: Message
 
 
 class Broken(NamedTuple):
@@ -71,7 +73,7 @@ class Dropped(NamedTuple):
     """A message to this node was in order, but the node could not keep all of it."""
 
     at: float
-    message: Any
+    message: Message
     #: What is lost, and why.
     text: str
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, Protocol
 
-from qlinkgen.link.codec import Codec, address_of
+from qlinkgen.link.codec import Codec, Framed, address_of, is_message
 from qlinkgen.link.echo import EchoCanceller
 
 
@@ -14,7 +14,8 @@ class Station(Protocol):
     #: Address that the node answers to. A request may change it.
     number: int
 
-    def handle(self, request: Any, now: float) -> Any | None:
+    # Any: a station handles messages of its own protocol alone.
+    def handle(self, request: Any, now: float) -> Framed | None:
         """Do what a request says; return the response, None where there is none."""
         ...
 
@@ -106,13 +107,13 @@ class SlaveEngine:
             data = self._echo.cancel(data)
         self._last = data[-1:]
         for event in self._decoder.feed(data):
-            if hasattr(event, "to_frame"):
+            if is_message(event):
                 self._heard(event, now)
             else:
                 damaged = self.counters.damaged
                 damaged[event.kind] = damaged.get(event.kind, 0) + 1
 
-    def _heard(self, request: Any, now: float) -> None:
+    def _heard(self, request: Framed, now: float) -> None:
         if self._echo.active and self._echo.is_own(self._encode(request)):
             return
         if self._answer:  # the asker has given up on it, or there would be silence

@@ -13,9 +13,8 @@ late is heard and thrown away before the next question is asked.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
-from qlinkgen.link.codec import Module
+from qlinkgen.link.codec import Command, Module
 from qlinkgen.link.echo import PROBE
 
 #: A receiver needs as long to know that a line is quiet; three byte times are also Q.link's response time.
@@ -84,11 +83,11 @@ class Timing:
         """Time of `size` bytes on the line."""
         return size * self.byte_time
 
-    def allowance(self, command: Any) -> float:
+    def allowance(self, command: Command) -> float:
         """Time that the protocol gives a slave before it answers."""
         return float(command.response_byte_times) * self.byte_time + float(command.response_seconds)
 
-    def deadline(self, command: Any, request_size: int | None = None) -> float:
+    def deadline(self, command: Command, request_size: int | None = None) -> float:
         """Time from handing over a request of `request_size` bytes until its answer must be complete.
 
         Without a size the longest request of the command counts. 0 where nothing answers.
@@ -109,16 +108,16 @@ class Timing:
         """How long that silence is waited for; a late answer of full length fits in."""
         return 2 * self.quiet + self.on_wire(self.longest_frame)
 
-    def gap(self, command: Any) -> float:
+    def gap(self, command: Command) -> float:
         """Time that slaves get after a request that nothing answers, before the next one begins."""
         return self.allowance(command)
 
-    def attempts_of(self, command: Any, attempts: int | None = None) -> int:
+    def attempts_of(self, command: Command, attempts: int | None = None) -> int:
         """How often a request is sent at most: once where it must not be repeated."""
         wanted = self.attempts if attempts is None else check_attempts(attempts)
         return wanted if command.repeat_safe and command.response is not None else 1
 
-    def worst_case(self, command: Any, attempts: int | None = None) -> float:
+    def worst_case(self, command: Command, attempts: int | None = None) -> float:
         """Most seconds that a call can take, whatever is on the line.
 
         The first term is what may be in the way of the first attempt: a request that was given up and may

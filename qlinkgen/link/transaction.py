@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, final
 
 from qlinkgen.errors import LinkError
+from qlinkgen.link.codec import Command, Framed
 from qlinkgen.link.timing import Timing
+
+
+@final
+class Packet(NamedTuple):
+    """A request to the device at a host port, and how it is to be sent."""
+
+    request: Framed
+    #: Request that must be in force before, None where it does not matter.
+    context: Framed | None = None
+    #: Read the checksum; None: as the engine does with this command.
+    check: bool | None = None
+
+
+#: What an engine may be asked.
+Question = Framed | Packet
 
 
 class Reply(NamedTuple):
     """The outcome of a transaction that did not fail."""
 
     #: None where nothing answers.
-    response: Any
+    response: Any  # the class that the request asks for; the calls of a generated bus module name it
     #: How often the request was sent.
     attempts: int
     #: Seconds from the call to the answer.
@@ -25,7 +41,7 @@ class Reply(NamedTuple):
 
 
 #: Whether a response is acceptable for a request, where more is known than its shape.
-Accepts = Callable[[Any, Any], bool]
+Accepts = Callable[[Any, Any], bool]  # Any: a request and a response of the classes of one command
 
 
 class Plan:
@@ -35,7 +51,7 @@ class Plan:
         "accepts", "allowance", "answer_time", "answers_broadcast", "command", "echoes", "response", "tries",
     )  # fmt: skip
 
-    def __init__(self, command: Any, timing: Timing, accepts: Accepts | None) -> None:
+    def __init__(self, command: Command, timing: Timing, accepts: Accepts | None) -> None:
         self.command = command
         self.response = command.response
         self.accepts = accepts

@@ -11,13 +11,15 @@ import threading
 from collections.abc import AsyncGenerator, Callable
 from contextlib import ExitStack, aclosing, suppress
 from types import TracebackType
-from typing import Any, Self
+from typing import Self, TypeVar, assert_never
 
 from qlinkgen.link.events import Event
-from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Steps
-from qlinkgen.link.transaction import Reply
+from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Steps, Tell
+from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
 from qlinkgen.transport.port import Port
+
+_Result = TypeVar("_Result")
 
 
 class AsyncMaster(MasterDriver):
@@ -33,7 +35,7 @@ class AsyncMaster(MasterDriver):
         super().__init__(engine, port, on_event)
         self._lock = asyncio.Lock()
 
-    async def transact(self, request: Any, *, attempts: int | None = None, trial: bool = False) -> Reply:
+    async def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """Ask, and return the answer with the number of attempts and the time that it took.
 
         A task that is cancelled leaves the bus usable: the next request waits for a quiet line.
@@ -59,7 +61,7 @@ class AsyncMaster(MasterDriver):
                 self._report()
 
     async def run(
-        self, procedure: Procedure[Outcome], progress: Callable[[Any], None] | None = None
+        self, procedure: Procedure[Outcome], progress: Callable[[Report], None] | None = None
     ) -> Outcome:
         """Run a procedure to its end; `progress` is called with what it tells on the way."""
         steps = Steps(procedure)
@@ -69,11 +71,11 @@ class AsyncMaster(MasterDriver):
                     progress(report)
         return steps.result
 
-    def iterate(self, procedure: Procedure[Outcome]) -> AsyncGenerator[Any, None]:
+    def iterate(self, procedure: Procedure[Outcome]) -> AsyncGenerator[Report, None]:
         """Run a procedure as an iterator over what it tells; it goes on as the iterator is asked for more."""
         return self._each(Steps(procedure))
 
-    async def _each(self, steps: Steps[Outcome]) -> AsyncGenerator[Any, None]:
+    async def _each(self, steps: Steps[Outcome]) -> AsyncGenerator[Report, None]:
         try:
             while steps.advance():
                 step = steps.wanted
@@ -87,8 +89,10 @@ class AsyncMaster(MasterDriver):
                 elif isinstance(step, Pause):
                     await sleep(self.port, step.seconds)
                     steps.outcome = self.port.now()
-                else:
+                elif isinstance(step, Tell):
                     yield step.report
+                else:
+                    assert_never(step)
         finally:
             steps.close()
 
@@ -106,8 +110,7 @@ async def read(port: Port, timeout: float) -> bytes:
     if data := port.read(0):
         return data
     if port.fileno() is None:
-        came: bytes = await _in_thread(port.read, timeout)
-        return came
+        return await _in_thread(port.read, timeout)
     await _readable(port, timeout)
     return port.read(0)
 
@@ -174,7 +177,7 @@ async def _readable(port: Port, timeout: float) -> None:
         timer.cancel()
 
 
-async def _in_thread(function: Callable[[float], Any], seconds: float) -> Any:
+async def _in_thread(function: Callable[[float], _Result], seconds: float) -> _Result:
     """Call in a thread; a cancelled caller still waits for it, since a port serves one at a time."""
     call = asyncio.ensure_future(asyncio.to_thread(function, seconds))
     cancelled: asyncio.CancelledError | None = None

@@ -5,11 +5,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Generator
 from types import TracebackType
-from typing import Any, Self
+from typing import Self, assert_never
 
 from qlinkgen.link.events import Event
-from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Steps
-from qlinkgen.link.transaction import Reply
+from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Steps, Tell
+from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
 from qlinkgen.transport.forking import tell_of_forks
 from qlinkgen.transport.port import Port
@@ -33,7 +33,7 @@ class BlockingMaster(MasterDriver):
         self._asking: int | None = None  # the thread that holds it
         tell_of_forks(self)
 
-    def transact(self, request: Any, *, attempts: int | None = None, trial: bool = False) -> Reply:
+    def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """Ask, and return the answer with the number of attempts and the time that it took.
 
         Raises:
@@ -67,30 +67,32 @@ class BlockingMaster(MasterDriver):
             if self.engine.busy:
                 self.engine.abort(self.port.now())
 
-    def run(self, procedure: Procedure[Outcome], progress: Callable[[Any], None] | None = None) -> Outcome:
+    def run(self, procedure: Procedure[Outcome], progress: Callable[[Report], None] | None = None) -> Outcome:
         """Run a procedure to its end; `progress` is called with what it tells on the way."""
         steps = Steps(procedure)
         try:
             while steps.advance():
-                if not self._do(steps) and progress is not None:
-                    progress(steps.wanted.report)
+                told = self._do(steps)
+                if told is not None and progress is not None:
+                    progress(told.report)
             return steps.result
         finally:
             steps.close()
 
-    def iterate(self, procedure: Procedure[Outcome]) -> Generator[Any, None, Outcome]:
+    def iterate(self, procedure: Procedure[Outcome]) -> Generator[Report, None, Outcome]:
         """Run a procedure as an iterator over what it tells; it goes on as the iterator is asked for more."""
         steps = Steps(procedure)
         try:
             while steps.advance():
-                if not self._do(steps):
-                    yield steps.wanted.report
+                told = self._do(steps)
+                if told is not None:
+                    yield told.report
             return steps.result
         finally:
             steps.close()
 
-    def _do(self, steps: Steps[Outcome]) -> bool:
-        """Do what a procedure wants; False where it wants to tell something."""
+    def _do(self, steps: Steps[Outcome]) -> Tell | None:
+        """Do what a procedure wants; return what it wants to tell."""
         step = steps.wanted
         if isinstance(step, Ask):
             try:
@@ -100,9 +102,11 @@ class BlockingMaster(MasterDriver):
         elif isinstance(step, Pause):
             self.port.sleep(step.seconds)
             steps.outcome = self.port.now()
+        elif isinstance(step, Tell):
+            return step
         else:
-            return False
-        return True
+            assert_never(step)
+        return None
 
     def __enter__(self) -> Self:
         return self

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator
-from typing import Any, Protocol
+from typing import Protocol
 
 from qlinkgen.link.codec import Module
+from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.events import Event
 from qlinkgen.link.timing import Timing
-from qlinkgen.link.transaction import Reply
+from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.port import Ability, Port
 
 #: Where a port cannot say how long it holds bytes back, the slowest of the common adapters is assumed: the
@@ -45,7 +47,7 @@ class Asker(Protocol):
     """What a driver needs of an engine that asks: `MasterEngine` on a bus, `HostEngine` at a host port."""
 
     #: What happened, oldest first.
-    events: Any
+    events: deque[Event]
     #: Whether the events tell of every request and answer.
     verbose: bool
 
@@ -55,11 +57,11 @@ class Asker(Protocol):
         ...
 
     @property
-    def total(self) -> Any:
+    def total(self) -> LinkCounters:
         """Counts of what happened."""
         ...
 
-    def start(self, request: Any, now: float, *, attempts: int | None, trial: bool) -> None:
+    def start(self, request: Question, now: float, *, attempts: int | None, trial: bool) -> None:
         """Begin a transaction."""
         ...
 
@@ -125,7 +127,7 @@ class MasterDriver:
 
 
 def conversation(
-    engine: Asker, port: Port, request: Any, attempts: int | None, *, trial: bool
+    engine: Asker, port: Port, request: Question, attempts: int | None, *, trial: bool
 ) -> Generator[float, bytes, Reply]:
     """One transaction: yields how long to wait for bytes, is sent those that came.
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from qlinkgen.codecs import qlink
 from qlinkgen.link import Monitor, Timing
+from qlinkgen.link.codec import address_of
 from qlinkgen.link.events import Damaged, Stray
 from qlinkgen.link.monitor import Asked, Replied, Unanswered, _same_frames
 from qlinkgen.protocols.qlink.matching import ACCEPTS
@@ -257,7 +258,7 @@ def test_everything_in_a_stream_is_accounted_for(stream: bytes) -> None:
                 size += len(each.message.to_frame())
             case Damaged():
                 size += len(each.fault.raw)
-        waits = isinstance(each, Asked) and each.request.node != 0
+        waits = isinstance(each, Asked) and address_of(each.request) != 0
         waits &= isinstance(each, Asked) and not isinstance(
             each.request, (qlink.NodeStartRequest, qlink.NodeStopRequest)
         )
@@ -347,7 +348,7 @@ def test_a_broadcast_of_a_command_that_a_node_would_answer() -> None:
 
 
 def test_where_one_decoder_has_seen_more_than_the_other_the_bytes_tell_what_is_the_same() -> None:
-    fault = Damaged(0.0, None, None)  # anything that is no message
+    fault = qlink.Fault("frame", 0, b"")
     both = list(_same_frames([ASK, RESET, SYNC], [fault, fault, ANSWER, RESET_DONE, fault]))
     assert both == [(ASK, None), (RESET, RESET_DONE), (SYNC, None), (None, ANSWER)]
     assert list(_same_frames([], [RESET_DONE])) == [(None, RESET_DONE)]

@@ -8,9 +8,8 @@ from typing import Any
 from qlinkgen.codecs import mc1231a
 from qlinkgen.errors import LinkError
 from qlinkgen.link.host import HostEngine
-from qlinkgen.link.host_rules import Packet
 from qlinkgen.link.host_timing import HostTiming
-from qlinkgen.link.transaction import Reply
+from qlinkgen.link.transaction import Packet, Reply
 from qlinkgen.protocols.mc1231a import ChipEngine
 from qlinkgen.protocols.mc1231a.facts import RULES, SELECT
 

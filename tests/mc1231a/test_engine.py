@@ -14,8 +14,8 @@ from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
 from qlinkgen.link.events import Damaged, Failed, Sent, TimedOut
 from qlinkgen.link.host_events import Filled, InStep, OutOfStep
-from qlinkgen.link.host_rules import Packet
 from qlinkgen.link.host_timing import HostTiming
+from qlinkgen.link.transaction import Packet
 from qlinkgen.protocols.mc1231a import ChipEngine, ChipSet
 from qlinkgen.protocols.mc1231a.facts import SELECT
 from tests.mc1231a.line import BAUD, BYTE, SLACK, Device, Line, chip_device, make, on_axis, sample
@@ -56,8 +56,9 @@ def test_one_transaction_at_a_time_and_only_requests() -> None:
     engine = make()
     with pytest.raises(RuntimeError, match="no transaction has ended"):
         engine.take()
+    response: Any = mc1231a.GetKpResponse()
     with pytest.raises(TypeError, match="GetKpResponse was given"):
-        engine.start(mc1231a.GetKpResponse(), 0.0)
+        engine.start(response, 0.0)
     with pytest.raises(ValueError, match="1 or more"):
         engine.start(GET_KP, 0.0, attempts=0)
     with pytest.raises(mc1231a.EncodeError):

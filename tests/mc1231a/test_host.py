@@ -11,8 +11,8 @@ import pytest
 from qlinkgen.codecs import mc1231a
 from qlinkgen.errors import PortLost, PortMissing
 from qlinkgen.link.host_events import InStep, OutOfStep
-from qlinkgen.link.host_rules import Packet
 from qlinkgen.link.procedure import Ask, Pause, Procedure
+from qlinkgen.link.transaction import Packet
 from qlinkgen.protocols.mc1231a import AsyncHost, ChipEngine, ChipSet, Host
 from qlinkgen.protocols.mc1231a.facts import SELECT
 from qlinkgen.sim import VirtualPort

@@ -20,6 +20,7 @@ from decimal import Decimal
 from typing import Any
 
 from qlinkgen.codecs import trio
+from qlinkgen.link.codec import Message
 from qlinkgen.link.ring_events import Broken, NetStat, Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
 from qlinkgen.protocols.trio.face import Node, engine_of
@@ -151,7 +152,7 @@ class Soak:
         self._wire.wake(link)
         return Entry((source + address) % len(RING), message)
 
-    def _key(self, message: trio.Message) -> tuple[Any, ...]:
+    def _key(self, message: Message) -> tuple[Any, ...]:
         return (type(message), *(getattr(message, name) for name in message.FIELDS))
 
     def _collect(self, entries: dict[tuple[Any, ...], Entry]) -> tuple[int, int]:

@@ -10,6 +10,7 @@ from decimal import Decimal
 import pytest
 
 from qlinkgen.codecs import trio
+from qlinkgen.link.codec import Message
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
@@ -30,7 +31,7 @@ MESSAGES: dict[str, Callable[[int], trio.Message]] = {
 }
 
 
-def fields(message: trio.Message) -> tuple[object, ...]:
+def fields(message: Message) -> tuple[object, ...]:
     return (type(message), *(getattr(message, name) for name in message.FIELDS))
 
 

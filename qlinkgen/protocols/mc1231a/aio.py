@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import TypeVar
 
 from qlinkgen.codecs import mc1231a
 from qlinkgen.codecs.mc1231a_bus import AsyncAxisCalls, AsyncHostCalls
 from qlinkgen.link.events import Event
 from qlinkgen.link.host import HostEngine
-from qlinkgen.link.host_rules import Packet
 from qlinkgen.protocols.mc1231a import updating
 from qlinkgen.protocols.mc1231a.facts import SELECT, check_axis
-from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine
+from qlinkgen.protocols.mc1231a.usage import Checksum, Usage, make_engine, packet
 from qlinkgen.transport.aio import AsyncMaster
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
@@ -47,7 +46,7 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
     ) -> None:
         """Take over a port; the arguments are those of `Host`."""
         engine = make_engine(port, checksum=checksum, attempts=attempts, slack=slack, forgets=forgets)
-        super().__init__(cast(Any, engine), port, on_event=on_event)
+        super().__init__(engine, port, on_event=on_event)
         self.command_errors = command_errors
         self.usage = Usage()
 
@@ -93,7 +92,7 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
         """Send a packet, for an axis if one is given, and return its answer."""
         self.usage.note(request)
         context = None if axis is None else SELECT[check_axis(axis)]
-        answer: R = (await self.transact(Packet(request, context))).response
+        answer: R = (await self.transact(packet(request, context))).response
         return answer
 
     async def raise_command_error(self, axis: int) -> int:
@@ -127,7 +126,7 @@ class AsyncAxis(AsyncAxisCalls):
     async def ask(self, request: mc1231a.Message, response: type[R]) -> R:  # noqa: ARG002  # for type checkers
         """Send a packet for this axis and return its answer."""
         self.host.usage.note(request)
-        answer: R = (await self.host.transact(Packet(request, self._context))).response
+        answer: R = (await self.host.transact(packet(request, self._context))).response
         return answer
 
     async def raise_command_error(self) -> int:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import difflib
 import warnings
 from collections.abc import Collection
-from typing import Any, Literal
+from typing import Literal
 
 from qlinkgen.codecs import mc1231a
 from qlinkgen.link.host import HostEngine
 from qlinkgen.link.host_timing import HostTiming
+from qlinkgen.link.transaction import Packet
 from qlinkgen.protocols.mc1231a.facts import RULES
 from qlinkgen.transport.conversation import host_slack
 from qlinkgen.transport.port import Ability, Port
@@ -28,7 +29,7 @@ class Usage:
     def __init__(self) -> None:
         self._weak = {each.request: each for each in mc1231a.COMMANDS.values() if not each.confirmed}
 
-    def note(self, request: Any) -> None:
+    def note(self, request: mc1231a.Message) -> None:
         """Warn if this is the first use of such a command; the caller of our caller's caller is shown."""
         if self._weak:
             command = self._weak.pop(type(request), None)
@@ -39,6 +40,13 @@ class Usage:
                     UnconfirmedCommand,
                     stacklevel=4,
                 )
+
+
+def packet(request: mc1231a.Message, context: mc1231a.Request | None) -> Packet:
+    """Return a request as an engine takes it. Raises TypeError for a response."""
+    if not isinstance(request, mc1231a.Request):
+        raise TypeError(f"{type(request).__name__} was given; a request of this protocol is needed")
+    return Packet(request, context)
 
 
 def make_engine(

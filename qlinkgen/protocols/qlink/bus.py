@@ -15,7 +15,7 @@ from qlinkgen.link.events import Event
 from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import FAILURES
-from qlinkgen.link.transaction import Reply
+from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.protocols.qlink import survey
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
@@ -99,7 +99,7 @@ class Bus(BlockingMaster, MasterCalls):
         port = open_port(name, baud=baud or BAUD)
         return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
 
-    def transact(self, request: qlink.Message, *, attempts: int | None = None, trial: bool = False) -> Reply:
+    def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """As `BlockingMaster.transact`.
 
         Raises:

@@ -11,11 +11,12 @@ from os import PathLike
 
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import CommandError
-from qlinkgen.link.codec import Codec
+from qlinkgen.link.codec import Codec, Message
 from qlinkgen.link.echo import EchoMode
 from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import Procedure
+from qlinkgen.link.transaction import Question
 from qlinkgen.protocols.qlink import loading, motion, pacing
 from qlinkgen.protocols.qlink.arguments import positive, whole
 from qlinkgen.protocols.qlink.facts import BROADCAST
@@ -25,7 +26,7 @@ from qlinkgen.transport.conversation import timing_of
 from qlinkgen.transport.port import Port
 
 #: Requests after which a motor may have stopped, so that its last status is outdated.
-_STOPPING = {qlink.NodeStopRequest, qlink.ClearFifoRequest, qlink.NodeResetRequest}
+_STOPPING = (qlink.NodeStopRequest, qlink.ClearFifoRequest, qlink.NodeResetRequest)
 #: Syncs of one run: more than a bus can send in its life.
 MOST_SYNCS = 1 << 62
 
@@ -65,7 +66,7 @@ class Memory:
         self.syncs.counter = (number + 1) & 0xFF
         return number
 
-    def check(self, request: qlink.Message) -> None:
+    def check(self, request: Question) -> None:
         """Refuse a request that the node is going to refuse, as far as its last status says.
 
         Raises:
@@ -84,13 +85,12 @@ class Memory:
                 status=status,
             )
 
-    def note(self, request: qlink.Message, response: qlink.Message | None) -> None:
+    def note(self, request: Question, response: Message | None) -> None:
         """Learn from a request that was sent, perhaps, and from its response where one came."""
-        kind = type(request)
-        if kind is qlink.MotionRequest:
+        if isinstance(request, qlink.MotionRequest):
             if isinstance(response, qlink.MotionResponse):
                 self.statuses[response.node] = response.motor_status
-        elif kind in _STOPPING:
+        elif isinstance(request, _STOPPING):
             if request.node == BROADCAST:
                 self.statuses.clear()
             else:
