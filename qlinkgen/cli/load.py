@@ -74,7 +74,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen load /dev/ttyUSB0 --node 3 program.hex
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     text = _text(file)
-    with_crc(qlink, crc)
+    with_crc(qlink, qlink.Codec, crc)
     with open_line(port, baud or BAUD) as opened:
         bus = Bus(opened, attempts=attempts, echo=echo or "auto", health=None, slack=slack, crc=crc)
         with _told(node, len(text)) as show:

@@ -60,7 +60,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen scan /dev/ttyUSB0 --nodes 1-4 --json
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     numbers = parse_nodes(nodes, NODES[0], NODES[-1])
-    with_crc(qlink, crc)
+    with_crc(qlink, qlink.Codec, crc)
     with open_line(port, baud or BAUD) as opened:
         bus = Bus(opened, echo=echo or "auto", health=None, slack=slack, crc=crc)
         with _progress() as show:

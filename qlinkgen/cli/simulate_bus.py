@@ -49,7 +49,7 @@ def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, lis
     if is_shipped(name, "qlink"):
         from qlinkgen.codecs import qlink  # noqa: PLC0415  # other protocols do without
 
-        return with_crc(qlink, crc), _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
+        return with_crc(qlink, qlink.Codec, crc), _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
     from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does without the compiler
     from qlinkgen.sim.generic import GenericNode  # noqa: PLC0415
 

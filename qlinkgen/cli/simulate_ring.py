@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.simulating import run_bus, say
 from qlinkgen.cli.wire_options import counted, with_crc
+from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.face import Node, engine_of
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
@@ -23,7 +26,7 @@ def simulate_ring(
 
     if plan is not None and plan.to != "both":
         raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; leave out to={plan.to}")
-    codec = with_crc(trio, crc)
+    codec: RingCodec = with_crc(trio, trio.Codec, crc)
     given = RING if ring is None else ring
     try:
         bus = ring_bus(given, link=link, baud=baud, faults=plan, codec=codec)
@@ -40,11 +43,15 @@ def _account(node: Node) -> str:
     engine = engine_of(node)
     counters = engine.counters
     seen = f"{counters.taken} taken, {counters.passed} sent on, NETSTAT {int(engine.netstat)}"
-    if isinstance(node, CoordinatorNode):
-        return f"coordinator: {seen}{_received(node)}{_variables(node)}"
-    if isinstance(node, KeypadNode):
-        return f"keypad: {seen}{_state(node)}"
-    return f"passive: {seen}"
+    match node:
+        case CoordinatorNode():
+            return f"coordinator: {seen}{_received(node)}{_variables(node)}"
+        case KeypadNode():
+            return f"keypad: {seen}{_state(node)}"
+        case RingNode():
+            return f"passive: {seen}"
+        case _:
+            assert_never(node)
 
 
 def _received(node: CoordinatorNode) -> str:

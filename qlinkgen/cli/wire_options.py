@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from types import ModuleType
-from typing import Literal, NamedTuple, cast
+from collections.abc import Callable, Mapping
+from typing import Literal, NamedTuple, TypeVar, cast
 
 import click
 
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.kinds import is_shipped
-from qlinkgen.link.codec import Codec
 from qlinkgen.link.echo import PROBE, EchoMode
 from qlinkgen.link.transaction import Accepts
 from qlinkgen.model.protocol import Protocol
@@ -65,6 +63,8 @@ echo_option = click.option(
 )
 
 
+A = TypeVar("A")
+B = TypeVar("B")
 Parity = Literal["none", "even", "odd"]
 
 
@@ -153,10 +153,10 @@ def matching(name: str) -> Mapping[str, Accepts] | None:
     return ACCEPTS
 
 
-def with_crc(codec: ModuleType, crc: str | None) -> Codec:
-    """A codec that ships, or the same with another CRC if one is wanted."""
+def with_crc(plain: A, choose: Callable[[str], B], crc: str | None) -> A | B:
+    """A codec that ships, or what its class `Codec` makes of another CRC if one is wanted."""
     try:
-        return cast(Codec, codec if crc is None else codec.Codec(crc))
+        return plain if crc is None else choose(crc)
     except ValueError as error:
         raise Failure(f"--set crc={crc}: {error}") from None
 

@@ -127,7 +127,7 @@ class RingNode:
     def __init__(
         self,
         codec: RingCodec,
-        on_message: Callable[[Any, float], object] | None = None,
+        on_message: Callable[[Any, float], object] | None = None,  # Any: a message of the codec's own class
         *,
         cut_through: bool = True,
         baud: int | None = None,

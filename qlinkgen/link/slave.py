@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, Protocol
 
-from qlinkgen.link.codec import Codec, Framed, address_of, is_message
+from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message
 from qlinkgen.link.echo import EchoCanceller
 
 
@@ -15,7 +15,7 @@ class Station(Protocol):
     number: int
 
     # Any: a station handles messages of its own protocol alone.
-    def handle(self, request: Any, now: float) -> Framed | None:
+    def handle(self, request: Any, now: float) -> Message | None:
         """Do what a request says; return the response, None where there is none."""
         ...
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, TypedDict
 
 from qlinkgen.sim.fault_kinds import KINDS
 
@@ -50,6 +50,14 @@ class Injected(NamedTuple):
     data: bytes
 
 
+class PlainCounts(TypedDict):
+    """Counts of faults in plain types."""
+
+    to_slaves: dict[str, int]
+    to_master: dict[str, int]
+    silenced: int
+
+
 class FaultCounts:
     """How often each kind of fault was injected.
 
@@ -75,7 +83,7 @@ class FaultCounts:
         """All faults of all kinds."""
         return sum(self.to_slaves.values()) + sum(self.to_master.values())
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> PlainCounts:
         """Return everything in plain types."""
         return {TO_SLAVES: dict(self.to_slaves), TO_MASTER: dict(self.to_master), "silenced": self.silenced}
 

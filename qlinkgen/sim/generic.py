@@ -6,10 +6,10 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from qlinkgen.link.codec import Codec
+from qlinkgen.link.codec import Codec, Framed, Message
 
 #: What a rule of a generated module is called, to its smallest legal value.
-_SMALLEST: Mapping[str, Callable[[Any], Any]] = {
+_SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
     "Whole": lambda rule: rule.ranges[0][0],
     "Mask": lambda rule: 0,  # noqa: ARG005
     "Items": lambda rule: [rule.item.ranges[0][0]] * rule.fewest,
@@ -41,7 +41,7 @@ class GenericNode:
             if command.response is not None
         }
 
-    def handle(self, request: Any, now: float) -> Any | None:  # noqa: ARG002  # what stations are asked
+    def handle(self, request: Framed, now: float) -> Message | None:  # noqa: ARG002  # what stations are asked
         """Return the response to a request; None where the command has none, or where it is no command."""
         self.requests += 1
         command = self._commands.get(type(request))
@@ -51,12 +51,13 @@ class GenericNode:
         values.update({name: getattr(request, name) for name in command.echoes})
         if address := command.response.ADDRESS:
             values[address] = self.number
-        return command.response(**values)
+        make: Callable[..., Message] = command.response
+        return make(**values)
 
 
-def required_values(message: Any) -> dict[str, Any]:
+def required_values(message: type[Message]) -> dict[str, object]:
     """Return a legal value for each field of a message class that has no default; the address is left out."""
-    rules = {rule.name: rule for rule in message.RULES}
+    rules = {rule.name: rule for rule in getattr(message, "RULES", ())}
     parameters = inspect.signature(message).parameters.values()
     return {
         each.name: _SMALLEST[type(rules[each.name]).__name__](rules[each.name])

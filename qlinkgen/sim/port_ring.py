@@ -11,10 +11,11 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterable, Sequence
-from typing import Any, Self
+from typing import Self, Unpack
 
 from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio.face import Node, engine_of
+from qlinkgen.protocols.trio.options import RingOptions
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.pty_bus import PtyBus, make_looker
 from qlinkgen.sim.ring import Faults, RingWire
@@ -156,7 +157,7 @@ def ring_bus(
     link: str | os.PathLike[str] | None = None,
     baud: int | None = None,
     faults: Faults = None,
-    **options: Any,
+    **options: Unpack[RingOptions],
 ) -> RingBus:
     """Put simulated nodes on a ring, and the outside at a new pty.
 
@@ -175,7 +176,7 @@ def ring_bus(
         CapabilityMissing: this system has no ptys.
         SimulationError: an argument out of its range.
     """
-    nodes = make_nodes(ring, **{"baud": baud, **options})
+    nodes = make_nodes(ring, baud=baud, **options)
     wire = RingWire(trio, baud=baud, faults=faults)
     for number, node in enumerate(nodes):
         wire.attach(engine_of(node), f"node {number}")

@@ -9,30 +9,31 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TypeVar
 
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.transport.handing_over import HandOver
+
+Result = TypeVar("Result")
 
 
 class _Program(threading.Thread):
     """One program, and the baton that lets it run."""
 
-    def __init__(self, owner: Programs, function: Callable[[], Any]) -> None:
-        super().__init__(name=getattr(function, "__name__", "program"), daemon=True)
+    def __init__(self, owner: Programs, name: str, function: Callable[[], None]) -> None:
+        super().__init__(name=name, daemon=True)
         self.owner = owner
         self.function = function
         self.baton = threading.Semaphore(0)
         self.due = math.inf
         self.ended = False
-        self.result: Any = None
         self.failure: BaseException | None = None
 
     def run(self) -> None:
         self.baton.acquire()
         with HandOver(self._failed):
             self.owner.check()
-            self.result = self.function()
+            self.function()
         self.ended = True
         self.owner.pass_on(self)
 
@@ -55,7 +56,7 @@ class Programs:
         self._stopping = False
         self._stuck = False
 
-    def run(self, functions: Sequence[Callable[[], Any]]) -> list[Any]:
+    def run(self, functions: Sequence[Callable[[], Result]]) -> list[Result]:
         """Run all programs to their ends; return what they return.
 
         Raises:
@@ -65,7 +66,15 @@ class Programs:
         if self._programs:
             raise SimulationError("programs are running already: start them all with one call of run")
         self._stopping = self._stuck = False
-        programs = self._programs = [_Program(self, function) for function in functions]
+        results: dict[int, Result] = {}
+
+        def keeping(place: int, function: Callable[[], Result]) -> Callable[[], None]:
+            return lambda: results.update({place: function()})
+
+        programs = self._programs = [
+            _Program(self, getattr(each, "__name__", "program"), keeping(place, each))
+            for place, each in enumerate(functions)
+        ]
         for program in programs:
             program.start()
         if programs:
@@ -77,7 +86,7 @@ class Programs:
         failures = [program.failure for program in programs if program.failure is not None]
         if failures:
             raise next((each for each in failures if not isinstance(each, _Stopped)), failures[0])
-        return [program.result for program in programs]
+        return [results[place] for place in range(len(programs))]
 
     def give_way(self, due: float) -> None:
         """Wait until something has happened, at the latest until `due`.

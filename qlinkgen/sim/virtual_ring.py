@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Iterable
-from typing import Any, TypeVar
+from typing import TypeVar, Unpack
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
@@ -14,6 +14,7 @@ from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.face import Node, engine_of
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.nodes import MembraneKeypad, MotionCoordinator
+from qlinkgen.protocols.trio.options import NodeOptions, RingOptions
 from qlinkgen.sim.errors import SimulationError
 from qlinkgen.sim.programs import Programs
 from qlinkgen.sim.ring import Faults, RingWire
@@ -21,15 +22,22 @@ from qlinkgen.transport.ring_aio import AsyncRingDriver
 from qlinkgen.transport.ring_driver import GIVE_WAY, RingDriver
 
 T = TypeVar("T")
+
+
+def _passive(**options: Unpack[NodeOptions]) -> RingNode:
+    options.setdefault("codec", trio)
+    return RingNode(**options)
+
+
 #: Makes a node of each kind that a ring can be described with; options are those of `RingNode`.
 KINDS: dict[str, Callable[..., Node]] = {
     "coordinator": CoordinatorNode,
     "keypad": KeypadNode,
-    "passive": lambda **options: RingNode(options.pop("codec", trio), **options),
+    "passive": _passive,
 }
 
 
-def make_nodes(ring: str | Iterable[str | Node], **options: Any) -> list[Node]:
+def make_nodes(ring: str | Iterable[str | Node], **options: Unpack[NodeOptions]) -> list[Node]:
     """Return the nodes of a ring in their order.
 
     Args:
@@ -46,7 +54,7 @@ def make_nodes(ring: str | Iterable[str | Node], **options: Any) -> list[Node]:
     return nodes
 
 
-def _make(kind: str, options: dict[str, Any]) -> Node:
+def _make(kind: str, options: NodeOptions) -> Node:
     if kind not in KINDS:
         raise SimulationError(f"there is no node of the kind {kind!r}; a ring is made of {', '.join(KINDS)}")
     return KINDS[kind](**options)
@@ -66,7 +74,7 @@ class VirtualRing:
         *,
         baud: int | None = None,
         faults: Faults = None,
-        **options: Any,
+        **options: Unpack[RingOptions],
     ) -> None:
         """Make a ring.
 
@@ -79,7 +87,7 @@ class VirtualRing:
         Raises:
             SimulationError: an argument out of its range.
         """
-        self.nodes = make_nodes(ring, **{"baud": baud, **options})
+        self.nodes = make_nodes(ring, baud=baud, **options)
         self.wire = RingWire(trio, baud=baud, faults=faults, outside=False)
         for number, node in enumerate(self.nodes):
             self.wire.attach(engine_of(node), f"node {number}")
@@ -121,7 +129,7 @@ class VirtualRing:
 
     # time
 
-    def run(self, *programs: Callable[[], Any]) -> list[Any]:
+    def run(self, *programs: Callable[[], T]) -> list[T]:
         """Run blocking programs side by side to their ends; return what they return.
 
         Raises:

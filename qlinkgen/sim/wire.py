@@ -15,7 +15,7 @@ import math
 import random
 from collections.abc import Callable
 from heapq import heappop, heappush
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from qlinkgen.sim.echo import Echo
 from qlinkgen.sim.errors import SimulationError
@@ -103,7 +103,7 @@ class Wire:
         self._attached = 0
         self._connect()
         self._echo_route = Route(self._outside, (), outside=True, on_line=False)
-        self._queue: list[tuple[float, int, int, Any]] = []
+        self._queue: list[tuple[float, int, int, Sender | Chunk]] = []
         self._order = 0
         self._now = -math.inf
         self._sending: list[Chunk] = []
@@ -208,8 +208,8 @@ class Wire:
         """Return when something happens next, None when nothing ever will unless the outside sends."""
         queue = self._queue
         while queue:
-            at, kind, _, item = queue[0]
-            if kind != _TURN or item.due == at:
+            at, _, _, item = queue[0]
+            if isinstance(item, Chunk) or item.due == at:
                 return at
             heappop(queue)
         return None
@@ -249,7 +249,7 @@ class Wire:
         queue, at_once, last = self._queue, 0, self._now
         while queue and queue[0][0] <= until:
             at, kind, _, item = heappop(queue)
-            if kind == _TURN and item.due != at:
+            if isinstance(item, Sender) and item.due != at:
                 continue  # its timer has changed since
             # A station that names a time gone by means now.
             if at > last:
@@ -259,20 +259,20 @@ class Wire:
                 at_once += 1
                 if at_once > _MOST_AT_ONCE:
                     self._give_up(item)
-            if kind == _ARRIVE:
+            if isinstance(item, Sender):
+                self._turn(last, item)
+            elif kind == _ARRIVE:
                 self._arrive(last, item)
                 if until_heard and self._heard:
                     return True
-            elif kind == _TURN:
-                self._turn(last, item)
             elif kind == _BEGIN:
                 self._begin(last, item)
             else:
                 self._submit(last, item)
         return False
 
-    def _give_up(self, item: Any) -> None:
-        station: Sender = item if isinstance(item, Sender) else item.route.sender
+    def _give_up(self, item: Sender | Chunk) -> None:
+        station = item if isinstance(item, Sender) else item.route.sender
         raise SimulationError(
             f"more than {_MOST_AT_ONCE} events at {self._now} s, the last at {station.name!r}: a timer must "
             "not stay due while nothing is sent, and who answers one another needs a baud or a turnaround"
@@ -280,7 +280,7 @@ class Wire:
 
     # events
 
-    def _push(self, at: float, kind: int, item: Any) -> None:
+    def _push(self, at: float, kind: int, item: Sender | Chunk) -> None:
         self._order = order = self._order + 1
         heappush(self._queue, (at, kind, order, item))
 

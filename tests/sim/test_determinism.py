@@ -6,6 +6,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -64,7 +65,7 @@ def test_in_processes_with_other_hashes() -> None:
 
 
 def test_pieces_change_nothing_but_the_pieces() -> None:
-    def outcome(chunks: Chunks) -> tuple[bytes, dict[str, object]]:
+    def outcome(chunks: Chunks) -> tuple[bytes, Mapping[str, object]]:
         plan = FaultPlan.parse("all=0.9,late=0,silent=0,delay=0,duplicate=0,seed=5")
         wire = Wire(baud=None, faults=plan, chunks=chunks)
         wire.attach(Answerer(1))

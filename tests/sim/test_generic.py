@@ -33,7 +33,7 @@ def test_every_command(path: Path) -> None:
             assert response is None
         else:
             assert response is not None
-            assert response.to_frame()
+            assert codec.encode(response)
             assert answers(command, request, response)
             assert address_of(response) == number
     assert node.requests == len(codec.COMMANDS)

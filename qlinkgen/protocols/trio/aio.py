@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any, Self
+from typing import Self, Unpack
 
 from qlinkgen.codecs import trio
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
@@ -12,6 +12,7 @@ from qlinkgen.protocols.trio.errors import NothingCame
 from qlinkgen.protocols.trio.face import TX_TIMEOUT, CoordinatorFace, Face, Item, N, paced_baud
 from qlinkgen.protocols.trio.facts import LINE_END, check_channel
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.protocols.trio.options import KeypadOptions, NodeOptions
 from qlinkgen.protocols.trio.printing import Number
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import OnEvent
@@ -63,10 +64,16 @@ class AsyncMotionCoordinator(CoordinatorFace, AsyncFace[CoordinatorNode]):
     """A Motion Coordinator for asyncio. The event loop keeps the node at work; see `MotionCoordinator`."""
 
     def __init__(
-        self, port: Port, *, tx_timeout: float = TX_TIMEOUT, on_event: OnEvent | None = None, **options: Any
+        self,
+        port: Port,
+        *,
+        tx_timeout: float = TX_TIMEOUT,
+        on_event: OnEvent | None = None,
+        **options: Unpack[NodeOptions],
     ) -> None:
         """Join the ring at a port, in a running event loop; see `MotionCoordinator`."""
-        node = CoordinatorNode(**{"baud": paced_baud(port), **options})
+        options.setdefault("baud", paced_baud(port))
+        node = CoordinatorNode(**options)
         super().__init__(node, drive_async(port, node.link, on_event=on_event), tx_timeout=tx_timeout)
 
     @classmethod
@@ -107,9 +114,12 @@ class AsyncMotionCoordinator(CoordinatorFace, AsyncFace[CoordinatorNode]):
 class AsyncMembraneKeypad(AsyncFace[KeypadNode]):
     """A membrane keypad for asyncio; see `MembraneKeypad`. Pressing a key waits for nothing."""
 
-    def __init__(self, port: Port, *, on_event: OnEvent | None = None, **options: Any) -> None:
+    def __init__(
+        self, port: Port, *, on_event: OnEvent | None = None, **options: Unpack[KeypadOptions]
+    ) -> None:
         """Join the ring at a port, in a running event loop; see `MembraneKeypad`."""
-        node = KeypadNode(**{"baud": paced_baud(port), **options})
+        options.setdefault("baud", paced_baud(port))
+        node = KeypadNode(**options)
         super().__init__(node, drive_async(port, node.link, on_event=on_event))
 
     @classmethod

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections import deque
 from decimal import Decimal
-from typing import Any, cast
+from typing import Unpack, cast
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Dropped
 from qlinkgen.protocols.trio.facts import KEYS, LAST_VARIABLE, OFFSET, RECEIVE_BUFFER, VARIABLE, wire_address
+from qlinkgen.protocols.trio.options import NodeOptions
 from qlinkgen.protocols.trio.printing import Number
 from qlinkgen.protocols.trio.variables import KeyTable, Variables
 
@@ -50,9 +51,10 @@ class CoordinatorNode:
 
     kind = "coordinator"
 
-    def __init__(self, **options: Any) -> None:
+    def __init__(self, **options: Unpack[NodeOptions]) -> None:
         """Make a node; the options are those of `RingNode`."""
-        self.link = RingNode(options.pop("codec", trio), self._handle, **options)
+        options.setdefault("codec", trio)
+        self.link = RingNode(on_message=self._handle, **options)
         self.vr = Variables()
         self.keys = KeyTable()
         self.received: deque[str] = deque()

@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Any, Generic, Self, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
@@ -51,6 +51,18 @@ def closing_on_error(port: Port) -> Iterator[Port]:
         raise
 
 
+class Driver(Protocol):
+    """What keeps a node at work, as far as all faces use it."""
+
+    def act(self, action: Callable[[float], T]) -> T:
+        """Do something to the node, at the time that the action is given."""
+        ...
+
+    def now(self) -> float:
+        """Return the time on the node's clock."""
+        ...
+
+
 class Face(Generic[N]):
     """What the faces share whatever drives their node.
 
@@ -60,7 +72,7 @@ class Face(Generic[N]):
         tx_timeout: seconds that a message waits for room in the transmit buffer.
     """
 
-    driver: Any
+    driver: Driver
 
     def __init__(self, node: N, *, tx_timeout: float = TX_TIMEOUT) -> None:
         self.node = node
@@ -92,13 +104,11 @@ class Face(Generic[N]):
             status, self.engine.netstat = self.engine.netstat, NetStat(0)
             return status
 
-        status: NetStat = self.driver.act(clear)
-        return status
+        return self.driver.act(clear)
 
     def now(self) -> float:
         """Return the time on the node's clock, in seconds."""
-        now: float = self.driver.now()
-        return now
+        return self.driver.now()
 
     def _put(self, message: trio.Message) -> Callable[[float], bool | None]:
         """What to try until there is room for a message."""

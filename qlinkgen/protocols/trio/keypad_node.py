@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Unpack
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Dropped
 from qlinkgen.protocols.trio.display import COLUMNS, ROWS, Display
 from qlinkgen.protocols.trio.facts import KEY_UP
+from qlinkgen.protocols.trio.options import NodeOptions
 
 _MODES = (trio.KeypadModeEnum.ON_ONLY, trio.KeypadModeEnum.ON_OFF)
 
@@ -51,9 +52,10 @@ class KeypadNode:
 
     kind = "keypad"
 
-    def __init__(self, *, rows: int = ROWS, columns: int = COLUMNS, **options: Any) -> None:
+    def __init__(self, *, rows: int = ROWS, columns: int = COLUMNS, **options: Unpack[NodeOptions]) -> None:
         """Make a keypad that was just switched on; the other options are those of `RingNode`."""
-        self.link = RingNode(options.pop("codec", trio), self._handle, **options)
+        options.setdefault("codec", trio)
+        self.link = RingNode(on_message=self._handle, **options)
         self.display = Display(rows, columns)
         self.counters = KeypadCounters()
         self.reset()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from typing import Self, Unpack
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
@@ -18,6 +18,13 @@ from qlinkgen.protocols.trio.face import (
 )
 from qlinkgen.protocols.trio.facts import LINE_END, check_channel
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
+from qlinkgen.protocols.trio.options import (
+    CoordinatorFaceOptions,
+    FaceOptions,
+    KeypadFaceOptions,
+    KeypadOptions,
+    NodeOptions,
+)
 from qlinkgen.protocols.trio.printing import Number
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Port
@@ -37,7 +44,12 @@ class MotionCoordinator(CoordinatorFace, BlockingFace[CoordinatorNode]):
     """
 
     def __init__(
-        self, port: Port, *, tx_timeout: float = TX_TIMEOUT, on_event: OnEvent | None = None, **options: Any
+        self,
+        port: Port,
+        *,
+        tx_timeout: float = TX_TIMEOUT,
+        on_event: OnEvent | None = None,
+        **options: Unpack[NodeOptions],
     ) -> None:
         """Join the ring at a port.
 
@@ -47,11 +59,12 @@ class MotionCoordinator(CoordinatorFace, BlockingFace[CoordinatorNode]):
             on_event: called with each event of the engine (`qlinkgen.link.ring_events`).
             options: `cut_through`, `patience` and `room` of `RingNode`.
         """
-        node = CoordinatorNode(**{"baud": paced_baud(port), **options})
+        options.setdefault("baud", paced_baud(port))
+        node = CoordinatorNode(**options)
         super().__init__(node, drive(port, node.link, on_event=on_event), tx_timeout=tx_timeout)
 
     @classmethod
-    def open(cls, name: str, baud: int = 115200, **options: Any) -> Self:
+    def open(cls, name: str, baud: int = 115200, **options: Unpack[CoordinatorFaceOptions]) -> Self:
         """Join the ring at a device or URL. Raises the errors of `open_port`."""
         with closing_on_error(open_port(name, baud=baud)) as port:
             return cls(port, **options)
@@ -137,13 +150,16 @@ class MembraneKeypad(BlockingFace[KeypadNode]):
         driver: what keeps it at work.
     """
 
-    def __init__(self, port: Port, *, on_event: OnEvent | None = None, **options: Any) -> None:
+    def __init__(
+        self, port: Port, *, on_event: OnEvent | None = None, **options: Unpack[KeypadOptions]
+    ) -> None:
         """Join the ring at a port; the options are `rows`, `columns`, and those of `RingNode`."""
-        node = KeypadNode(**{"baud": paced_baud(port), **options})
+        options.setdefault("baud", paced_baud(port))
+        node = KeypadNode(**options)
         super().__init__(node, drive(port, node.link, on_event=on_event))
 
     @classmethod
-    def open(cls, name: str, baud: int = 115200, **options: Any) -> Self:
+    def open(cls, name: str, baud: int = 115200, **options: Unpack[KeypadFaceOptions]) -> Self:
         """Join the ring at a device or URL. Raises the errors of `open_port`."""
         with closing_on_error(open_port(name, baud=baud)) as port:
             return cls(port, **options)
@@ -186,14 +202,18 @@ class PassiveNode(BlockingFace[RingNode]):
         driver: what keeps it at work.
     """
 
-    def __init__(self, port: Port, *, on_event: OnEvent | None = None, **options: Any) -> None:
+    def __init__(
+        self, port: Port, *, on_event: OnEvent | None = None, **options: Unpack[NodeOptions]
+    ) -> None:
         """Join the ring at a port; the options are those of `RingNode`."""
-        node = RingNode(options.pop("codec", trio), **{"baud": paced_baud(port), **options})
+        options.setdefault("codec", trio)
+        options.setdefault("baud", paced_baud(port))
+        node = RingNode(**options)
         node.verbose = True
         super().__init__(node, drive(port, node, on_event=on_event))
 
     @classmethod
-    def open(cls, name: str, baud: int = 115200, **options: Any) -> Self:
+    def open(cls, name: str, baud: int = 115200, **options: Unpack[FaceOptions]) -> Self:
         """Join the ring at a device or URL. Raises the errors of `open_port`."""
         with closing_on_error(open_port(name, baud=baud)) as port:
             return cls(port, **options)
