@@ -10,7 +10,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 from qlinkgen.errors import CapabilityMissing, PortError
 from qlinkgen.transport import settings
@@ -35,7 +35,7 @@ _PARITIES = {"none": "N", "even": "E", "odd": "O"}
 class PyserialChannel:
     """Reads and writes by pyserial, for ports without a descriptor that could be used directly."""
 
-    def __init__(self, serial: Any) -> None:
+    def __init__(self, serial: settings.SerialStream) -> None:
         self._serial = serial
         self._woken = False
 
@@ -201,15 +201,16 @@ def _scheme(name: str) -> str:
     return name.partition("://")[0].lower() if "://" in name else ""
 
 
-def _open(name: str, baud: int, parity: str, stop_bits: int) -> Any:
+def _open(name: str, baud: int, parity: str, stop_bits: int) -> settings.Serial:
     check_url(name)
     import serial  # noqa: PLC0415  # takes 9 ms, and simulated ports do without
 
     options = {"parity": parity, "stopbits": stop_bits, "timeout": _SLICE, "exclusive": True}
     try:
-        return serial.serial_for_url(name, baud, **options)
+        opened: settings.Serial = serial.serial_for_url(name, baud, **options)
     except (*SYSTEM_ERRORS, ValueError) as error:  # ValueError: a URL that pyserial does not know
         raise explain(name, error) from error
+    return opened
 
 
 def _capabilities(adapter: Adapter, *, accepted: bool, rs485: Ability) -> Capabilities:

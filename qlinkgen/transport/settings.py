@@ -10,8 +10,9 @@ import contextlib
 import os
 import socket
 import sys
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Protocol
 
 from qlinkgen.errors import CapabilityMissing
 from qlinkgen.transport.port import Ability
@@ -27,6 +28,42 @@ _RS485_ENABLED = 1
 
 #: Share by which both ends may differ: ten bits later the receiver must still sample within the right one.
 _BAUD_TOLERANCE = 0.025
+
+
+class SerialStream(Protocol):
+    """How bytes go through an open port of pyserial, which has no types."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once."""
+        ...
+
+    def read(self, size: int, /) -> bytes:
+        """Return so many bytes, or those that came within the timeout."""
+        ...
+
+    def write(self, data: bytes, /) -> int | None:
+        """Hand over bytes."""
+        ...
+
+    def flush(self) -> None:
+        """Wait until all is sent."""
+        ...
+
+
+class Serial(SerialStream, Protocol):
+    """An open port of pyserial; not every kind of port has what is not a method."""
+
+    rs485_mode: object
+    set_low_latency_mode: Callable[[bool], None]
+
+    def fileno(self) -> int:
+        """Return the file descriptor."""
+        ...
+
+    def close(self) -> None:
+        """Close the port."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +85,7 @@ class RS485Settings:
     delay_before_rx: float | None = None
 
 
-def set_rs485(serial: Any, name: str, wanted: RS485Settings) -> None:
+def set_rs485(serial: Serial, name: str, wanted: RS485Settings) -> None:
     """Make the driver switch the transceiver. Raises CapabilityMissing where it cannot."""
     from serial.rs485 import RS485Settings as Settings  # noqa: PLC0415  # few need it
 
@@ -74,7 +111,7 @@ def rs485_state(descriptor: int) -> Ability:
     return Ability.YES if state[0] & _RS485_ENABLED else Ability.NO
 
 
-def set_low_latency(serial: Any) -> bool:
+def set_low_latency(serial: Serial) -> bool:
     """Ask the driver to hand on bytes at once (ASYNC_LOW_LATENCY). Returns whether it agreed."""
     try:
         serial.set_low_latency_mode(True)

@@ -150,6 +150,12 @@ class Failing:
             return self.results.pop(0)
         raise serial.SerialException("connection failed")
 
+    def write(self, data: bytes) -> int:
+        raise serial.SerialException(f"{len(data)} bytes were not to be written")
+
+    def flush(self) -> None:
+        raise serial.SerialException("nothing is to be sent")
+
 
 def test_what_came_before_a_loss_is_read_first() -> None:
     channel = PyserialChannel(Failing(b"last ", b"words"))
