@@ -43,7 +43,7 @@ def test_faults_to_the_host_alone_make_nothing_up() -> None:
 def test_the_session_notices_a_chip_set_that_holds_something_else() -> None:
     session = Session(FaultPlan())
     session.run(50)
-    session.chip.axes[1].values["kp"] ^= 1
+    session.chip.axes[1].values["kp"] += 1
     session.chip.axes[2].auto_stop ^= True
     found = session.model.differences(session.chip)
     assert len(found) == 2

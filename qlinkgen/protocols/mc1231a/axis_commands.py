@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from operator import attrgetter
-from typing import Any, Final
+from typing import Final
 
 from qlinkgen.protocols.mc1231a.chip_axis import ChipAxis
 from qlinkgen.protocols.mc1231a.registers import BUFFERED, IMMEDIATE, READABLE
 from qlinkgen.protocols.mc1231a.trajectory import GEAR, S_CURVE, TRAPEZOIDAL, VELOCITY
 
-Action = Callable[..., Any]
+Action = Callable[..., float | None]
 
 
 def _writes(register: str) -> Action:
@@ -21,7 +21,7 @@ def _reads(register: str) -> Action:
     return lambda axis: axis.values[register]
 
 
-def _sets(attribute: str, value: Any) -> Action:
+def _sets(attribute: str, value: str | bool) -> Action:
     return lambda axis: setattr(axis, attribute, value)
 
 

@@ -7,7 +7,7 @@ two calls everything happens that time has brought, sample by sample.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import Final
 
 from qlinkgen.codecs import mc1231a
 from qlinkgen.protocols.mc1231a.axis_commands import AXIS_COMMANDS
@@ -18,7 +18,7 @@ from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
 SAMPLE_TIME: Final = 0.0005
 #: The number that get_vrsn gives; its layout was not found.
 VERSION: Final = 0x1231
-_Handler = Callable[[Any], Any]
+_Handler = Callable[[mc1231a.Request], float | None]
 
 
 class ChipSet:
@@ -68,11 +68,11 @@ class ChipSet:
 
     # Commands -----------------------------------------------------------------------------------------------
 
-    def knows(self, request: type[Any]) -> bool:
+    def knows(self, request: type[mc1231a.Request]) -> bool:
         """Whether a command, by the class of its request, is legal here."""
         return self._handlers[request][0] not in self.illegal
 
-    def handle(self, request: Any, now: float) -> Any:
+    def handle(self, request: mc1231a.Request, now: float) -> mc1231a.Response:
         """Do what a packet says; return its response."""
         self.advance(now)
         _, handler, respond = self._handlers[type(request)]
@@ -128,7 +128,7 @@ class ChipSet:
     def _do_set_output_dac16(self) -> None:
         self._output = mc1231a.OutputMode.DAC16
 
-    def _do_get_output_mode(self) -> Any:
+    def _do_get_output_mode(self) -> mc1231a.OutputMode:
         return self._output
 
     def _do_set_lmt_sense(self, value: int) -> None:
@@ -169,7 +169,7 @@ class ChipSet:
 
     def _look_at_interrupts(self) -> None:
         """The axis that was first keeps the interrupt; of two at once it is axis 1."""
-        asking = [n for n, axis in self.axes.items() if axis.events & axis.values["intrpt_mask"]]
+        asking = [n for n, axis in self.axes.items() if axis.events & int(axis.values["intrpt_mask"])]
         if self._interrupting not in asking:
             self._interrupting = asking[0] if asking else None
 
@@ -228,9 +228,11 @@ class ChipSet:
         self._look_at_interrupts()
 
 
-def _respond(response: Any) -> Callable[[Any], Any]:
+def _respond(response: type[mc1231a.Response] | None) -> Callable[[float | None], mc1231a.Response]:
     """How a result becomes a response: one field, or none."""
+    assert response is not None  # every packet is answered
+    make: Callable[..., mc1231a.Response] = response
     if not response.FIELDS:
-        return lambda _result: response()
+        return lambda _result: make()
     (field,) = response.FIELDS
-    return lambda result: response(**{field: result})
+    return lambda result: make(**{field: result})

@@ -5,7 +5,7 @@ What no source says is settled here, and listed in docs/mc1231a.md.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.protocols.mc1231a.facts import EVENTS
@@ -36,8 +36,8 @@ class ChipAxis:
 
     def __init__(self, limits: list[bool] | None = None) -> None:
         self.limits = limits if limits is not None else [False, False]
-        self.values: dict[str, Any] = after_reset()
-        self.active: dict[str, Any] = {name: self.values[name] for name in BUFFERED}
+        self.values: dict[str, float] = after_reset()
+        self.active: dict[str, float] = {name: self.values[name] for name in BUFFERED}
         self.pending: set[str] = set()
         self.trajectory = Trajectory()
         self.events = 0
@@ -104,7 +104,7 @@ class ChipAxis:
         """What is put out: by hand with an open loop, else the bias, since nothing needs force here."""
         if not self.motor_on:
             return self._open_loop_command
-        most: int = self.values["mtr_lmt"]
+        most = int(self.values["mtr_lmt"])
         return max(min(int(self.values["mtr_bias"]), most), -most)
 
     def take_capture(self) -> int:
@@ -172,7 +172,7 @@ class ChipAxis:
 
     def look_at_breakpoint(self, time: int) -> None:
         """Compare; `time` is in cycles since the reset."""
-        value: int = self.values["brk_pnt"]
+        value = int(self.values["brk_pnt"])
         here = {"time": time, "pos": self.target, "neg": -self.target, "actl_pos": self.actual}
         reached = here.get(self.armed, -self.actual)
         wanted = -value if self.armed in {"neg", "actl_neg"} else value
@@ -188,7 +188,7 @@ class ChipAxis:
 
     # Updates ------------------------------------------------------------------------------------------------
 
-    def write(self, name: str, value: Any) -> None:
+    def write(self, name: str, value: float) -> None:
         """Write a register."""
         self.values[name] = value
         if name in self.active:
@@ -207,7 +207,7 @@ class ChipAxis:
             else:
                 self.active[name] = self.values[name]
         if "buf_mtr_cmd" in pending and not self.motor_on:
-            self._open_loop_command = self.active["buf_mtr_cmd"]
+            self._open_loop_command = int(self.active["buf_mtr_cmd"])
         self._act(pending)
 
     def _refused(self, pending: set[str]) -> set[str]:
@@ -232,7 +232,7 @@ class ChipAxis:
             return
         elif trajectory.mode in _FIXED:
             if "pos" in pending:
-                trajectory.move_to(self.active["pos"] << COUNTS, self._ramp())
+                trajectory.move_to(int(self.active["pos"]) << COUNTS, self._ramp())
         elif trajectory.mode == VELOCITY and self.active["acc"] and not self._blocked(self.active["acc"]):
             trajectory.run_free()
 

@@ -6,8 +6,6 @@ sent as soon as a packet is complete, whether or not the host wants them.
 
 from __future__ import annotations
 
-from typing import Any
-
 from qlinkgen.codecs import mc1231a
 from qlinkgen.protocols.mc1231a.chip import ChipSet
 
@@ -63,9 +61,9 @@ class ChipEngine:
         self.chip = chip
         self.counters = ChipCounters()
         self.record: list[bytes] | None = [] if record else None
-        commands: list[Any] = list(mc1231a.COMMANDS.values())
-        self._requests = {command.id: command.request for command in commands}
-        self._answer_sizes = {command.id: command.response.MAX_SIZE for command in commands}
+        commands = mc1231a.COMMANDS.values()
+        self._requests: dict[int, type[mc1231a.Request]] = {each.id: each.request for each in commands}
+        self._answer_sizes = {each.id: each.response.MAX_SIZE for each in commands if each.response}
         self._forgets = forgets
         self._turnaround = turnaround
         self._buffer = b""
@@ -90,7 +88,7 @@ class ChipEngine:
             at += size
         self._buffer = buffer[at:]
 
-    def _carry_out(self, request: type[Any] | None, packet: bytes, now: float) -> None:
+    def _carry_out(self, request: type[mc1231a.Request] | None, packet: bytes, now: float) -> None:
         if not self._answer:
             self._due = now + self._turnaround
         if request is None or not self.chip.knows(request):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 from qlinkgen.codecs import mc1231a
 
@@ -25,9 +25,9 @@ IMMEDIATE: Final = tuple(
 #: Registers that can be read back.
 READABLE: Final = tuple(n for n in (*BUFFERED, *IMMEDIATE) if f"get_{n}" in mc1231a.COMMANDS)
 #: Values after reset that are not 0; no source has them.
-AFTER_RESET: Final[dict[str, Any]] = {"pos_err": 32767, "mtr_lmt": 32767, "phase_cnts": 129}
+AFTER_RESET: Final[dict[str, float]] = {"pos_err": 32767, "mtr_lmt": 32767, "phase_cnts": 129}
 
 
-def after_reset() -> dict[str, Any]:
+def after_reset() -> dict[str, float]:
     """Return every register as it is after a reset."""
     return {name: AFTER_RESET.get(name, 0) for name in (*BUFFERED, *IMMEDIATE)}

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from qlinkgen.codecs import qlink
+from qlinkgen.codecs._support import Items, Octets
 
 
 def _bus(name: str) -> int:
@@ -14,9 +13,10 @@ def _bus(name: str) -> int:
     return number
 
 
-def _most(message: type[Any], field: str) -> int:
+def _most(message: type[qlink.Message], field: str) -> int:
     """Return how many items a field of a message can hold."""
-    return next(int(rule.most) for rule in message.RULES if rule.name == field)
+    rules = (rule for rule in message.RULES if isinstance(rule, Items | Octets))
+    return next(rule.most for rule in rules if rule.name == field)
 
 
 BAUD = _bus("baud")

@@ -22,7 +22,7 @@ from importlib import import_module
 from io import StringIO
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Protocol
 
 from qlinkgen.errors import ExtraMissing, HexFileError
 from qlinkgen.protocols.qlink.arguments import whole
@@ -85,6 +85,16 @@ def pieces(text: bytes, size: int = PIECE) -> Iterator[bytes]:
     return (text[at : at + size] for at in range(0, len(text), size))
 
 
+class _Program(Protocol):
+    """What intelhex, which has no types, makes of a file."""
+
+    start_addr: dict[str, int] | None
+
+    def segments(self) -> list[tuple[int, int]]: ...
+
+    def tobinstr(self, *, start: int, size: int) -> bytes: ...
+
+
 def _judge() -> ModuleType:
     try:
         return import_module("intelhex")
@@ -123,15 +133,16 @@ def _lines(name: str, content: bytes) -> list[str]:
     return lines
 
 
-def _judged(judge: ModuleType, name: str, lines: list[str]) -> Any:
+def _judged(judge: ModuleType, name: str, lines: list[str]) -> _Program:
     try:
-        return judge.IntelHex(StringIO("\n".join(lines)))
+        program: _Program = judge.IntelHex(StringIO("\n".join(lines)))
     except judge.HexReaderError as fault:
         number = fault.line
         raise HexFileError(_complaint(judge, fault, lines[number - 1]), file=name, line=number) from fault
+    return program
 
 
-def _complaint(judge: ModuleType, fault: Any, line: str) -> str:
+def _complaint(judge: ModuleType, fault: Exception, line: str) -> str:
     """Say in full what the judge found: it names the rule, this adds what was seen and what to do."""
     if type(fault) is judge.HexRecordError:
         return _no_record(line)

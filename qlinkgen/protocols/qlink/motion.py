@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any
 
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import LinkError
@@ -251,7 +250,7 @@ def _progress(feed: _Feed, answer: qlink.MotionResponse) -> MotionProgress:
 
 def _bear(feed: _Feed, error: LinkError, patience: float) -> Procedure[None]:
     """Let a node be silent for a while: its words are kept, and the others go on."""
-    now: Any = yield Pause(0)
+    now: float = yield Pause(0)
     if feed.silent_since is None:
         feed.silent_since = now - error.elapsed
     if now - feed.silent_since >= patience:
