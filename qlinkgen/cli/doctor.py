@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from enum import Enum
-from typing import Any
 
 import click
 
@@ -14,6 +13,7 @@ from qlinkgen.cli.common import on_terminal
 from qlinkgen.cli.diagnosis import Advice, Cost, Echo, advise, cost, probe
 from qlinkgen.cli.tables import Table
 from qlinkgen.cli.wire_options import open_line
+from qlinkgen.model.values import Json
 from qlinkgen.protocols.qlink.facts import BAUD
 from qlinkgen.transport.conversation import ASSUMED_LATENCY, OTHER_PROGRAM, WAKE_UP
 from qlinkgen.transport.port import Ability, Capabilities, Port
@@ -85,8 +85,11 @@ def _show_json(port: Port, total: Cost, echo: Echo | None, advice: list[Advice])
     click.echo(json.dumps(answer, indent=2))
 
 
-def _plain(value: Any) -> Any:
-    return value.value if isinstance(value, Enum) else value
+def _plain(value: Json | Enum) -> Json:
+    if isinstance(value, Enum):
+        plain: Json = value.value
+        return plain
+    return value
 
 
 def _show_text(port: Port, total: Cost, echo: Echo | None, advice: list[Advice]) -> None:

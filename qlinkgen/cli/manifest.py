@@ -13,7 +13,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Any
+from typing import TypedDict
 
 from qlinkgen._resources import schemas_dir
 from qlinkgen.backends.base import is_generated
@@ -112,6 +112,13 @@ class Manifest:
         return Manifest(kept, before.hashes | self.hashes)
 
 
+class _Stored(TypedDict):
+    """An entry as the file has it."""
+
+    schema: str
+    files: dict[str, list[str]]
+
+
 def hash_of(text: str) -> str:
     """Identifies the text of a file that has no banner; line ends do not count."""
     return hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()
@@ -129,7 +136,7 @@ def schema_of(protocol: Protocol, given: str, root: Path) -> str:
     return Path(os.path.relpath(given, root)).as_posix()
 
 
-def _entry(found: Any) -> Entry:
+def _entry(found: _Stored) -> Entry:
     files = {str(target): [str(path) for path in paths] for target, paths in found["files"].items()}
     return Entry(str(found["schema"]), files)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import sys
 from types import ModuleType
+from typing import assert_never
 
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.hearing import MOST, Telling, values_text
 from qlinkgen.cli.wire_options import counted
 from qlinkgen.link.codec import Message
-from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
+from qlinkgen.link.ring_events import Blocked, Broken, Dropped, Passed, Queued, RingEvent, StatusRaised, Taken
 from qlinkgen.model.naming import address_attribute
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import Json
@@ -40,13 +41,17 @@ class RingTeller:
 
     def event(self, event: RingEvent) -> Telling | None:
         """What a node has seen; None for what is no message that came."""
-        if isinstance(event, Taken):
-            return self.message(event.at, event.message, event.frame, sent_on=False)
-        if isinstance(event, Passed):
-            return self._passed(event)
-        if isinstance(event, Broken):
-            return self.broken(event.at, event.kind, event.raw, event.text, sent_on=event.cut_short)
-        return None
+        match event:
+            case Taken():
+                return self.message(event.at, event.message, event.frame, sent_on=False)
+            case Passed():
+                return self._passed(event)
+            case Broken():
+                return self.broken(event.at, event.kind, event.raw, event.text, sent_on=event.cut_short)
+            case Queued() | Blocked() | Dropped() | StatusRaised():
+                return None
+            case _:
+                assert_never(event)
 
     def _passed(self, event: Passed) -> Telling:
         try:

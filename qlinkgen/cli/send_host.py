@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import click
 
@@ -10,7 +10,9 @@ from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.wire_options import Line, open_free
+from qlinkgen.codecs import mc1231a
 from qlinkgen.codecs.mc1231a_bus import AxisCalls
+from qlinkgen.link.codec import Framed
 from qlinkgen.link.transaction import Packet
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
@@ -21,7 +23,7 @@ from qlinkgen.protocols.mc1231a.facts import AXES, SELECT
 def send_to_chip(
     protocol: Protocol,
     message: Message,
-    request: Any,
+    request: Framed,
     port: str,
     *,
     axis: int | None,
@@ -34,7 +36,7 @@ def send_to_chip(
 ) -> None:
     """Make the axis current if one is given, send the packet, and print the answer."""
     _check_axis(message, axis)
-    axes = _checked_axes(message, request, axis) if check else []
+    axes = _checked_axes(request, axis) if check else []
     context = None if axis is None else SELECT[axis]
     with (
         open_free(protocol, port, baud, line) as opened,
@@ -52,10 +54,10 @@ def _check_axis(message: Message, axis: int | None) -> None:
         raise Failure(f"{message.command} does not act on the current axis; leave out --axis {axis}")
 
 
-def _checked_axes(message: Message, request: Any, axis: int | None) -> list[int]:
+def _checked_axes(request: Framed, axis: int | None) -> list[int]:
     """The axes whose status word is read."""
     if axis is not None:
         return [axis]
-    if message.command == "multi_update":
+    if isinstance(request, mc1231a.MultiUpdateRequest):
         return [each for each in AXES if request.axes >> (each - 1) & 1]
     raise Failure("--check reads the status word of an axis; say which with --axis 1 or --axis 2")

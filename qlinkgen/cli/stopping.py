@@ -5,9 +5,12 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable
 from types import FrameType, TracebackType
-from typing import Any, Self
+from typing import Self
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+
+
+_Handler = Callable[[int, FrameType | None], object] | int | None
 
 
 class StopSignals:
@@ -24,7 +27,7 @@ class StopSignals:
         """`on_stop` is called in a signal handler."""
         self.stopped = False
         self._on_stop = on_stop
-        self._before: dict[signal.Signals, Any] = {}
+        self._before: dict[signal.Signals, _Handler] = {}
 
     def __enter__(self) -> Self:
         # A shell starts background programs with SIGINT ignored; they are to end with it all the same. nohup

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, assert_never
 
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Array, BitField, Bits, Blob, FieldType, Scalar
@@ -29,16 +29,24 @@ class Field:
     @property
     def min_size(self) -> int:
         """Fewest bytes on the wire."""
-        if isinstance(self.type, Blob | Array):
-            return self.type.length.minimum * self.type.item_size
-        return self.type.size
+        match self.type:
+            case Blob() | Array():
+                return self.type.length.minimum * self.type.item_size
+            case Scalar() | Bits():
+                return self.type.size
+            case _:
+                assert_never(self.type)
 
     @property
     def max_size(self) -> int:
         """Most bytes on the wire."""
-        if isinstance(self.type, Blob | Array):
-            return self.type.length.maximum * self.type.item_size
-        return self.type.size
+        match self.type:
+            case Blob() | Array():
+                return self.type.length.maximum * self.type.item_size
+            case Scalar() | Bits():
+                return self.type.size
+            case _:
+                assert_never(self.type)
 
     @property
     def quantity(self) -> str:
@@ -124,11 +132,18 @@ class Message:
 
     def _values(self) -> Iterator[Value]:
         for field in self.fields:
-            if isinstance(field.type, Bits):
-                for member in field.type.members:
-                    yield Value(member.name, member.type, member.doc, field, member)
-            elif not isinstance(field.type, Scalar) or field.type.settable:
-                yield Value(field.name, field.type, field.doc, field)
+            kind = field.type
+            match kind:
+                case Bits():
+                    for member in kind.members:
+                        yield Value(member.name, member.type, member.doc, field, member)
+                case Scalar():
+                    if kind.settable:
+                        yield Value(field.name, kind, field.doc, field)
+                case Blob() | Array():
+                    yield Value(field.name, kind, field.doc, field)
+                case _:
+                    assert_never(kind)
 
     @property
     def docs(self) -> dict[str, str]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.texts import Text, without_texts
 from qlinkgen.model.transaction import Bus, Command
@@ -68,11 +69,16 @@ class Protocol:
     @property
     def address_name(self) -> str | None:
         """Name of the frame's address ("node", "address"), None where it has none."""
-        if isinstance(self.frame, MarkedFrame):
-            return self.frame.address_name
-        if isinstance(self.frame, DelimitedFrame) and (part := self.frame.part("address")):
-            return part.name
-        return None
+        match self.frame:
+            case MarkedFrame():
+                return self.frame.address_name
+            case DelimitedFrame():
+                part = self.frame.part("address")
+                return part.name if part else None
+            case PacketFrame():
+                return None
+            case _:
+                assert_never(self.frame)
 
     @property
     def part_sections(self) -> dict[str, str]:

@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, Part
+from typing import assert_never
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, Part
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 
 
 def frame_size(frame: Frame, message: Message, payload: int) -> int:
     """Bytes of a frame with ``payload`` payload bytes, before stuffing."""
-    if isinstance(frame, DelimitedFrame):
-        return frame.overhead + payload
-    checksum = len(frame.checksum.chunks) if frame.checksum and message.checksum else 0
-    if isinstance(frame, MarkedFrame):
-        return 2 + payload + checksum
-    return payload + (checksum if message.direction == "response" else 1)
+    match frame:
+        case DelimitedFrame():
+            return frame.overhead + payload
+        case MarkedFrame():
+            return 2 + payload + _check_size(frame, message)
+        case PacketFrame():
+            return payload + (_check_size(frame, message) if message.direction == "response" else 1)
+        case _:
+            assert_never(frame)
+
+
+def _check_size(frame: MarkedFrame | PacketFrame, message: Message) -> int:
+    return len(frame.checksum.chunks) if frame.checksum and message.checksum else 0
 
 
 def max_frame_size(frame: Frame, message: Message) -> int:
@@ -54,7 +63,13 @@ def _stuffable(frame: DelimitedFrame, part: Part, message: Message) -> int:
 def max_payload(protocol: Protocol) -> int:
     """Most payload bytes that the frame of a protocol allows."""
     frame = protocol.frame
-    return frame.payload.max_size if isinstance(frame, DelimitedFrame) else frame.payload_max
+    match frame:
+        case DelimitedFrame():
+            return frame.payload.max_size
+        case MarkedFrame() | PacketFrame():
+            return frame.payload_max
+        case _:
+            assert_never(frame)
 
 
 def protocol_max_wire_size(protocol: Protocol) -> int:

@@ -13,7 +13,7 @@ import re
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
-from typing import TypeAlias
+from typing import TypeAlias, assert_never
 
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
@@ -34,11 +34,15 @@ class BadValue(ValueError):
 def default_of(value: Value) -> Native:
     """The default of a field, native."""
     kind = value.type
-    if isinstance(kind, Scalar):
-        return native_from_raw(kind, kind.default)
-    if isinstance(kind, Array):
-        return list(kind.default)
-    return kind.default.decode("ascii") if kind.text else kind.default
+    match kind:
+        case Scalar():
+            return native_from_raw(kind, kind.default)
+        case Array():
+            return list(kind.default)
+        case Blob():
+            return kind.default.decode("ascii") if kind.text else kind.default
+        case _:
+            assert_never(kind)
 
 
 def native_from_raw(scalar: Scalar, raw: int) -> Native:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import select
@@ -71,6 +73,8 @@ def _growth(frame: FramePlan, envelope: Envelope, message: Message) -> int:
         case FrameStuffing():
             parts = envelope.between(transparency.front, transparency.back)
             return transparency.rule.growth(sum(_stuffable(each, message, transparency) for each in parts))
+        case _:
+            assert_never(transparency)
 
 
 def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
@@ -92,3 +96,5 @@ def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
             return int(any(first <= mark <= last for first, last in message.addresses))
         case LengthPart() | IdPart() | AddressPart() | CheckPart() | MarkPart():
             return part.size
+        case _:
+            assert_never(part)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
+from typing import assert_never
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.transaction import Bus
 from qlinkgen.schema.report import Reporter
 
@@ -32,10 +34,16 @@ def check_addresses(frame: Frame | None, bus: Bus, report: Reporter) -> None:
 
 def _highest(frame: Frame) -> int | None:
     """Greatest address, None where the frame has none."""
-    if isinstance(frame, MarkedFrame):
-        return frame.address_bits.mask
-    part = frame.part("address") if isinstance(frame, DelimitedFrame) else None
-    return part.scalar.maximum if part and part.scalar else None
+    match frame:
+        case MarkedFrame():
+            return frame.address_bits.mask
+        case DelimitedFrame():
+            part = frame.part("address")
+            return part.scalar.maximum if part and part.scalar else None
+        case PacketFrame():
+            return None
+        case _:
+            assert_never(frame)
 
 
 def _check_unused(bus: Bus, report: Reporter) -> None:

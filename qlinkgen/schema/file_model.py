@@ -6,7 +6,7 @@ The editors' JSON Schema is generated from these classes, so every description h
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import (
     BaseModel,
@@ -355,7 +355,7 @@ class SchemaFile(_Mapping):
     )
 
 
-def json_schema() -> dict[str, Any]:
+def json_schema() -> JsonSchemaValue:
     """JSON Schema of the file format, for editors."""
     schema = SchemaFile.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

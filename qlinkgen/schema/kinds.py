@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from decimal import Decimal
 from fractions import Fraction
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import (
     BaseModel,
     BeforeValidator,
     Field,
+    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     PlainValidator,
     StrictInt,
@@ -19,6 +20,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from qlinkgen.model.texts import CONTROL
+from qlinkgen.model.values import Json
 from qlinkgen.schema import notation
 from qlinkgen.schema.characters import CONTROL_CHARACTER, control_character
 from qlinkgen.schema.notation import shown
@@ -67,7 +69,7 @@ class ShortForm:
         self.key = key
         self.kinds = kinds
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Expand the short form before the mapping is checked."""
         from_short = BeforeValidator(self._expand)
         schema: CoreSchema = from_short.__get_pydantic_core_schema__(source, handler)
@@ -85,7 +87,7 @@ class ShortForm:
         return value if isinstance(value, dict | BaseModel) else {self.key: value}
 
 
-def _json(description: str, *kinds: str, **more: Any) -> WithJsonSchema:
+def _json(description: str, *kinds: str, **more: Json) -> WithJsonSchema:
     return WithJsonSchema(
         {"type": list(kinds) if len(kinds) > 1 else kinds[0], "description": description, **more}
     )

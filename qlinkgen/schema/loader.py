@@ -19,7 +19,7 @@ from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.messages import MessageBuilder
 from qlinkgen.schema.names import check_names
 from qlinkgen.schema.report import Reporter, did_you_mean
-from qlinkgen.schema.source import parse
+from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
@@ -107,7 +107,7 @@ def read_regular(path: FilePath) -> str:
         os.close(descriptor)
 
 
-def _build(data: object, report: Reporter, text: str, file_name: str, crc: str | None) -> Protocol | None:
+def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | None) -> Protocol | None:
     file = check_structure(data, report)
     if file is None:
         return None

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import assert_never
+
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction, Field, Message
 from qlinkgen.model.transaction import Addressing, Bus
-from qlinkgen.model.types import Array, Bits, Blob, Chunk
+from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
 from qlinkgen.schema.fields import FieldBuilder, is_open
 from qlinkgen.schema.file_model import CommandSpec, Fields, MessageSpec, SchemaFile
 from qlinkgen.schema.report import Reporter
@@ -186,11 +188,17 @@ class MessageBuilder:
 
 def _chunks(field: Field) -> tuple[Chunk, ...]:
     kind = field.type
-    if isinstance(kind, Bits):
-        return kind.container.chunks
-    if isinstance(kind, Array):
-        return kind.item.chunks
-    return () if isinstance(kind, Blob) else kind.chunks
+    match kind:
+        case Bits():
+            return kind.container.chunks
+        case Array():
+            return kind.item.chunks
+        case Blob():
+            return ()
+        case Scalar():
+            return kind.chunks
+        case _:
+            assert_never(kind)
 
 
 def _joined(ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:

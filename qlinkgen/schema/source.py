@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import yaml
 
@@ -19,7 +19,8 @@ from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT, control_characte
 from qlinkgen.schema.notation import DecimalNumber
 
 Path: TypeAlias = tuple[str | int, ...]
-Data: TypeAlias = Any
+#: What a file holds; numbers with a point are Decimal.
+Data: TypeAlias = "str | int | Decimal | list[Data] | dict[str, Data] | None"
 
 _INTEGER = re.compile(
     r"[-+]?(?:0|[1-9][0-9]*(?:_[0-9]+)*|0x[0-9a-fA-F]+(?:_[0-9a-fA-F]+)*|0b[01]+(?:_[01]+)*)\Z"

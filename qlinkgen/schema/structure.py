@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any, get_args
+from typing import get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -18,10 +18,10 @@ from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT
 from qlinkgen.schema.file_model import BRANCH, SchemaFile
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
-from qlinkgen.schema.source import Path
+from qlinkgen.schema.source import Data, Path
 
 #: Required keys whose absence should not keep the rest of their mapping from being checked.
-_STAND_INS: dict[str, Any] = {
+_STAND_INS: dict[str, Data] = {
     "qlinkgen": 1, "protocol": {}, "name": "unnamed", "revision": "", "source": "",
     "frame": {}, "bus": {}, "kind": "host",
     "type": "u8", "id": 0, "fields": {}, "at": 0,
@@ -36,7 +36,7 @@ _EXPECTED = {
 }
 
 
-def check_structure(data: Any, report: Reporter) -> SchemaFile | None:
+def check_structure(data: Data, report: Reporter) -> SchemaFile | None:
     """Validate plain data as a schema file, without what is wrong; None where nothing usable is left."""
     if not isinstance(data, dict):
         what = "the file is empty" if data is None else f"the file is {shown(data)}, not a mapping of keys"
@@ -57,7 +57,7 @@ def check_structure(data: Any, report: Reporter) -> SchemaFile | None:
 class _Round:
     """What one validation found: reports it, and repairs the data for the next."""
 
-    def __init__(self, details: Sequence[ErrorDetails], data: Any, report: Reporter) -> None:
+    def __init__(self, details: Sequence[ErrorDetails], data: Data, report: Reporter) -> None:
         self._details = [(detail, _path_in(data, detail["loc"])) for detail in details]
         self._data = data
         self._report = report
@@ -149,7 +149,7 @@ def _purpose(path: Path) -> str:
     return f"add {key}: {description[0].lower()}{description[1:]}" if description else f"add {key}:"
 
 
-def _path_in(data: Any, location: tuple[int | str, ...]) -> Path:
+def _path_in(data: Data, location: tuple[int | str, ...]) -> Path:
     """The place of a fault in the file, without branches of unions and keys that short forms imply."""
     path: list[int | str] = []
     for step in location:
@@ -162,13 +162,13 @@ def _path_in(data: Any, location: tuple[int | str, ...]) -> Path:
     return tuple(path)
 
 
-def _item(data: Any, step: int | str) -> Any:
+def _item(data: Data, step: int | str) -> Data:
     if isinstance(data, dict):
-        return data.get(step)
+        return data.get(str(step))
     return data[step] if isinstance(data, list) and isinstance(step, int) and step < len(data) else None
 
 
-def _at(data: Any, path: Path) -> Any:
+def _at(data: Data, path: Path) -> Data:
     for step in path:
         data = _item(data, step)
     return data
@@ -176,7 +176,7 @@ def _at(data: Any, path: Path) -> Any:
 
 def _model_at(path: Path) -> type[BaseModel] | None:
     """The class of the mapping at a path."""
-    here: Any = SchemaFile
+    here: object = SchemaFile
     for step in path:
         if isinstance(here, type) and issubclass(here, BaseModel):
             field = here.model_fields.get(str(step))
@@ -187,7 +187,7 @@ def _model_at(path: Path) -> type[BaseModel] | None:
     return here if isinstance(here, type) and issubclass(here, BaseModel) else None
 
 
-def _mapping_type(annotation: Any) -> Any:
+def _mapping_type(annotation: object) -> object:
     """The part of an annotation that says what a mapping or list holds."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
