@@ -8,7 +8,7 @@ import pytest
 
 from qlinkgen.codecs import qlink
 from qlinkgen.errors import BadReply, LinkError, NoReply
-from qlinkgen.link import MasterEngine, Reply
+from qlinkgen.link import MasterEngine, Reply, Timing
 from qlinkgen.link.events import Answered, Damaged, Failed, Sent, Stray, TimedOut
 from tests.link.line import (
     BYTE,
@@ -22,6 +22,7 @@ from tests.link.line import (
     request_of,
     taken,
 )
+from tests.python.protocols import build, module, protocol
 
 ASK = qlink.MotorPositionRequest(node=3)
 ANSWER = qlink.MotorPositionResponse(node=3, position=-5)
@@ -410,3 +411,17 @@ def test_errors_are_those_of_the_link() -> None:
     error = drive(make(), ASK).error
     assert isinstance(error, LinkError)
     assert isinstance(error, TimeoutError)
+
+
+def test_an_answer_that_a_false_beginning_hides_until_the_next_attempt_is_told_as_a_stray() -> None:
+    codec = module("kitchen_sink")
+    messages = protocol("kitchen_sink").by_name
+    request = build("kitchen_sink", messages["integers.request"])
+    answer = build("kitchen_sink", messages["integers.response"])
+    engine = MasterEngine(codec, Timing.of(codec, host_slack=SLACK, baud=115200))
+    hidden = b"\x7e\x38" + answer.to_frame()  # the length reaches beyond the frame
+    run = drive(engine, request, [(0.01, hidden)], attempts=2)
+    assert isinstance(run.error, LinkError)
+    assert len(run.sent) == 2
+    strays = [event for event in engine.events if isinstance(event, Stray)]
+    assert [(stray.message, stray.late) for stray in strays] == [(answer, True)]
