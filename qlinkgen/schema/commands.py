@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Repeat
 from qlinkgen.model.types import Scalar
@@ -225,15 +226,20 @@ class CommandBuilder:
 
     def _check_id_fits(self, message: Message, path: Path) -> None:
         most = 0xFF
-        if isinstance(self._frame, DelimitedFrame):
-            part = self._frame.part("message")
-            most = part.scalar.maximum if part and part.scalar else most
-        elif isinstance(self._frame, MarkedFrame):
-            most = self._frame.id_bits.mask
-            if message.id == self._frame.end_id:
-                what = f"{message.id} marks the end of a message"
-                needs = (path, ("frame",))
-                self._report.error("overlapping-id", path, what, "use another id", needs=needs)
+        match self._frame:
+            case DelimitedFrame():
+                part = self._frame.part("message")
+                most = part.scalar.maximum if part and part.scalar else most
+            case MarkedFrame():
+                most = self._frame.id_bits.mask
+                if message.id == self._frame.end_id:
+                    what = f"{message.id} marks the end of a message"
+                    needs = (path, ("frame",))
+                    self._report.error("overlapping-id", path, what, "use another id", needs=needs)
+            case PacketFrame() | None:
+                pass
+            case _:
+                assert_never(self._frame)
         if message.id > most:
             what = f"id {message.id:#x} does not fit the frame"
             self._report.error("id-does-not-fit", path, what, f"use 0..{most:#x}", needs=(path, ("frame",)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import assert_never
 
 from qlinkgen.model.message import Field
 from qlinkgen.model.transaction import Command
@@ -65,18 +66,27 @@ def _settable(field: Field) -> bool:
 
 def _holds(kind: FieldType, other: FieldType) -> bool:
     """Both are of the same type, and every value of the other one is in the range of this one."""
-    if isinstance(kind, Blob) and isinstance(other, Blob):
-        return kind.text == other.text and _longer(kind.length, other.length)
-    if isinstance(kind, Array) and isinstance(other, Array):
-        return _holds(kind.item, other.item) and _longer(kind.length, other.length)
-    if isinstance(kind, Bits) and isinstance(other, Bits):
-        pairs = zip(kind.members, other.members, strict=False)
-        same = len(kind.members) == len(other.members)
-        return same and all(a.name == b.name and _holds(a.type, b.type) for a, b in pairs)
-    if isinstance(kind, Scalar) and isinstance(other, Scalar):
-        within = kind.minimum <= other.minimum and other.maximum <= kind.maximum
-        return within and _nature(kind) == _nature(other)
-    return False
+    match kind:
+        case Blob():
+            return isinstance(other, Blob) and kind.text == other.text and _longer(kind.length, other.length)
+        case Array():
+            return (
+                isinstance(other, Array)
+                and _holds(kind.item, other.item)
+                and _longer(kind.length, other.length)
+            )
+        case Bits():
+            if not isinstance(other, Bits) or len(kind.members) != len(other.members):
+                return False
+            pairs = zip(kind.members, other.members, strict=True)
+            return all(a.name == b.name and _holds(a.type, b.type) for a, b in pairs)
+        case Scalar():
+            if not isinstance(other, Scalar):
+                return False
+            within = kind.minimum <= other.minimum and other.maximum <= kind.maximum
+            return within and _nature(kind) == _nature(other)
+        case _:
+            assert_never(kind)
 
 
 def _longer(length: Length, other: Length) -> bool:
