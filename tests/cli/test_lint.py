@@ -164,7 +164,7 @@ frame:
 bus: {kind: host, response_within: 3 bytes}
 defaults: {repeat: safe}
 commands:
-  go: {id: 1, request: {FIELDS}, response: {}}
+  go: {id: 1, request: {FIELDS}, response: none}
 """
 
 
