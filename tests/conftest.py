@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import signal
 from collections import Counter
@@ -48,14 +49,21 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_configure(config: pytest.Config) -> None:
     """Heed Ctrl-C and hang-ups: background jobs may not, and neither would the programs that tests start.
 
-    Also say which marker allows a skip, and let `tests.support.needs` mark the tests.
+    Also choose new random schemas, say which marker allows a skip, and let `tests.support.needs` mark tests.
     """
     config.pluginmanager.register(needs)
     config.addinivalue_line(
         "markers", "optional_tool(name): may be skipped where this program is not to be had"
     )
+    # Workers inherit it, as they must all see the same tests.
+    os.environ.setdefault("QLINKGEN_SCHEMAS", str(secrets.randbelow(10**9)))
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+def pytest_report_header() -> str:
+    """Tell the seed of new random schemas."""
+    return f"random schemas: QLINKGEN_SCHEMAS={os.environ['QLINKGEN_SCHEMAS']}"
 
 
 def _missing(what: str, *, package: str) -> NoReturn:

@@ -47,13 +47,26 @@ def wrong_frames(
     found = [_spoilt(wire, rng) for _ in range(3)]
     found += [wire[: rng.randrange(len(wire) + 1)], wire + bytes([rng.randrange(256)])]
     for _ in range(4):
-        spoilt = _spoilt(payload, rng)
-        if _fits(reference, spoilt):
-            found.append(reference.seal(message.name, spoilt, place, request))
+        found += sealed(reference, message, payload, place, rng, request=request)
     return found
 
 
-def _fits(reference: Reference, payload: bytes) -> bool:
+def sealed(
+    reference: Reference,
+    message: Message,
+    payload: bytes,
+    place: int,
+    rng: random.Random,
+    *,
+    request: bytes = b"",
+) -> list[bytes]:
+    """A good frame around a payload that may be wrong, if one can hold it."""
+    spoilt = _spoilt(payload, rng)
+    return [reference.seal(message.name, spoilt, place, request)] if fits(reference, spoilt) else []
+
+
+def fits(reference: Reference, payload: bytes) -> bool:
+    """A frame can hold the payload, whatever it is."""
     most = getattr(reference.frame, "most", None)
     return most is None or len(payload) <= most
 

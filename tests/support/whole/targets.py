@@ -15,7 +15,8 @@ from typing import Any
 from construct import ConstructError
 
 from qlinkgen.backends import construct, python
-from qlinkgen.backends.base import Options
+from qlinkgen.backends.base import Options, Outputs
+from qlinkgen.backends.python import bus
 from qlinkgen.model import naming
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol
@@ -117,10 +118,10 @@ class PythonTarget(Target):
 
     name = "python"
 
-    def __init__(self, reference: Reference, protocol: Protocol) -> None:
-        """Compile the module in memory."""
+    def __init__(self, reference: Reference, module: types.ModuleType) -> None:
+        """Use an imported module."""
         super().__init__(reference)
-        self.module: Any = python.load(protocol)
+        self.module: Any = module
         self._address = naming.address_attribute(reference.address_name or "")
 
     def encode(
@@ -251,20 +252,30 @@ class ConstructTarget(Target):
         return Seen(found["message"], found[naming.record_key(name)] if name else None, values)
 
 
-def printed(protocol: Protocol, folder: Path) -> construct.Live:
-    """The structures of the printed module, imported from a package as a user would."""
-    package = folder / f"construct_of_{protocol.name}"
+def printed_structures(protocol: Protocol, folder: Path) -> construct.Live:
+    """The structures of the printed module."""
+    return construct.Live(
+        vars(_printed(folder / "printed_structures", construct.generate(protocol, Options())))
+    )
+
+
+def printed_codec(protocol: Protocol, folder: Path) -> types.ModuleType:
+    """The printed module, imported with that of the calls of its bus."""
+    outputs = {**python.generate(protocol, Options()), **bus.generate(protocol, Options())}
+    return _printed(folder / "printed_codecs", outputs)
+
+
+def _printed(package: Path, outputs: Outputs) -> types.ModuleType:
+    """The first module of a package, after all of its modules were imported as a user would."""
     package.mkdir()
-    for path, text in construct.generate(protocol, Options()).items():
+    for path, text in outputs.items():
         (package / Path(path).name).write_text(text, "utf-8")
-    return construct.Live(vars(_imported(package, naming.file_stem(protocol.name))))
-
-
-def _imported(package: Path, name: str) -> types.ModuleType:
+    names = [Path(path).stem for path in outputs if path.endswith(".py") and Path(path).name[0] != "_"]
     sys.path.insert(0, str(package.parent))
     importlib.invalidate_caches()
     try:
-        return importlib.import_module(f"{package.name}.{name}")
+        modules = [importlib.import_module(f"{package.name}.{name}") for name in names]
+        return modules[0]
     finally:
         sys.path.remove(str(package.parent))
         for each in [each for each in sys.modules if each.split(".")[0] == package.name]:

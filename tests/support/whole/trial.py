@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
-from qlinkgen.backends import c, construct
+from qlinkgen.backends import c, construct, python
 from qlinkgen.backends.base import Options
 from qlinkgen.cli.targets import TARGETS
 from qlinkgen.model.message import Direction
@@ -37,7 +37,8 @@ from tests.support.whole.targets import (
     InterpreterTarget,
     PythonTarget,
     Target,
-    printed,
+    printed_codec,
+    printed_structures,
 )
 
 #: Seconds of processor time that one schema may take, and of any time that a compiled program may.
@@ -196,9 +197,11 @@ class _Trial:
             if path.endswith(".py"):
                 self.guard("parse", Path(path).parent.name, partial(_parse, text, path))
         self.targets.append(InterpreterTarget(self.reference, plan_of(protocol)))
-        self.guard("load", "python", lambda: self.targets.append(PythonTarget(self.reference, protocol)))
+        self.guard("load", "python in memory", partial(_load, protocol))
+        codec = partial(printed_codec, protocol, self.folder)
+        self.guard("load", "python", lambda: self.targets.append(PythonTarget(self.reference, codec())))
         self.guard("load", "construct", lambda: self._construct("construct", construct.live(protocol)))
-        source = partial(printed, protocol, self.folder)
+        source = partial(printed_structures, protocol, self.folder)
         self.guard("load", "construct source", lambda: self._construct("construct source", source()))
         header = self.folder / f"{file_stem(protocol.name)}.h"
         if not self.effort.uncompiled and header.exists() and self._compile(header):
@@ -247,7 +250,7 @@ class _Trial:
             folder.mkdir()
             self.guard("generate", f"c {role}", partial(_header_of, protocol, role, folder))
             for header in folder.glob("*.h"):
-                self._strict(header, _EVERY if self.effort.every else _STRICT[:1])
+                self._strict(header, (*_STRICT, _EVERY[-2]) if self.effort.every else _STRICT[:1])
 
     def _kit(self, kit: Path, compiler: str) -> None:
         """Compile strictly and run; warnings do not keep it from running, which would hide what it finds."""
@@ -334,12 +337,18 @@ class _Trial:
                 self._stream(direction, chance.stream(frames, alphabet, self.rng))
 
     def _frames(self, message: Message) -> list[bytes]:
-        """The shortest of some frames: long ones cost much time, and say no more."""
-        frames = []
+        """The shortest of some frames, as long ones cost much time; some carry what is wrong, or a frame."""
+        frames: list[bytes] = []
+        odd: list[bytes] = []
+        nested: list[bytes] = []
         for _ in range(5):
-            given = chance.values(message, self.rng, self.mark)
-            frames.append(self.reference.encode(message.name, given, chance.address(message, self.rng))[1])
-        return sorted(frames, key=len)[:2]
+            given, place = chance.values(message, self.rng, self.mark), chance.address(message, self.rng)
+            payload, wire = self.reference.encode(message.name, given, place)
+            frames.append(wire)
+            odd += chance.sealed(self.reference, message, payload, place, self.rng)
+            if chance.fits(self.reference, wire):
+                nested.append(self.reference.seal(message.name, wire, place))
+        return [*sorted(frames, key=len)[:2], *sorted(odd, key=len)[:1], *sorted(nested, key=len)[:1]]
 
     def _stream(self, direction: Direction, data: bytes) -> None:
         self.outcome.streams += 1
@@ -389,6 +398,10 @@ def _generate(name: str, protocol: Protocol, texts: dict[str, str]) -> None:
 def _header_of(protocol: Protocol, role: Role, folder: Path) -> None:
     for path, text in c.generate(protocol, Options(role=role)).items():
         (folder / Path(path).name).write_text(text, "utf-8")
+
+
+def _load(protocol: Protocol) -> None:
+    python.load(protocol)
 
 
 def _parse(text: str, path: str) -> None:
