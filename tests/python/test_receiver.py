@@ -96,6 +96,9 @@ def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObj
     for at, byte in enumerate(wire):
         expected = [_shown(name, event) for event in machine.feed(byte)]
         assert described(decoder.feed(bytes((byte,)))) == expected, f"byte {at} of {wire.hex(' ')}"
+    ends = list(machine.finish())
+    assert {event.at for event in ends} <= {len(wire)}
+    assert described(decoder.finish()) == [_shown(name, event) for event in ends]
 
 
 def test_skipped_bytes_are_told_of_by_the_longest_frame_that_there_can_be() -> None:

@@ -1,0 +1,71 @@
+"""Schemas on which outputs once differed; random ones found them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from tests.support.whole.trial import Effort, run_text
+
+_HEAD = """\
+qlinkgen: 1
+protocol: {name: tank, title: Tank, revision: "1", source: Example, doc: A tank}
+byteorder: big
+"""
+_PARTS = """\
+frame:
+  parts:
+    start: {role: constant, value: 7E}
+    node: {role: address, type: u8}
+    code: {role: message, type: u8}
+    length: {role: length, type: u8, counts: [data]}
+    data: {role: payload, size: 0..40}
+    crc: {role: checksum, type: u8, algorithm: sum8, over: [code, data]}
+"""
+_COUNTED = """\
+frame:
+  parts:
+    start: {role: constant, value: 10 02}
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..40}
+  stuffing: {after: 0x10, insert: 0x03, exempt: [start]}
+bus: {kind: master_slave}
+"""
+_MARKED = """\
+groups: {bits: 7, first: most}
+frame:
+  marked:
+    marker: 0x80
+    header: {address: 4..6, message: 0..3}
+    end: 0
+    payload: 0..24
+    checksum: {role: checksum, type: u16, algorithm: sum16, over: [payload], sent: [0..5, 8..13]}
+bus: {kind: ring, nodes: 1..7}
+"""
+_BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
+
+FOUND = {
+    "a wrong count, whose fault showed more bytes the longer the pieces were": _COUNTED
+    + "messages:\n  log: {id: 255, fields: {n: {type: u8, counts: a}, m: {type: u8, counts: b}, "
+    'a: "bytes[0..1]", b: "u16[0..3]", c: u32}}\n',
+    "a message of no command, which slaves in C took from the broadcast address": _PARTS
+    + _BUS
+    + "messages:\n  log: {id: 5, direction: request, fields: {v: u8}}\n"
+    "  state: {id: 6, direction: response, fields: {v: u8}}\n",
+    "a marked frame with a count that does not fit, which the kit took for another fault": _MARKED
+    + 'messages:\n  log: {id: 2, fields: {n: {type: u8, counts: t}, t: "text[0..4]"}}\n',
+    "a field called like the type of another, which C++ refuses": _PARTS
+    + _BUS
+    + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", FOUND.values(), ids=FOUND)
+def test_outputs_agree(text: str, require_tool: Callable[..., str]) -> None:
+    for compiler, package in (("gcc", "gcc"), ("g++", "g++"), ("clang", "clang"), ("clang++", "clang")):
+        require_tool(compiler, package=package)
+    outcome = run_text(_HEAD + text, effort=Effort(streams=40, every=True))
+    assert not outcome.refused
+    assert not outcome.differences, outcome.report()
