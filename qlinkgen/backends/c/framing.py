@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qlinkgen.backends.c.extents import size_terms
-from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
+from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
 from qlinkgen.model.message import Message
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import ByMark, FramePlan
@@ -87,8 +87,8 @@ def struct_parameter(names: Names, message: Message, *, const: bool) -> str:
 
 
 def address_group(message: MessagePlan, address: Address) -> AddressGroup | None:
-    """The set of addresses that a message may have, None where it may have any."""
-    condition = allowed(message.allowed, address.name, address.bits)
+    """The set of addresses that a message may have, None where it may have any that its C type holds."""
+    condition = allowed(message.allowed, address.name, storage(address.bits))
     if not condition or message.allowed is None:
         return None
     ranges = [(str(each.low), str(each.high)) for each in message.allowed.ranges]
