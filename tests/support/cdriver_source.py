@@ -154,7 +154,9 @@ class _Source:
         self._add("    if (status != @P@_OK) { fail(status); return; }")
         address = self.header.address
         self._add(
-            f'    printf("ok %u", (unsigned)frame.{address});' if address else '    printf("ok -");',
+            f'    printf("ok %llu", (unsigned long long)frame.{address});'
+            if address
+            else '    printf("ok -");',
             shown,
             "}",
         )
@@ -166,7 +168,7 @@ class _Source:
 
     def _stream(self) -> None:
         address, field = self.header.address, self.header.id
-        node = f'printf("%u:", (unsigned)frame.{address});' if address else 'printf("-:");'
+        node = f'printf("%llu:", (unsigned long long)frame.{address});' if address else 'printf("-:");'
         self._add(
             "static void deliver(size_t at, @p@_event_t event, const @p@_receiver_t *rx,",
             "                    const char *direction)",

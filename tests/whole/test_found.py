@@ -55,6 +55,10 @@ FOUND = {
     "  state: {id: 6, direction: response, fields: {v: u8}}\n",
     "a marked frame with a count that does not fit, which the kit took for another fault": _MARKED
     + 'messages:\n  log: {id: 2, fields: {n: {type: u8, counts: t}, t: "text[0..4]"}}\n',
+    "an address of three bytes that may be any, and has four in C": _PARTS.replace(
+        "address, type: u8", "address, type: u24"
+    )
+    + "bus: {kind: master_slave, nodes: 0..16777215}\nmessages:\n  log: {id: 5, fields: {v: u8}}\n",
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",

@@ -85,13 +85,19 @@ def _spoilt(data: bytes, rng: random.Random) -> bytes:
 
 
 def stream(frames: Sequence[bytes], alphabet: bytes, rng: random.Random) -> bytes:
-    """Frames, pieces of them and noise, damaged in a few places or none."""
+    """Frames, pieces of them and noise, damaged."""
     data = bytearray()
     for _ in range(rng.randint(1, 6)):
         frame = rng.choice(frames)
         data += rng.choice(
             (frame, frame, frame, frame[: rng.randrange(len(frame) + 1)], _noise(alphabet, rng))
         )
+    return damaged(bytes(data), alphabet, rng)
+
+
+def damaged(stream: bytes, alphabet: bytes, rng: random.Random) -> bytes:
+    """A stream with noise in a few places or none."""
+    data = bytearray(stream)
     for _ in range(rng.choice((0, 1, 1, 2, 4))):
         at = rng.randrange(len(data) + 1)
         action = rng.choice(("change", "lose", "double", "add"))

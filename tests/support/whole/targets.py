@@ -25,6 +25,7 @@ from qlinkgen.plan import receive as interpreted
 from qlinkgen.plan.codec import Codec, Decoded
 from qlinkgen.plan.content import Unsendable, pack
 from qlinkgen.plan.reading import BadFrame
+from qlinkgen.plan.receive import PacketReceiver as PlannedPackets
 from qlinkgen.plan.receive import receiver
 from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
@@ -153,9 +154,13 @@ class PythonTarget(Target):
         values = self.raws(shape, lambda each: getattr(found, naming.attribute(each)))
         return Seen(found.NAME, getattr(found, self._address) if self._address else None, values)
 
-    def events(self, direction: Direction, pieces: Sequence[bytes]) -> list[list[Heard]]:
+    def events(
+        self, direction: Direction, pieces: Sequence[bytes], asked: Sequence[bytes] = ()
+    ) -> list[list[Heard]]:
         """The events of each piece, then those at the end; `at` is the last byte of the piece."""
         decoder = self.module.StreamDecoder(*(() if direction == "message" else (direction,)))
+        for request in asked:
+            decoder.expect(self.module.decode_request(request))
         found, end = [], 0
         for piece in pieces:
             end += len(piece)
@@ -206,9 +211,13 @@ class InterpreterTarget(Target):
         shape = self.reference.by_name[decoded.message.name]
         return Seen(shape.name, decoded.address, {name: found[name] for name, _ in shape.values()})
 
-    def events(self, direction: Direction, stream: bytes) -> list[Heard]:
+    def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Heard]:
         """The events of a stream."""
-        return [self._heard(event) for event in receiver(self._plan, direction).run(stream)]
+        machine = receiver(self._plan, direction)
+        if isinstance(machine, PlannedPackets):
+            for request in asked:
+                machine.expect(request)
+        return [self._heard(event) for event in machine.run(stream)]
 
     def _heard(self, event: interpreted.Event) -> Heard:
         if event.decoded is None:

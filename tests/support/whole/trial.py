@@ -324,10 +324,10 @@ class _Trial:
     # Streams
 
     def _streams(self) -> None:
-        directions: tuple[Direction, ...] = self.reference.directions
-        if isinstance(self.reference.frame, Packets):
-            directions = ("request",)
-        for direction in directions:
+        for direction in self.reference.directions:
+            if isinstance(self.reference.frame, Packets) and direction == "response":
+                self._answers()
+                continue
             known = list(self.reference.known(direction).values())
             frames = [frame for each in known for frame in self._frames(each)]
             if not frames:
@@ -335,6 +335,17 @@ class _Trial:
             alphabet = b"".join(frame[:4] + frame[-2:] for frame in frames) + bytes([self.mark, 0])
             for _ in range(self.effort.streams):
                 self._stream(direction, chance.stream(frames, alphabet, self.rng))
+
+    def _answers(self) -> None:
+        """Streams of packets that are expected."""
+        known = list(self.reference.known("response").values())
+        for _ in range(self.effort.streams if known else 0):
+            asked, data = [], b""
+            for message in self.rng.choices(known, k=self.rng.randint(1, 4)):
+                asked.append(self._request(message))
+                given = chance.values(message, self.rng, self.mark)
+                data += self.reference.encode(message.name, given, request=asked[-1])[1]
+            self._stream("response", chance.damaged(data, data[:4], self.rng), tuple(asked))
 
     def _frames(self, message: Message) -> list[bytes]:
         """The shortest of some frames, as long ones cost much time; some carry what is wrong, or a frame."""
@@ -350,18 +361,20 @@ class _Trial:
                 nested.append(self.reference.seal(message.name, wire, place))
         return [*sorted(frames, key=len)[:2], *sorted(odd, key=len)[:1], *sorted(nested, key=len)[:1]]
 
-    def _stream(self, direction: Direction, data: bytes) -> None:
+    def _stream(self, direction: Direction, data: bytes, asked: tuple[bytes, ...] = ()) -> None:
         self.outcome.streams += 1
         seed = self.rng.random()
         for target in list(self.targets):
             if isinstance(target, PythonTarget):
-                self._heard(target, direction, data, "stream", partial(_python_stream, target, direction))
-                cut = partial(_cut_stream, target, direction, seed)
+                whole = partial(_python_stream, target, direction, asked)
+                self._heard(target, direction, data, "stream", whole)
+                cut = partial(_cut_stream, target, direction, asked, seed)
                 self._heard(target, direction, data, "cut stream", cut)
-            elif isinstance(target, CTarget):
+            elif isinstance(target, CTarget) and not asked:
                 self._heard(target, direction, data, "stream", partial(_c_stream, target, direction))
             elif isinstance(target, InterpreterTarget):
-                self._heard(target, direction, data, "stream", partial(_plan_stream, target, direction))
+                whole = partial(_plan_stream, target, direction, asked)
+                self._heard(target, direction, data, "stream", whole)
 
     def _heard(
         self, target: Target, direction: Direction, data: bytes, stage: str, compare: Callable[[bytes], str]
@@ -451,15 +464,15 @@ def _manner(expected: object, found: object) -> str:
     return f"{found} instead of {expected}" if isinstance(expected, str) else "refuses what is right"
 
 
-def _python_stream(target: PythonTarget, direction: Direction, data: bytes) -> str:
-    expected = [Heard.of(event) for event in target.reference.events(direction, data)]
-    found = target.events(direction, [bytes([byte]) for byte in data])
+def _python_stream(target: PythonTarget, direction: Direction, asked: Sequence[bytes], data: bytes) -> str:
+    expected = [Heard.of(event) for event in target.reference.events(direction, data, asked)]
+    found = target.events(direction, [bytes([byte]) for byte in data], asked)
     return _unlike(expected, [event for events in found for event in events])
 
 
-def _plan_stream(target: InterpreterTarget, direction: Direction, data: bytes) -> str:
-    expected = [Heard.of(event) for event in target.reference.events(direction, data)]
-    return _unlike(expected, target.events(direction, data))
+def _plan_stream(target: InterpreterTarget, direction: Direction, asked: Sequence[bytes], data: bytes) -> str:
+    expected = [Heard.of(event) for event in target.reference.events(direction, data, asked)]
+    return _unlike(expected, target.events(direction, data, asked))
 
 
 def _c_stream(target: CTarget, direction: Direction, data: bytes) -> str:
@@ -470,14 +483,17 @@ def _c_stream(target: CTarget, direction: Direction, data: bytes) -> str:
     return _unlike(bare, target.events(direction, data))
 
 
-def _cut_stream(target: PythonTarget, direction: Direction, seed: float, data: bytes) -> str:
-    """What a piece brings is what its bytes bring one by one."""
+def _cut_stream(
+    target: PythonTarget, direction: Direction, asked: Sequence[bytes], seed: float, data: bytes
+) -> str:
+    """What a piece brings is what its bytes bring one by one; the end of the stream is the last piece."""
     cut = chance.pieces(data, random.Random(seed))
-    single = target.events(direction, [bytes([byte]) for byte in data])
+    single = target.events(direction, [bytes([byte]) for byte in data], asked)
     end = 0
-    for piece, events in zip(cut, target.events(direction, cut), strict=False):
-        expected = [event for each in single[end : end + len(piece)] for event in each]
-        end += len(piece)
+    sizes = [*map(len, cut), 1]
+    for size, events in zip(sizes, target.events(direction, cut, asked), strict=True):
+        expected = [event for each in single[end : end + size] for event in each]
+        end += size
         if [_timeless(each) for each in events] != [_timeless(each) for each in expected]:
             kinds = [each.kind for each in events], [each.kind for each in expected]
             return f"depends on the cuts; {[each.hex(' ') for each in cut]}: {kinds[0]} instead of {kinds[1]}"

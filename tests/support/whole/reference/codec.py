@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tests.support.whole.reference import document, values
@@ -98,15 +98,15 @@ class Reference:
             raise Wrong(event.kind)
         return Seen(event.name, event.address, event.values)
 
-    def receiver(self, direction: Direction) -> Receiver:
-        """A new receiver."""
+    def receiver(self, direction: Direction, asked: Sequence[bytes] = ()) -> Receiver:
+        """A new receiver; `asked` are the packets that are answered."""
         known = self.known(direction)
         if isinstance(self.frame, Marked):
             return MarkedReceiver(self.frame, known)
         if isinstance(self.frame, Packets):
-            return PacketReceiver(self.frame, known)
+            return PacketReceiver(self.frame, known, asked, answers=direction == "response")
         return Hunter(self.frame, known) if self.frame.unique else Searcher(self.frame, known)
 
-    def events(self, direction: Direction, stream: bytes) -> list[Event]:
+    def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Event]:
         """What a receiver delivers, the end of the stream included."""
-        return self.receiver(direction).run(stream)
+        return self.receiver(direction, asked).run(stream)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tests.support.whole.reference import values
@@ -309,22 +309,34 @@ class MarkedReceiver(Receiver):
 
 
 class PacketReceiver(Receiver):
-    """The first byte says how many follow. Requests alone."""
+    """The first byte of a request says how many follow, the request how many its response has."""
 
-    def __init__(self, frame: Packets, known: Mapping[int, Message]) -> None:
-        """Between packets."""
+    def __init__(
+        self, frame: Packets, known: Mapping[int, Message], asked: Sequence[bytes], *, answers: bool
+    ) -> None:
+        """Between packets; `asked` are the requests that are answered one after the other."""
         super().__init__(known)
-        self.frame = frame
+        self.frame, self.answers = frame, answers
+        self.asked = [request for request in asked if request[0] in known]
         self.raw = b""
 
     def take(self, byte: int) -> Iterator[Event]:
         """One step."""
         self.raw += bytes([byte])
-        message = self.known.get(self.raw[0])
-        size = message.sizes[1] if message else 0
-        if message is None or len(self.raw) == 1 + size:
-            raw, self.raw = self.raw, b""
-            yield self.carried(message, None, lambda: raw[1:], self.at + 1 - len(raw), raw)
+        request = b""
+        if self.answers and not self.asked:
+            yield Event("frame", self.at, self.at, self.raw)
+            self.raw = b""
+            return
+        if self.answers:
+            request = self.asked[0]
+        message = self.known.get((request or self.raw)[0])
+        if message is None or len(self.raw) == self.frame.size(message):
+            raw, self.raw, self.asked = self.raw, b"", self.asked[1:]
+            yield self.carried(message, None, lambda: self._opened(raw, request), self.at + 1 - len(raw), raw)
+
+    def _opened(self, raw: bytes, request: bytes) -> bytes:
+        return self.frame.opened(self.known[(request or raw)[0]], raw, request)
 
     def finish(self) -> Iterator[Event]:
         """An unfinished packet is truncated."""

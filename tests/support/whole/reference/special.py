@@ -75,6 +75,11 @@ class Packets:
         found = [part_of(name, spec, order) for name, spec in parts.items() if spec["role"] == "checksum"]
         self._check = found[0] if found else None
 
+    def size(self, message: Message) -> int:
+        """Bytes of a packet, always the same."""
+        check = self._check.size if self._check and message.direction == "response" else 0
+        return message.sizes[1] + (check if message.direction == "response" else 1)
+
     def seal(self, message: Message, payload: bytes, request: bytes) -> bytes:
         """A request, or a response to one."""
         if message.direction == "request":
