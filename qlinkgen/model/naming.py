@@ -89,7 +89,7 @@ _C_WORDS = frozenset(
 _C_LOCALS = frozenset(
     """size payload wire capacity message value from to end check since index sent status id slave master
     listener frame checked request response body buffer start count raw sum crc payload_size
-    payload_capacity total trailer covered head place broadcast context byte
+    payload_capacity total trailer covered head place broadcast context byte at direction
     size_t""".split()  # noqa: SIM905
 )
 #: What a table of handlers has beside its functions.
