@@ -156,7 +156,7 @@ def file_stem(protocol: str) -> str:
 #: What JSON lines, vectors and containers of construct say of a message beside its address.
 _IN_RECORDS = frozenset(
     """message fields raw kinds request payload wire source decode_only what kind part error at from to
-    sent_on repeat delay late stray unanswered asked offset""".split()  # noqa: SIM905
+    sent_on repeat delay late stray unanswered asked offset time refused work""".split()  # noqa: SIM905
 )
 
 

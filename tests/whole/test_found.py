@@ -55,6 +55,12 @@ FOUND = {
     "  state: {id: 6, direction: response, fields: {v: u8}}\n",
     "a marked frame with a count that does not fit, which the kit took for another fault": _MARKED
     + 'messages:\n  log: {id: 2, fields: {n: {type: u8, counts: t}, t: "text[0..4]"}}\n',
+    "an address called like a key of the vectors": _PARTS.replace("node:", "raw:")
+    + _BUS
+    + "messages:\n  log: {id: 5, fields: {v: {type: u8, scale: 1/2, unit: V}}}\n",
+    "an address called like a key of what construct parses": _PARTS.replace("node:", "message:")
+    + _BUS
+    + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
     "an address of three bytes that may be any, and has four in C": _PARTS.replace(
         "address, type: u8", "address, type: u24"
     )

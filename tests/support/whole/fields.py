@@ -356,16 +356,16 @@ class FieldMaker:
         if most < 1:
             return
         low = rng.choice((0, 0, 0, 1, most))
-        open_before = any(self._is_open(each, made) for _, each in made)
-        counted = not room.open_end or open_before or rng.random() < 0.5
-        if counted and open_before:
-            return
+        opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
+        counted = not room.open_end or opened < len(made) or rng.random() < 0.5
         if counted:
             low = min(low, most - 1)
         spec = {"type": f"{kind}[{low}..{most}]", **spec}
         if counted:
             for unit in rng.choice((("items",), ("items",), ("bytes",), ("items", "bytes"))):
-                self._count(name, unit, most * (step if unit == "bytes" else 1), made, taken=taken, room=room)
+                number = most * (step if unit == "bytes" else 1)
+                self._count(name, unit, number, made, opened, taken=taken, room=room)
+                opened += 1
         elif low == 0 and rng.random() < 0.3 and kind in ("bytes", "text"):
             spec["type"] = kind
             most = 0
@@ -388,9 +388,17 @@ class FieldMaker:
         return self._item()
 
     def _count(
-        self, name: str, unit: str, most: int, made: list[tuple[str, Any]], *, taken: set[str], room: Room
+        self,
+        name: str,
+        unit: str,
+        most: int,
+        made: list[tuple[str, Any]],
+        end: int,
+        *,
+        taken: set[str],
+        room: Room,
     ) -> None:
-        """A count somewhere in front of its field, and behind an open-ended one never."""
+        """A count somewhere before its field, and before an open-ended one at `end`."""
         rng = self.rng
         kind = "u8" if most < 256 and rng.random() < 0.75 else "u16"
         spec: Doc = {"type": kind, "counts": name, "counts_in": unit}
@@ -398,7 +406,7 @@ class FieldMaker:
             del spec["counts_in"]
         if kind == "u16" and not self.shape.groups and rng.random() < 0.4:
             spec["byteorder"] = rng.choice(("big", "little"))
-        made.insert(rng.randint(0, len(made)), (self.words.name(taken), spec))
+        made.insert(rng.randint(0, end), (self.words.name(taken), spec))
         room.left -= self._bytes_of(kind, {})
 
 
