@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
+from qlinkgen.backends import python
+from qlinkgen.schema import loads
 from tests.support.whole.trial import Effort, run_text
 
 _HEAD = """\
@@ -19,6 +21,16 @@ frame:
     start: {role: constant, value: 7E}
     node: {role: address, type: u8}
     code: {role: message, type: u8}
+    length: {role: length, type: u8, counts: [data]}
+    data: {role: payload, size: 0..40}
+    crc: {role: checksum, type: u8, algorithm: sum8, over: [code, data]}
+"""
+_BARE = """\
+frame:
+  parts:
+    code: {role: message, type: u8}
+    version: {role: constant, value: "01"}
+    node: {role: address, type: u8}
     length: {role: length, type: u8, counts: [data]}
     data: {role: payload, size: 0..40}
     crc: {role: checksum, type: u8, algorithm: sum8, over: [code, data]}
@@ -79,3 +91,14 @@ def test_outputs_agree(text: str, require_tool: Callable[..., str]) -> None:
     outcome = run_text(_HEAD + text, effort=Effort(streams=40, every=True))
     assert not outcome.refused
     assert not outcome.differences, outcome.report()
+
+
+def test_the_first_wrong_part_of_a_header_names_the_fault() -> None:
+    """Without a preamble; the constant precedes the address, which is wrong too."""
+    text = f"{_HEAD}{_BARE}{_BUS}messages:\n  log: {{id: 5, fields: {{v: u8}}}}\n"
+    protocol, faults = loads(text, "whole.yaml")
+    assert protocol, faults
+    codec = python.load(protocol)
+    with pytest.raises(codec.DecodeError) as caught:
+        codec.decode(bytes.fromhex("05 02 63 01 00 05"))
+    assert caught.value.kind == "frame"

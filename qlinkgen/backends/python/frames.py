@@ -123,10 +123,15 @@ class UniqueView:
 
 @dataclass(frozen=True)
 class HeadCheck:
-    """A test that fails where no frame begins, in wire order, and what ``_split`` then gives."""
+    """A test that holds where no frame begins, in wire order, and what ``_split`` then gives.
+
+    Attributes:
+        fault: "number", "address" or "constant" where only a decoder of one whole frame reports it.
+    """
 
     test: str
     found: str
+    fault: str = ""
 
 
 @dataclass(frozen=True)
@@ -181,7 +186,6 @@ class PartsView:
     max_payload: int
     blank_header: str
     id_start: int
-    id_end: int
     id_of: str
     address_of: str
     bare: bool
@@ -195,6 +199,11 @@ class PartsView:
     def check(self) -> CheckView | None:
         """The check value, None where there is none."""
         return self.placed.view if self.placed else None
+
+    @property
+    def astray(self) -> Sequence[HeadCheck]:
+        """Tests of which one holds where no frame begins."""
+        return [each for each in self.head_checks if each.fault]
 
 
 @dataclass(frozen=True)
@@ -424,7 +433,6 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         max_payload=envelope.payload.most,
         blank_header=_blank_header(envelope, 0, address),
         id_start=envelope.offset(number),
-        id_end=envelope.offset(number) + number.size,
         id_of=_number_at(envelope, number),
         address_of=_number_at(envelope, envelope.address) if envelope.address else "",
         bare=receiver.bare,
@@ -481,7 +489,9 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
         start, end = envelope.offset(part), envelope.offset(part) + part.size
         match part:
             case ConstantPart():
-                yield HeadCheck(f"not {literal(part.data)}.startswith(head[{start}:{end}])", astray)
+                yield HeadCheck(
+                    f"not {literal(part.data)}.startswith(head[{start}:{end}])", astray, "constant"
+                )
             case LengthPart():
                 whole = isinstance(plan.frame.transparency, FrameStuffing)
                 place = f"_take(buf, start, {end})[1]" if whole else f"start + {end}"
@@ -491,9 +501,9 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 needed = [each for each in (envelope.id, envelope.address) if each is not None]
                 known = all(envelope.offset(each) < end for each in needed)
                 if isinstance(part, IdPart):
-                    yield HeadCheck(f"len(head) >= {end} and _number(head) not in known", astray)
+                    yield HeadCheck(f"len(head) >= {end} and _number(head) not in known", astray, "number")
                 if known and envelope.address is not None:
-                    yield HeadCheck(f"len(head) >= {end} and not _allowed(head, known)", astray)
+                    yield HeadCheck(f"len(head) >= {end} and not _allowed(head, known)", astray, "address")
             case IdPart() | AddressPart():
                 pass
             case MarkPart() | PayloadPart() | CheckPart():
