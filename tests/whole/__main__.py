@@ -114,9 +114,11 @@ def summary(outcomes: Sequence[Outcome]) -> str:
     lines += [
         f"{stage}, {who}: {cause}: {_seeds(seeds)}" for (stage, who, cause), seeds in sorted(causes.items())
     ]
+    counted = ("messages", "frames", "streams")
+    tried = [f"{sum(getattr(each, name) for each in outcomes)} {name}" for name in counted]
     lines.append(
         f"{len(outcomes)} schemas, {sum(bool(each.refused) for each in outcomes)} refused by lint, "
-        f"{sum(bool(each.differences) for each in outcomes)} with differences, "
+        f"{sum(bool(each.differences) for each in outcomes)} with differences; {', '.join(tried)}, "
         f"{sum(each.compared for each in outcomes)} comparisons"
     )
     return "\n".join(lines)
