@@ -231,7 +231,8 @@ class Decoder:
         alone = len(self._rows) == 1 and len(rows) == 1 and not self._slices
         lines: list[str] = []
         for number, row in enumerate(rows):
-            name = f"_UNPACK_{self.title}" + (f"_{number + 1}" if len(rows) > 1 else "")
+            # Before the title, as a message may be called like another one with a number after it.
+            name = f"_UNPACK_{number + 1}_{self.title}" if len(rows) > 1 else f"_UNPACK_{self.title}"
             if alone and (payload.fixed or self._tabled):
                 lines += self._whole(name, row)
                 continue

@@ -303,7 +303,8 @@ class Encoder:
         return [before + piece] if isinstance(piece, str) else self._call(piece, rows, before)
 
     def _call(self, row: Row, rows: list[Row], before: str) -> list[str]:
-        name = f"_PACK_{self.title}" + (f"_{rows.index(row) + 1}" if len(rows) > 1 else "")
+        # Before the title, as a message may be called like another one with a number after it.
+        name = f"_PACK_{rows.index(row) + 1}_{self.title}" if len(rows) > 1 else f"_PACK_{self.title}"
         text = self.place.prefix + format_of(row.codes)
         if row.items is None:
             self.constants.append(f'{name} = {self.place.use("Struct")}("{text}").pack')
