@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from qlinkgen.codecs import qlink
 from qlinkgen.link import Monitor, SlaveEngine, Timing
+from qlinkgen.link.codec import address_of
 from qlinkgen.link.monitor import Asked, Heard, Replied
 from qlinkgen.protocols.qlink import Bus, VirtualNode
 from qlinkgen.sim import Wire
@@ -84,7 +85,7 @@ def _described(entry: Heard) -> str:
     if isinstance(entry, Asked):
         return f"master  {entry.request!r}\n{'':14}{entry.frame.hex(' ')}"
     if isinstance(entry, Replied):
-        return f"node {entry.response.node}  {entry.response!r}\n{'':14}{entry.frame.hex(' ')}"
+        return f"node {address_of(entry.response)}  {entry.response!r}\n{'':14}{entry.frame.hex(' ')}"
     return repr(entry)
 
 
