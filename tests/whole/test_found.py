@@ -75,7 +75,8 @@ FOUND = {
     + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
     "a message called like another with a number, whose code has more than one row": _PARTS
     + _BUS
-    + 'messages:\n  log: {id: 5, fields: {v: u8, w: "u8[0..3]", x: u16}}\n'
+    + 'messages:\n  log: {id: 5, fields: {a: "u24[1]", n: {type: u8, counts: w}, w: "u24[0..3]", x: u16, '
+    'm: {type: u8, counts: z}, z: "bytes[0..3]", y: u8}}\n'
     "  log_1: {id: 6, fields: {v: i32}}\n  log_2: {id: 7, fields: {v: u64}}\n",
     "an address of three bytes that may be any, and has four in C": _PARTS.replace(
         "address, type: u8", "address, type: u24"
