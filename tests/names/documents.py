@@ -17,9 +17,11 @@ Fields = Mapping[str, Json]
 PLAIN_PARTS = ("zz_start", "zz_length", "zz_id", "zz_to", "zz_data", "zz_check")
 
 
-def frame(parts: Sequence[str], *, stuffed: bool = False, length: bool = True) -> Json:
+def frame(
+    parts: Sequence[str], *, stuffed: bool = False, length: bool = True, check: str = "crc-16/modbus"
+) -> Json:
     """A frame of six parts that are called so: start, length, id, address, payload, check."""
-    start, size, number, to, data, check = parts
+    start, size, number, to, data, total = parts
     counted: Mapping[str, Json] = (
         {size: {"role": "length", "type": "u16", "counts": [data]}} if length else {}
     )
@@ -29,10 +31,10 @@ def frame(parts: Sequence[str], *, stuffed: bool = False, length: bool = True) -
         number: {"role": "message", "type": "u16"},
         to: {"role": "address", "type": "u8"},
         data: {"role": "payload", "size": "0..2000"},
-        check: {
+        total: {
             "role": "checksum",
             "type": "u16",
-            "algorithm": "crc-16/modbus",
+            "algorithm": check,
             "over": [number, to, data],
         },
     }

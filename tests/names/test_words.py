@@ -158,7 +158,8 @@ def alone(known: Sequence[str], shapes: int) -> Iterator[Document]:
     for index in range(len(known)):
         six = [known[(index + 97 * step) % len(known)] for step in range(6)]
         for shape in range(index, index + shapes):
-            made = frame(six, stuffed=shape % 3 == 1, length=shape % 3 < 2)
+            check = "sum16" if shape % 3 else "crc-16/modbus"
+            made = frame(six, stuffed=shape % 3 == 1, length=shape % 3 < 2, check=check)
             yield Document(f"parts_{index}_{shape % 3}", frame=made, commands=LEAST)
 
 

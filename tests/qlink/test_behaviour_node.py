@@ -123,7 +123,8 @@ class TestSync:
 
 class TestMotor:
     def test_a_request_is_polled_until_it_is_completed(self, make: MakeRig) -> None:
-        rig = make(Slave(motor=backwards, motor_seconds=0.05))
+        # Long enough for the first poll of a machine under load to come too early.
+        rig = make(Slave(motor=backwards, motor_seconds=0.5))
         answer = rig.sure(lambda: rig.bus.complete_motor_request(1, b"\xa5\xa5\x00ask"))
         assert (answer.last_completion, bytes(answer.motor_data)) == (0x16, b"ksa\x00\xa5\xa5")
         polls = [each for each in rig.node.heard if isinstance(each, qlink.MotorResponsePollRequest)]
