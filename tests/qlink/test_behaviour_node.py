@@ -326,10 +326,10 @@ class TestSetup:
         rig.nodes[1].inputs = 0xA5A5A4
         first = second = None
         for _ in range(100 if rig.faulty else 1):
-            first, second, nobody = rig.bus.status((1, 2, 3))
+            first, second, absent = rig.bus.status((1, 2, 3))
             assert first.position in {None, -99}
             assert second.inputs in {None, 0xA5A5A4}
-            assert not nobody.online
+            assert not absent.online
             if first.position is not None and second.inputs is not None:
                 break
         assert first is not None
