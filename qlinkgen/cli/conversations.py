@@ -10,7 +10,7 @@ from qlinkgen.cli.codec import MessageObject
 from qlinkgen.cli.streams import Bad, Event, OneWay
 from qlinkgen.link.codec import Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.sizes import max_frame_size
+from qlinkgen.plan import Plan, plan_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +31,14 @@ Asked = Message | OutOfRange
 
 
 class Conversation:
-    """Both sides on one line: behind a request, a response if its check value fits, else the next request.
+    """Both sides on one line: after a request, a response if its check value fits, else the next request.
 
     The host need not read the check value, so requests may also follow one another directly.
     """
 
     def __init__(self, protocol: Protocol, codec: ModuleType) -> None:
         """Begin with a request."""
-        self._protocol = protocol
+        self._plan = plan_of(protocol)
         self._codec = codec
         self._requests = OneWay(codec, "request")
         self._names = {message.id: message.name for message in protocol.received("request")}
@@ -61,7 +61,7 @@ class Conversation:
             if self._asked is None:
                 yield from self._request(self._take(1))
                 continue
-            size = answer_size(self._protocol, self._asked)
+            size = answer_size(self._plan, self._asked)
             if len(self._waiting) < size and not last:
                 return
             asked, self._asked = self._asked, None
@@ -103,7 +103,7 @@ class Answers:
 
     def __init__(self, protocol: Protocol, codec: ModuleType, asked: Asked) -> None:
         """Every response answers ``asked``."""
-        self._size = answer_size(protocol, asked)
+        self._size = answer_size(plan_of(protocol), asked)
         self._codec, self._asked = codec, asked
         self._offset = 0
         self._waiting = bytearray()
@@ -124,10 +124,10 @@ class Answers:
             yield Bad("truncated", self._offset, bytes(self._waiting), text)
 
 
-def answer_size(protocol: Protocol, asked: Asked) -> int:
+def answer_size(plan: Plan, asked: Asked) -> int:
     """Bytes of the response to a request object, check value included; 0 if nothing answers."""
-    command = protocol.command_of(protocol.by_name[asked.NAME])
-    return max_frame_size(protocol.frame, command.response) if command and command.response else 0
+    command = plan.protocol.command_of(plan.protocol.by_name[asked.NAME])
+    return plan.message(command.response.name).frame_size if command and command.response else 0
 
 
 def decode_answer(codec: ModuleType, raw: bytes, asked: Asked, offset: int) -> Event:

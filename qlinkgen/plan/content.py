@@ -42,7 +42,7 @@ class Unsendable(ValueError):
 
 
 class BadContent(ValueError):
-    """Bytes that are no payload of the message.
+    """Bytes that are not a payload of the message.
 
     Attributes:
         kind: length or range.
@@ -260,6 +260,5 @@ def _members(step: BitsStep, whole: int, at: int) -> dict[str, Raw]:
         value = integer.signed_value(whole >> member.shift & integer.mask)
         if broken(member.conditions, value):
             raise BadContent("range", member.name, at)
-        if isinstance(member, Member):
-            found[member.name] = value
+        found[member.name] = value
     return found

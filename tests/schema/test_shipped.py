@@ -12,7 +12,6 @@ import pytest
 from qlinkgen.model.frame import DelimitedFrame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.sizes import max_wire_size
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.framing import Hunt
@@ -209,7 +208,7 @@ def test_qlink_frame(qlink: Protocol) -> None:
 
 def test_qlink_worst_wire_size(qlink: Protocol) -> None:
     # Length, command 0x20 and node 1..16 are never A5: 26 data and 2 CRC bytes can be stuffed.
-    assert max_wire_size(qlink.frame, qlink.by_name["motion.request"]) == 5 + 2 * 28
+    assert plan_of(qlink).message("motion").wire_size == 5 + 2 * 28
 
 
 def test_qlink_bus(qlink: Protocol) -> None:

@@ -6,23 +6,19 @@ from dataclasses import dataclass
 
 from qlinkgen.backends import c_text
 from qlinkgen.backends.c.names import Names, bracketed, integer_type, literal, unsigned
-from qlinkgen.model import sizes
-from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Enum, Flags, NamedValue
+from qlinkgen.plan import Plan
 
 
-def limits(protocol: Protocol, kept: tuple[Message, ...]) -> list[tuple[str, str]]:
-    """Names and values of what holds for the whole protocol."""
-    bus, frame = protocol.bus, protocol.frame
-    longest = max((sizes.max_frame_size(frame, message) for message in protocol.messages), default=0)
+def limits(whole: Plan, kept: Plan) -> list[tuple[str, str]]:
+    """Names and values of what holds for the whole protocol, whatever is kept of it."""
+    bus, most = whole.protocol.bus, whole.frame.max_payload
+    longest = max(message.frame_size for message in whole.messages)
     values = [
-        ("MAX_PAYLOAD_SIZE", f"{sizes.max_payload(protocol)}U"),
-        (
-            "MAX_FRAME_SIZE",
-            f"{max(longest, sizes.frame_size(frame, protocol.messages[0], sizes.max_payload(protocol)))}U",
-        ),
-        ("MAX_WIRE_SIZE", f"{max((sizes.max_wire_size(frame, m) for m in kept), default=0)}U"),
+        ("MAX_PAYLOAD_SIZE", f"{most}U"),
+        ("MAX_FRAME_SIZE", f"{max(longest, most + whole.messages[0].envelope.overhead)}U"),
+        ("MAX_WIRE_SIZE", f"{kept.max_wire_size}U"),
     ]
     if bus.nodes:
         values += [("FIRST_NODE", f"{bus.nodes[0]}U"), ("LAST_NODE", f"{bus.nodes[1]}U")]

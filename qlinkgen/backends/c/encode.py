@@ -68,8 +68,7 @@ class Encoder:
                 self._check_value(step)
             case BitsStep():
                 for member in step.members:
-                    if isinstance(member, Member):
-                        self._check_value(member)
+                    self._check_value(member)
             case BytesStep():
                 if step.text:
                     octets = f"message->{member_of(step.name)}"

@@ -21,9 +21,9 @@ from qlinkgen.backends.c.messages import MessageWriter, Rounding, nearest_helper
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
-from qlinkgen.model import sizes
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake
+from qlinkgen.plan import plan_of
 from qlinkgen.plan.payload import BytesStep
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -195,13 +195,14 @@ class Header:
 
     def _head(self) -> HeadView:
         protocol, runs, check = self._protocol, self._byte_runs(), self._section.check
+        whole = plan_of(protocol)
         return HeadView(
             banner=[piece for line in banner(protocol) for piece in c_text.comment(line, WIDTH)],
             about=c_text.comment(protocol.doc, WIDTH),
             options=option_lines(self._names.upper, check),
             example=example_lines(self._plan, self._names, self._section),
-            max_wire_size=max(sizes.protocol_max_wire_size(protocol), self._section.view.max_wire),
-            limits=limits(protocol, self._kept),
+            max_wire_size=max(whole.max_wire_size, self._section.view.max_wire),
+            limits=limits(whole, self._plan),
             enums=enum_views(protocol, self._names),
             helpers=self._layouts.helpers(),
             has_text=any(run.text for run in runs),

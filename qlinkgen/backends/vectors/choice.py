@@ -15,7 +15,6 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
-    Member,
     PayloadPlan,
     ReservedStep,
     ValueStep,
@@ -72,8 +71,7 @@ class Rule:
                 case BitsStep():
                     bits = self._bits(step.integer)
                     for member in step.members:
-                        if isinstance(member, Member):
-                            found[member.name] = self._chosen(member.number, bits >> member.shift)
+                        found[member.name] = self._chosen(member.number, bits >> member.shift)
                 case BytesStep():
                     mask = 0x7F if step.text else 0xFF
                     found[step.name] = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
