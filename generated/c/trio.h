@@ -516,7 +516,7 @@ static inline bool trio_shape_(uint8_t id, size_t count, bool *checked)
     return false;
 }
 
-/* Completes a frame whose payload already stands in its place. */
+/* Completes a frame whose payload is in its place already. */
 static inline int trio_seal_(
     uint8_t id, uint8_t address, uint8_t *wire, size_t capacity, int payload_size, bool checked)
 {

@@ -47,7 +47,7 @@ class Shapes:
     messages: list[Shape]
 
 
-#: A marked frame has one byte before the payload and one behind it.
+#: A marked frame has one byte before the payload and one after it.
 PLACE = PlaceView(tailed=False, tail=1, header=1, overhead=2)
 
 

@@ -121,7 +121,7 @@ class PartsView:
 
     @property
     def reads_tail(self) -> bool:
-        """Bytes behind the payload are compared."""
+        """Bytes after the payload are compared."""
         return bool(self.wrong_tail or self.check_differs)
 
 

@@ -101,7 +101,7 @@ def native(kind: Number | Run, raw: Raw) -> Any:
 
 
 def raw_of(kind: Number | Run, found: Any) -> Raw:
-    """The integer that a value stands for. Raises TypeError or ValueError for a value that no integer has."""
+    """The integer that represents a value. Raises TypeError or ValueError for a value without one."""
     if isinstance(kind, Run):
         return list(found) if kind.item else found.encode("ascii") if kind.text else bytes(found)
     if kind.scale is None:
