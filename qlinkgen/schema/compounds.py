@@ -8,17 +8,17 @@ from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
 from qlinkgen.schema.constants import integer_range
 from qlinkgen.schema.file_model import BitSpec, FieldSpec
 from qlinkgen.schema.kinds import MAX_PAYLOAD
+from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, byte_string, shown, whole_range
 from qlinkgen.schema.numbers import defaulted, quantified
 from qlinkgen.schema.scalars import Meaning, Plain, ScalarBuilder
-from qlinkgen.schema.site import Site
 
 _NUMBER_KEYS = ("byteorder", "groups", "parts", "scale", "offset", "range", "raw_range", "counts", "bits")
 _ITEM_KEYS = ("scale", "offset", "range", "raw_range", "const", "reserved", "counts", "bits")
 _CONTAINER_KEYS = ("scale", "offset", "range", "raw_range", "default", "const", "reserved", "counts", "unit")
 
 
-def build_length(text: TypeText, item_size: int, payload_max: int, site: Site) -> Length | None:
+def build_length(text: TypeText, item_size: int, payload_max: int, location: Location) -> Length | None:
     """How many items the brackets of a type allow; without a number, as many as the payload can hold."""
     if text.count is None or not text.count.strip():
         return Length(0, payload_max // item_size)
@@ -26,10 +26,10 @@ def build_length(text: TypeText, item_size: int, payload_max: int, site: Site) -
         first, last = whole_range(text.count)
     except ValueError:
         hint = "write a number or a range, like [4] or [0..12]"
-        site.fault("unknown-type", "type", f"{shown(text.count)} is not a count", hint)
+        location.fault("unknown-type", "type", f"{shown(text.count)} is not a count", hint)
         return None
     if last == 0:
-        site.fault(
+        location.fault(
             "bad-array",
             "type",
             f"{text.base}[{text.count}] holds nothing",
@@ -38,28 +38,28 @@ def build_length(text: TypeText, item_size: int, payload_max: int, site: Site) -
         return None
     if last * item_size > MAX_PAYLOAD:
         what = f"{text.base}[{text.count}] has up to {last * item_size} bytes"
-        site.fault("payload-too-long", "type", what, f"no payload has more than {MAX_PAYLOAD}")
+        location.fault("payload-too-long", "type", what, f"no payload has more than {MAX_PAYLOAD}")
         return None
     return Length(first, last)
 
 
-def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, site: Site) -> Blob | None:
+def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, location: Location) -> Blob | None:
     """A byte string or text."""
-    site.reject(spec, (*_NUMBER_KEYS, "unit", "reserved"), text.base)
+    location.reject(spec, (*_NUMBER_KEYS, "unit", "reserved"), text.base)
     if spec.const is not None:
-        site.key_fault(
+        location.key_fault(
             "not-applicable", "const", f"'const' has no effect on {text.base}", "use integers with const"
         )
-    length = build_length(text, 1, payload_max, site)
+    length = build_length(text, 1, payload_max, location)
     if length is None:
         return None
-    default = _blob_default(spec, text, length, site)
+    default = _blob_default(spec, text, length, location)
     fill = b" " if text.base == "text" else b"\0"
     required = spec.default is None and length.minimum > 0
     return Blob(text.base == "text", length, default.ljust(length.minimum, fill), required)
 
 
-def _blob_default(spec: FieldSpec, text: TypeText, length: Length, site: Site) -> bytes:
+def _blob_default(spec: FieldSpec, text: TypeText, length: Length, location: Location) -> bytes:
     if spec.default is None:
         return b""
     is_text = text.base == "text"
@@ -67,15 +67,15 @@ def _blob_default(spec: FieldSpec, text: TypeText, length: Length, site: Site) -
         default = str(spec.default).encode("ascii") if is_text else _bytes(spec.default)
     except UnicodeEncodeError:
         what = f"{shown(spec.default)} is no text"
-        site.fault("bad-value", "default", what, "write characters of 7 bits")
+        location.fault("bad-value", "default", what, "write characters of 7 bits")
         return b""
     except ValueError as error:
         what, _, hint = str(error).partition("; ")
-        site.fault("bad-value", "default", what, hint)
+        location.fault("bad-value", "default", what, hint)
         return b""
     if not length.minimum <= len(default) <= length.maximum:
         what = f"the default has {len(default)} bytes"
-        site.fault(
+        location.fault(
             "value-does-not-fit", "default", what, f"{text.base}[{text.count or ''}] is what it has to fit"
         )
         return b""
@@ -86,61 +86,65 @@ def _bytes(value: object) -> bytes:
     return b"" if value == "" else byte_string(value)
 
 
-def build_array(item: Scalar, spec: FieldSpec, text: TypeText, payload_max: int, site: Site) -> Array | None:
+def build_array(
+    item: Scalar, spec: FieldSpec, text: TypeText, payload_max: int, location: Location
+) -> Array | None:
     """Integers in a row."""
-    length = build_length(text, item.size, payload_max, site)
+    length = build_length(text, item.size, payload_max, location)
     if length is None:
         return None
-    default = _array_default(spec, item, length, site)
+    default = _array_default(spec, item, length, location)
     required = spec.default is None and length.minimum > 0
     return Array(item, length, default + (0,) * (length.minimum - len(default)), required)
 
 
-def _array_default(spec: FieldSpec, item: Scalar, length: Length, site: Site) -> tuple[int, ...]:
+def _array_default(spec: FieldSpec, item: Scalar, length: Length, location: Location) -> tuple[int, ...]:
     if spec.default is None:
         return ()
     if not isinstance(spec.default, list):
-        site.fault("wrong-type", "default", f"{shown(spec.default)} is no list", "write a list, like [1, 2]")
+        location.fault(
+            "wrong-type", "default", f"{shown(spec.default)} is no list", "write a list, like [1, 2]"
+        )
         return ()
     if len(spec.default) > length.maximum:
         what = f"the default has {len(spec.default)} items"
-        site.fault("value-does-not-fit", "default", what, f"write at most {length.maximum}")
+        location.fault("value-does-not-fit", "default", what, f"write at most {length.maximum}")
         return ()
     for value in spec.default:
         if not item.minimum <= value <= item.maximum:
             hint = f"write numbers from {item.minimum} to {item.maximum}"
-            site.fault("value-does-not-fit", "default", f"{value} does not fit an item", hint)
+            location.fault("value-does-not-fit", "default", f"{value} does not fit an item", hint)
             return ()
     return tuple(spec.default)
 
 
-def is_plain_item(spec: FieldSpec, plain: Plain, base: str, site: Site) -> bool:
+def is_plain_item(spec: FieldSpec, plain: Plain, base: str, location: Location) -> bool:
     """An array can hold it; keys that would have no effect on the items are reported."""
     if plain.meaning is not None or plain.scaling is not None:
         hint = "use u8 to i64, or a field for each"
-        site.fault("bad-array", "type", f"an array holds plain integers, not '{base}'", hint)
+        location.fault("bad-array", "type", f"an array holds plain integers, not '{base}'", hint)
         return False
     for key in _ITEM_KEYS:
         if getattr(spec, key) in (None, False):
             continue
-        if key in site.written:
-            site.reject(spec, (key,), "an array")
+        if key in location.written:
+            location.reject(spec, (key,), "an array")
         else:
             what = f"an array holds plain integers, and '{key}' belongs to its items' type"
-            site.fault("bad-array", "type", what, "use u8 to i64, or a field for each")
+            location.fault("bad-array", "type", what, "use u8 to i64, or a field for each")
     return True
 
 
-def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, site: Site) -> Bits:
+def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, location: Location) -> Bits:
     """An integer divided into bit fields."""
-    site.reject(
+    location.reject(
         spec, _CONTAINER_KEYS, "an integer with bits", "put it on one of the bit fields, or remove it"
     )
     if container.meaning is not None or container.scaling is not None:
-        site.fault("not-applicable", "type", "bits divide a plain integer", "use u8, u16 and so on")
+        location.fault("not-applicable", "type", "bits divide a plain integer", "use u8, u16 and so on")
     members: list[BitField] = []
     for name, bit in (spec.bits or {}).items():
-        place = site.inner("bits", name, written=bit.model_fields_set)
+        place = location.inner("bits", name, written=bit.model_fields_set)
         first, last = bit.at
         if last >= container.bits:
             place.fault(
@@ -154,41 +158,41 @@ def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, site:
         if scalar is not None:
             members.append(BitField(name, first, scalar, bit.doc))
     if not members:
-        site.report.taint(site.path)
+        location.report.taint(location.path)
     return Bits(container, tuple(members))
 
 
-def _bit_scalar(spec: BitSpec, width: int, scalars: ScalarBuilder, site: Site) -> Scalar | None:
-    meaning = _bit_meaning(spec, width, scalars, site)
+def _bit_scalar(spec: BitSpec, width: int, scalars: ScalarBuilder, location: Location) -> Scalar | None:
+    meaning = _bit_meaning(spec, width, scalars, location)
     if isinstance(meaning, str) and meaning != "bool":
         return None
     if meaning is not None and spec.signed:
-        site.reject(spec, ("signed",), "a named value")
+        location.reject(spec, ("signed",), "a named value")
     low, high = integer_range(width, signed=spec.signed)
     scalar = Scalar(
         bits=width, signed=spec.signed, chunks=(), minimum=low, maximum=high, meaning=meaning, unit=spec.unit
     )
-    scalar = quantified(scalar, spec, "a named value", site)
-    return defaulted(scalar, spec.default, "default", site)
+    scalar = quantified(scalar, spec, "a named value", location)
+    return defaulted(scalar, spec.default, "default", location)
 
 
 def _bit_meaning(
-    spec: BitSpec, width: int, scalars: ScalarBuilder, site: Site
+    spec: BitSpec, width: int, scalars: ScalarBuilder, location: Location
 ) -> Meaning | Literal["unknown"]:
     if spec.type is None:
         numeric = spec.scale is not None or spec.offset is not None or spec.signed
         return "bool" if width == 1 and not numeric else None
-    plain = scalars.named(spec.type, site)
+    plain = scalars.named(spec.type, location)
     if plain is None:
         return "unknown"
     if plain.meaning is None:
         hint = "leave type out, and write signed: true for a signed number"
-        site.fault("not-applicable", "type", f"'{spec.type}' is not the type of a bit field", hint)
+        location.fault("not-applicable", "type", f"'{spec.type}' is not the type of a bit field", hint)
         return "unknown"
     if plain.meaning == "bool":
         if width > 1:
-            site.fault("bits-do-not-fit", "", f"bool is one bit, not {width}", "use at: with one bit")
+            location.fault("bits-do-not-fit", "", f"bool is one bit, not {width}", "use at: with one bit")
         return "bool"
     if not plain.fits(width):
-        site.fault("bits-do-not-fit", "", f"{spec.type} does not fit {width} bits", "widen the bit field")
+        location.fault("bits-do-not-fit", "", f"{spec.type} does not fit {width} bits", "widen the bit field")
     return plain.meaning

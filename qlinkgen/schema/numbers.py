@@ -9,9 +9,9 @@ from typing import Protocol
 
 from qlinkgen.model.types import DOUBLE_BITS, Enum, Flags, Scalar, Scaling, Settable
 from qlinkgen.schema.constants import MAX_BITS
+from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import Range, shown
 from qlinkgen.schema.report import did_you_mean, listed
-from qlinkgen.schema.site import Site
 
 Written = int | bool | Decimal | str | list[int]
 
@@ -31,34 +31,34 @@ class Quantity(Protocol):
     def raw_range(self) -> Range | None: ...  # noqa: D102
 
 
-def quantified(scalar: Scalar, spec: Quantity, what: str, site: Site) -> Scalar:
+def quantified(scalar: Scalar, spec: Quantity, what: str, location: Location) -> Scalar:
     """A scalar with the scale, offset and range that are written for it."""
     if spec.scale is not None or spec.offset is not None:
         if scalar.meaning is not None:
-            site.reject(spec, ("scale", "offset"), what, "remove it, or use an integer type")  # type: ignore[arg-type]
+            location.reject(spec, ("scale", "offset"), what, "remove it, or use an integer type")  # type: ignore[arg-type]
         else:
-            scalar = _scaled(scalar, spec.scale, spec.offset, site)
+            scalar = _scaled(scalar, spec.scale, spec.offset, location)
     if spec.range is not None:
-        return _ranged(scalar, spec.range, "range", scalar.scaling, site)
-    return scalar if spec.raw_range is None else _ranged(scalar, spec.raw_range, "raw_range", None, site)
+        return _ranged(scalar, spec.range, "range", scalar.scaling, location)
+    return scalar if spec.raw_range is None else _ranged(scalar, spec.raw_range, "raw_range", None, location)
 
 
-def _scaled(scalar: Scalar, scale: Fraction | None, offset: Fraction | None, site: Site) -> Scalar:
+def _scaled(scalar: Scalar, scale: Fraction | None, offset: Fraction | None, location: Location) -> Scalar:
     base = scalar.scaling.scale if scalar.scaling else Fraction(1)
     scaling = Scaling(base if scale is None else scale, offset or Fraction(0))
     if scaling.scale == 0:
-        site.fault("bad-scale", "scale", "the scale is 0", "write the value of one step, like 1/10")
+        location.fault("bad-scale", "scale", "the scale is 0", "write the value of one step, like 1/10")
         return scalar
     scaled = replace(scalar, scaling=scaling)
     key = "scale" if scale is not None else "offset"
     if max(abs(scaling.factor), scaling.divisor, abs(scaling.bias)) >= 1 << MAX_BITS:
         hint = "use a scale and an offset of fewer digits"
-        site.fault("bad-scale", key, f"{key} needs integers of more than {MAX_BITS} bits", hint)
+        location.fault("bad-scale", key, f"{key} needs integers of more than {MAX_BITS} bits", hint)
         return scalar
     if scaled.number == "decimal" and not _terminates(scaling.divisor):
         hint = f"use a scale like 1/10 or 1/2^16, or at most {DOUBLE_BITS} bits"
         what = f"{scalar.bits} bits in steps of {scaling.scale} have values without a decimal form that ends"
-        site.fault("inexact-scale", key, what, hint)
+        location.fault("inexact-scale", key, what, hint)
     return scaled
 
 
@@ -69,13 +69,13 @@ def _terminates(denominator: int) -> bool:
     return denominator == 1
 
 
-def _ranged(scalar: Scalar, limits: Range, key: str, scaling: Scaling | None, site: Site) -> Scalar:
+def _ranged(scalar: Scalar, limits: Range, key: str, scaling: Scaling | None, location: Location) -> Scalar:
     ends = [limits.first, limits.last]
     if scaling is not None:
         ends = [(end - scaling.offset) / scaling.scale for end in ends]
     for written, end in zip((limits.first, limits.last), ends, strict=True):
         if end.denominator != 1:
-            site.fault(
+            location.fault(
                 "bad-scale", key, f"the bound {_decimal(written)} lies between two steps", _step_hint(scaling)
             )
             return scalar
@@ -83,7 +83,7 @@ def _ranged(scalar: Scalar, limits: Range, key: str, scaling: Scaling | None, si
     if low < scalar.natural_minimum or high > scalar.natural_maximum:
         what = f"raw values of {low}..{high} do not fit {_bits(scalar)}"
         hint = f"those hold {scalar.natural_minimum}..{scalar.natural_maximum}; use a wider type"
-        site.fault("range-does-not-fit", key, what, hint)
+        location.fault("range-does-not-fit", key, what, hint)
         return scalar
     return replace(scalar, minimum=low, maximum=high)
 
@@ -105,59 +105,59 @@ def _step_hint(scaling: Scaling | None) -> str:
     return f"use a multiple of {scaling.scale}" + (f" from {scaling.offset} on" if scaling.offset else "")
 
 
-def defaulted(scalar: Scalar, value: Written | None, key: str, site: Site) -> Scalar:
+def defaulted(scalar: Scalar, value: Written | None, key: str, location: Location) -> Scalar:
     """A scalar with the default or constant that is written for it; without one, the number nearest to 0."""
     if value is None:
         nearest = min(max(0, scalar.minimum), scalar.maximum)
         return replace(scalar, default=nearest, role=Settable(required=nearest != 0))
-    raw = _raw(scalar, value, key, site)
+    raw = _raw(scalar, value, key, location)
     if raw is None:
         return scalar
     if not scalar.natural_minimum <= raw <= scalar.natural_maximum:
         held = f"{scalar.natural_minimum}..{scalar.natural_maximum}"
         hint = f"those hold {held}; use a wider type or another number"
         what = f"{shown(value)} does not fit {_bits(scalar)}"
-        site.fault("value-does-not-fit", key, what, hint)
+        location.fault("value-does-not-fit", key, what, hint)
         return scalar
     if not scalar.minimum <= raw <= scalar.maximum:
         low, high = sorted((scalar.physical(scalar.minimum), scalar.physical(scalar.maximum)))
-        site.fault("default-out-of-range", key, f"{shown(value)} is out of range", f"use {low}..{high}")
+        location.fault("default-out-of-range", key, f"{shown(value)} is out of range", f"use {low}..{high}")
         return scalar
     if isinstance(scalar.meaning, Flags) and scalar.meaning.reserved_zero and raw & ~scalar.meaning.mask:
         hint = f"named are the bits {scalar.meaning.mask:#x}"
-        site.fault(
+        location.fault(
             "default-out-of-range", key, f"{shown(value)} sets reserved bits of {scalar.meaning.name}", hint
         )
         return scalar
     return replace(scalar, default=raw)
 
 
-def _raw(scalar: Scalar, value: Written, key: str, site: Site) -> int | None:
+def _raw(scalar: Scalar, value: Written, key: str, location: Location) -> int | None:
     """A default or constant as written, as an integer on the wire."""
     if isinstance(scalar.meaning, Enum) and isinstance(value, str):
-        return _named(scalar.meaning, value, key, site)
+        return _named(scalar.meaning, value, key, location)
     if scalar.meaning == "bool" and isinstance(value, bool):
         return int(value)
     if isinstance(value, bool) or not isinstance(value, int | Decimal):
         needed = "true or false" if scalar.meaning == "bool" else "a number"
-        site.fault("wrong-type", key, f"{shown(value)} is not {needed}", f"write {needed}")
+        location.fault("wrong-type", key, f"{shown(value)} is not {needed}", f"write {needed}")
         return None
     steps = Fraction(value)
     if scalar.scaling is not None:
         steps = (steps - scalar.scaling.offset) / scalar.scaling.scale
     if steps.denominator != 1:
-        site.fault("bad-scale", key, f"{value} lies between two steps", _step_hint(scalar.scaling))
+        location.fault("bad-scale", key, f"{value} lies between two steps", _step_hint(scalar.scaling))
         return None
     return int(steps)
 
 
-def _named(enum: Enum, name: str, key: str, site: Site) -> int | None:
+def _named(enum: Enum, name: str, key: str, location: Location) -> int | None:
     names = {member.name: member.value for member in enum.members}
     if name in names:
         return names[name]
-    from_enum = (("enums", enum.name), site.path)
+    from_enum = (("enums", enum.name), location.path)
     hint = did_you_mean(name, names, f"it has {listed(names)}")
-    site.report.error(
-        "bad-value", site.place(key), f"{enum.name} has no {shown(name)}", hint, needs=from_enum
+    location.report.error(
+        "bad-value", location.place(key), f"{enum.name} has no {shown(name)}", hint, needs=from_enum
     )
     return None

@@ -22,10 +22,10 @@ from qlinkgen.model.types import (
 )
 from qlinkgen.schema.constants import INTEGER, MAX_BITS, carrier, integer_range
 from qlinkgen.schema.file_model import FieldSpec, SchemaFile
+from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.numbers import defaulted, quantified
 from qlinkgen.schema.report import did_you_mean
-from qlinkgen.schema.site import Site
 
 FIXED = re.compile(r"(?P<sign>u?)fixed(?P<whole>[0-9]{1,2})\.(?P<fraction>[0-9]{1,2})\Z", re.ASCII)
 #: Built-in types that are no integers.
@@ -73,7 +73,7 @@ class ScalarBuilder:
         #: Names that some field has as its type.
         self.used: set[str] = set()
 
-    def named(self, base: str, site: Site) -> Plain | None:
+    def named(self, base: str, location: Location) -> Plain | None:
         """A type by its name; one that is unknown is reported."""
         self.used.add(base)
         plain = self.plain(base)
@@ -93,11 +93,13 @@ class ScalarBuilder:
             hint = did_you_mean(base, known, "define it under types, enums or flags")
             places = [(group, base) for group in ("types", "enums", "flags")]
             what = f"unknown type {shown(base)}"
-            site.report.error("unknown-type", site.place("type"), what, hint, needs=(site.path, *places))
+            location.report.error(
+                "unknown-type", location.place("type"), what, hint, needs=(location.path, *places)
+            )
         elif isinstance(plain.meaning, Enum | Flags):
             group = "enums" if isinstance(plain.meaning, Enum) else "flags"
-            if site.report.touched((group, base)):
-                site.report.taint(site.path)
+            if location.report.touched((group, base)):
+                location.report.taint(location.path)
         return plain
 
     def plain(self, base: str) -> Plain | None:
@@ -119,9 +121,9 @@ class ScalarBuilder:
             return Plain(int(match["bits"]), signed=match["sign"] == "i")
         return None
 
-    def build(self, spec: FieldSpec, base: str, plain: Plain, site: Site) -> Scalar | None:
+    def build(self, spec: FieldSpec, base: str, plain: Plain, location: Location) -> Scalar | None:
         """The scalar of a field; None where its bytes cannot be told."""
-        chunks = self._chunks(spec, plain.bits, base, site)
+        chunks = self._chunks(spec, plain.bits, base, location)
         if chunks is None:
             return None
         low, high = (0, 1) if plain.meaning == "bool" else integer_range(plain.bits, signed=plain.signed)
@@ -129,34 +131,36 @@ class ScalarBuilder:
             bits=plain.bits, signed=plain.signed, chunks=chunks, minimum=low, maximum=high,
             scaling=plain.scaling, meaning=plain.meaning, unit=spec.unit or "",
         )  # fmt: skip
-        _check_keys(spec, plain, site)
+        _check_keys(spec, plain, location)
         if spec.counts is not None:
             return replace(scalar, role=Count(spec.counts, spec.counts_in))
-        scalar = quantified(scalar, spec, plain.what, site)
+        scalar = quantified(scalar, spec, plain.what, location)
         key = "const" if spec.const is not None else "default"
-        scalar = defaulted(scalar, getattr(spec, key), key, site)
+        scalar = defaulted(scalar, getattr(spec, key), key, location)
         if spec.reserved:
             return replace(scalar, role=Reserved())
         return scalar if spec.const is None else replace(scalar, role=Constant())
 
-    def _chunks(self, spec: FieldSpec, bits: int, base: str, site: Site) -> tuple[Chunk, ...] | None:
+    def _chunks(self, spec: FieldSpec, bits: int, base: str, location: Location) -> tuple[Chunk, ...] | None:
         if not 1 <= bits <= MAX_BITS:
-            site.fault("bad-width", "type", f"{base} has {bits} bits", f"1 to {MAX_BITS} are possible")
+            location.fault("bad-width", "type", f"{base} has {bits} bits", f"1 to {MAX_BITS} are possible")
             return None
         groups = spec.groups or self._file.groups
         if groups is not None:
             parts = tuple(spec.parts or [(0, bits - 1)])
             if not _covered(parts, bits):
                 hint = f"name every bit from 0 to {bits - 1} once"
-                site.fault("bad-width", "parts", f"the parts do not cover the {bits} bits of {base}", hint)
+                location.fault(
+                    "bad-width", "parts", f"the parts do not cover the {bits} bits of {base}", hint
+                )
                 return None
             return group_chunks(parts, groups.bits, least_first=groups.first == "least")
         if bits % 8:
             hint = "use u8, u16, u24 ... u64, bits inside an integer, or groups"
-            site.fault("bad-width", "type", f"{base} has {bits} bits, which fill no whole bytes", hint)
+            location.fault("bad-width", "type", f"{base} has {bits} bits, which fill no whole bytes", hint)
             return None
         if spec.parts:
-            site.key_fault(
+            location.key_fault(
                 "not-applicable", "parts", "'parts' has no effect without groups", "add groups, or remove it"
             )
         return byte_chunks(bits // 8, spec.byteorder or self._file.byteorder)
@@ -168,23 +172,25 @@ def _covered(parts: tuple[tuple[int, int], ...], bits: int) -> bool:
     return sorted(bit for first, last in parts for bit in range(first, last + 1)) == list(range(bits))
 
 
-def _check_keys(spec: FieldSpec, plain: Plain, site: Site) -> None:
+def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
     """Report keys that contradict one another."""
     if spec.counts is not None:
-        site.reject(
+        location.reject(
             spec, ("scale", "offset", "range", "raw_range", "default", "const", "reserved"), "a count"
         )
         if plain.meaning is not None or plain.scaling is not None:
-            site.fault("bad-count", "counts", f"{plain.what} cannot count", "use an unsigned integer")
-    elif "counts_in" in site.written:
-        site.key_fault("not-applicable", "counts_in", "'counts_in' has no effect without counts", "remove it")
+            location.fault("bad-count", "counts", f"{plain.what} cannot count", "use an unsigned integer")
+    elif "counts_in" in location.written:
+        location.key_fault(
+            "not-applicable", "counts_in", "'counts_in' has no effect without counts", "remove it"
+        )
     if spec.const is not None:
-        site.reject(spec, ("default",), "a constant")
+        location.reject(spec, ("default",), "a constant")
     elif spec.reserved:
-        site.reject(spec, ("default",), "reserved bytes", "use const for what is sent")
+        location.reject(spec, ("default",), "reserved bytes", "use const for what is sent")
     if spec.range is not None and spec.raw_range is not None:
-        site.key_fault(
+        location.key_fault(
             "not-applicable", "raw_range", "'raw_range' has no effect beside range", "keep one of them"
         )
     if plain.meaning == "bool" or isinstance(plain.meaning, Flags):
-        site.reject(spec, ("range", "raw_range"), plain.what)
+        location.reject(spec, ("range", "raw_range"), plain.what)

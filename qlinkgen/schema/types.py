@@ -8,10 +8,10 @@ from qlinkgen.model.types import Array, FieldType, Scalar
 from qlinkgen.schema.compounds import build_array, build_bits, build_blob, is_plain_item
 from qlinkgen.schema.constants import INTEGER, build_enum, build_flags
 from qlinkgen.schema.file_model import FieldSpec, SchemaFile
+from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.scalars import FIXED, KEYWORDS, ScalarBuilder
-from qlinkgen.schema.site import Site
 from qlinkgen.schema.source import Path
 
 _GROUPS = ("enums", "flags", "types")
@@ -82,9 +82,9 @@ class TypeBuilder:
 
         ``seen`` are the named types that are being built, to find those that contain themselves.
         """
-        site = Site(self._report, path, frozenset(spec.model_fields_set))
-        resolved = self._resolve(spec, site, seen)
-        kind = self._build(*resolved, site) if resolved else None
+        location = Location(self._report, path, frozenset(spec.model_fields_set))
+        resolved = self._resolve(spec, location, seen)
+        kind = self._build(*resolved, location) if resolved else None
         if kind is None:
             self._report.taint(path)
         return self._named(spec, kind)
@@ -100,48 +100,48 @@ class TypeBuilder:
             return replace(kind, item=replace(kind.item, type_name=name))
         return replace(kind, type_name=name)
 
-    def _build(self, spec: FieldSpec, text: TypeText, site: Site) -> FieldType | None:
+    def _build(self, spec: FieldSpec, text: TypeText, location: Location) -> FieldType | None:
         if text.base in ("bytes", "text"):
-            self._note_unbounded(text, site)
-            return self._blob(spec, text, site)
-        plain = self._scalars.named(text.base, site)
+            self._note_unbounded(text, location)
+            return self._blob(spec, text, location)
+        plain = self._scalars.named(text.base, location)
         if plain is None:
             return None
         if text.count is not None:
-            self._note_unbounded(text, site)
-            if not is_plain_item(spec, plain, text.base, site):
+            self._note_unbounded(text, location)
+            if not is_plain_item(spec, plain, text.base, location):
                 return None
-            item = self._scalars.build(_bare(spec, text.base), text.base, plain, site)
-            return build_array(item, spec, text, self._payload_max, site) if item else None
+            item = self._scalars.build(_bare(spec, text.base), text.base, plain, location)
+            return build_array(item, spec, text, self._payload_max, location) if item else None
         if spec.bits is None:
-            return self._scalars.build(spec, text.base, plain, site)
-        container = self._scalars.build(_bare(spec, text.base), text.base, plain, site)
-        return build_bits(spec, container, self._scalars, site) if container else None
+            return self._scalars.build(spec, text.base, plain, location)
+        container = self._scalars.build(_bare(spec, text.base), text.base, plain, location)
+        return build_bits(spec, container, self._scalars, location) if container else None
 
-    def _blob(self, spec: FieldSpec, text: TypeText, site: Site) -> FieldType | None:
+    def _blob(self, spec: FieldSpec, text: TypeText, location: Location) -> FieldType | None:
         if text.base == "bytes" and self._file.groups is not None:
             hint = f"use text or an array of u{self._file.groups.bits}"
-            site.fault(
+            location.fault(
                 "bad-width", "type", f"bytes have no place in groups of {self._file.groups.bits} bits", hint
             )
             return None
-        return build_blob(spec, text, self._payload_max, site)
+        return build_blob(spec, text, self._payload_max, location)
 
-    def _note_unbounded(self, text: TypeText, site: Site) -> None:
+    def _note_unbounded(self, text: TypeText, location: Location) -> None:
         if not (text.count or "").strip():
-            self.unbounded.add(site.path)
+            self.unbounded.add(location.path)
 
     # Named types
 
     def _resolve(
-        self, spec: FieldSpec, site: Site, seen: tuple[str, ...]
+        self, spec: FieldSpec, location: Location, seen: tuple[str, ...]
     ) -> tuple[FieldSpec, TypeText] | None:
         """Follow named types down to a built-in type, an enum or flags."""
         try:
             text = type_text(spec.type)
         except ValueError as error:
             what, _, hint = str(error).partition("; ")
-            site.fault("unknown-type", "type", what, hint)
+            location.fault("unknown-type", "type", what, hint)
             return None
         named = self._file.types.get(text.base)
         if named is None or text.base in KEYWORDS:
@@ -149,27 +149,27 @@ class TypeBuilder:
         self._scalars.used.add(text.base)
         self._check_named(text.base)
         if self._report.touched(("types", text.base)):
-            self._report.taint(site.path)
+            self._report.taint(location.path)
         if text.base in seen or len(seen) > _MAX_CHAIN:
             what = (
                 f"type '{text.base}' contains itself"
                 if text.base in seen
                 else "the chain of types is too long"
             )
-            site.fault("recursive-type", "type", what, "end the chain in a built-in type")
+            location.fault("recursive-type", "type", what, "end the chain in a built-in type")
             return None
-        return self._refine(spec, text, named, site, (*seen, text.base))
+        return self._refine(spec, text, named, location, (*seen, text.base))
 
     def _refine(
-        self, spec: FieldSpec, text: TypeText, named: FieldSpec, site: Site, seen: tuple[str, ...]
+        self, spec: FieldSpec, text: TypeText, named: FieldSpec, location: Location, seen: tuple[str, ...]
     ) -> tuple[FieldSpec, TypeText] | None:
         """What a field says, on top of what its named type says."""
-        resolved = self._resolve(named, site, seen)
+        resolved = self._resolve(named, location, seen)
         if resolved is None:
             return None
         base, below = resolved
         if below.count is not None and text.count is not None:
-            site.fault("bad-array", "type", f"'{spec.type}' would be an array of arrays", "use one count")
+            location.fault("bad-array", "type", f"'{spec.type}' would be an array of arrays", "use one count")
             return None
         merged = base.model_copy(
             update={key: getattr(spec, key) for key in spec.model_fields_set if key != "type"}

@@ -1,4 +1,4 @@
-"""A field as it is written: where faults about its keys find their place."""
+"""The location of a field in the document, for errors about its keys."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from qlinkgen.schema.source import Path
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
+class Location:
     """Place of a field, a named type or a bit field.
 
     A fault about one key is concluded from the others too (a default from the scale), so it is only reported
@@ -38,9 +38,9 @@ class Site:
             if getattr(spec, key) not in (None, False, ""):
                 self.key_fault("not-applicable", key, f"'{key}' has no effect on {what}", hint)
 
-    def inner(self, *keys: str, written: Iterable[str] = ()) -> Site:
+    def inner(self, *keys: str, written: Iterable[str] = ()) -> Location:
         """The place of something inside."""
-        return Site(self.report, (*self.path, *keys), frozenset(written))
+        return Location(self.report, (*self.path, *keys), frozenset(written))
 
     def place(self, key: str) -> Path:
         """Where a key stands, or the field where it stands in its type."""
