@@ -6,7 +6,7 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from construct import Default, Enum, FlagsEnum, Int8ub, Int16sb, Int16ub, Int32sb, Int32ub
 
-from ._fields import Message, Ranged, Scaled, Whole
+from ._fields import Message, OpenFlags, Ranged, Scaled
 from ._frames import Check, Id, Packet, Payload, Sum, messages_of
 
 # Form of the motor output. (Host commands)
@@ -74,7 +74,7 @@ SET_1_REQUEST = Message("set_1.request", 0x01)
 SET_1_RESPONSE = Message(
     "set_1.response",
     0x01,
-    "status" / Default(Whole(AXIS_STATUS), 0),  # Status of the axis
+    "status" / Default(OpenFlags(AXIS_STATUS), 0),  # Status of the axis
 )
 
 # Make axis 2 current and offer its status word. (Host commands)
@@ -82,7 +82,7 @@ SET_2_REQUEST = Message("set_2.request", 0x02)
 SET_2_RESPONSE = Message(
     "set_2.response",
     0x02,
-    "status" / Default(Whole(AXIS_STATUS), 0),  # Status of the axis
+    "status" / Default(OpenFlags(AXIS_STATUS), 0),  # Status of the axis
 )
 
 # Make the axis that raised the host interrupt current and offer its status word. (Host commands)
@@ -90,7 +90,7 @@ SET_I_REQUEST = Message("set_i.request", 0x08)
 SET_I_RESPONSE = Message(
     "set_i.response",
     0x08,
-    "status" / Default(Whole(AXIS_STATUS), 0),  # Status of the axis
+    "status" / Default(OpenFlags(AXIS_STATUS), 0),  # Status of the axis
 )
 
 # Select S-curve point-to-point profiling. (Host commands)
@@ -441,7 +441,7 @@ UPDATE_RESPONSE = Message("update.response", 0x1A)
 MULTI_UPDATE_REQUEST = Message(
     "multi_update.request",
     0x5B,
-    "axes" / Default(Whole(AXES), 0),  # Axes to update; bit 0 is axis 1 (not confirmed)
+    "axes" / Default(OpenFlags(AXES), 0),  # Axes to update; bit 0 is axis 1 (not confirmed)
 )
 MULTI_UPDATE_RESPONSE = Message("multi_update.response", 0x5B)
 
@@ -465,7 +465,8 @@ GET_BRK_PNT_RESPONSE = Message(
 SET_INTRPT_MASK_REQUEST = Message(
     "set_intrpt_mask.request",
     0x2F,
-    "mask" / Default(Whole(EVENT_MASK), 0),  # Events that may interrupt: 1 lets one through (not confirmed)
+    # Events that may interrupt: 1 lets one through (not confirmed)
+    "mask" / Default(OpenFlags(EVENT_MASK), 0),
 )
 SET_INTRPT_MASK_RESPONSE = Message("set_intrpt_mask.response", 0x2F)
 
@@ -474,14 +475,14 @@ GET_INTRPT_REQUEST = Message("get_intrpt.request", 0x30)
 GET_INTRPT_RESPONSE = Message(
     "get_intrpt.response",
     0x30,
-    "status" / Default(Whole(AXIS_STATUS), 0),  # Status of the axis
+    "status" / Default(OpenFlags(AXIS_STATUS), 0),  # Status of the axis
 )
 
 # Clear event bits of interrupting axis and release HostIntrpt. (Host commands)
 RST_INTRPT_REQUEST = Message(
     "rst_intrpt.request",
     0x32,
-    "mask" / Default(Whole(EVENT_MASK), 0),  # Events to keep: 0 clears one
+    "mask" / Default(OpenFlags(EVENT_MASK), 0),  # Events to keep: 0 clears one
 )
 RST_INTRPT_RESPONSE = Message("rst_intrpt.response", 0x32)
 
@@ -490,7 +491,7 @@ GET_INTRPT_MASK_REQUEST = Message("get_intrpt_mask.request", 0x56)
 GET_INTRPT_MASK_RESPONSE = Message(
     "get_intrpt_mask.response",
     0x56,
-    "mask" / Default(Whole(EVENT_MASK), 0),  # Events that may interrupt: 1 lets one through
+    "mask" / Default(OpenFlags(EVENT_MASK), 0),  # Events that may interrupt: 1 lets one through
 )
 
 # Clear all event bits of the status word. (Host commands)
@@ -501,7 +502,7 @@ CLR_STATUS_RESPONSE = Message("clr_status.response", 0x33)
 RST_STATUS_REQUEST = Message(
     "rst_status.request",
     0x34,
-    "mask" / Default(Whole(EVENT_MASK), 0),  # Events to keep: 0 clears one
+    "mask" / Default(OpenFlags(EVENT_MASK), 0),  # Events to keep: 0 clears one
 )
 RST_STATUS_RESPONSE = Message("rst_status.response", 0x34)
 
@@ -510,7 +511,7 @@ GET_STATUS_REQUEST = Message("get_status.request", 0x31)
 GET_STATUS_RESPONSE = Message(
     "get_status.response",
     0x31,
-    "status" / Default(Whole(AXIS_STATUS), 0),  # Status of the axis
+    "status" / Default(OpenFlags(AXIS_STATUS), 0),  # Status of the axis
 )
 
 # Read profile and breakpoint mode flags. (Host commands) NOT CONFIRMED by a second source.
@@ -623,7 +624,7 @@ SET_LMT_SENSE_REQUEST = Message(
     "set_lmt_sense.request",
     0x66,
     # Active level of each limit input, laid out as in get_lmt_swtch, as inferred
-    "value" / Default(Whole(LIMIT_SWITCHES), 0),
+    "value" / Default(OpenFlags(LIMIT_SWITCHES), 0),
 )
 SET_LMT_SENSE_RESPONSE = Message("set_lmt_sense.response", 0x66)
 
@@ -632,7 +633,7 @@ GET_LMT_SWTCH_REQUEST = Message("get_lmt_swtch.request", 0x67)
 GET_LMT_SWTCH_RESPONSE = Message(
     "get_lmt_swtch.response",
     0x67,
-    "value" / Default(Whole(LIMIT_SWITCHES), 0),  # Limit inputs; 1 is set
+    "value" / Default(OpenFlags(LIMIT_SWITCHES), 0),  # Limit inputs; 1 is set
 )
 
 # Enable limit-switch handling. (Host commands) NOT CONFIRMED by a second source.

@@ -6,7 +6,7 @@ Do not edit: change the schema and run `qlinkgen generate`.
 
 from construct import Default, Enum, FlagsEnum, Int8ub, Int16ub, Int24ul, Int32sb, Int32ub
 
-from ._fields import Items, Message, Octets, Ranged, Scaled, Whole
+from ._fields import ArrayField, BytesField, Message, OpenFlags, Ranged, Scaled
 from ._frames import (
     CRC,
     Address,
@@ -77,7 +77,7 @@ NODE_PROGRAM_LOAD_REQUEST = Message(
     "node_program_load.request",
     0x06,
     "counter" / Default(Int8ub, 0),  # Number of the piece, 0 for the first, 255 wraps to 0
-    "program_data" / Default(Octets(0, 25), b""),  # Piece of the Intel HEX text
+    "program_data" / Default(BytesField(0, 25), b""),  # Piece of the Intel HEX text
     addresses=[(1, 16)],
     empty_is_default=True,
 )
@@ -99,7 +99,7 @@ MOTOR_RESPONSE_POLL_RESPONSE = Message(
     0x15,
     # Command number of the last completed request, 0 while it is not completed
     "last_completion" / Default(Int8ub, 0),
-    "motor_data" / Default(Octets(0, 25), b""),  # What the motor returned
+    "motor_data" / Default(BytesField(0, 25), b""),  # What the motor returned
     addresses=[(1, 16)],
 )
 
@@ -107,7 +107,7 @@ MOTOR_RESPONSE_POLL_RESPONSE = Message(
 MOTOR_REQUEST_REQUEST = Message(
     "motor_request.request",
     0x16,
-    "motor_data" / Default(Octets(1, 26), b"\x00"),  # Passed to the motor as it is
+    "motor_data" / Default(BytesField(1, 26), b"\x00"),  # Passed to the motor as it is
     addresses=[(1, 16)],
 )
 MOTOR_REQUEST_RESPONSE = Message("motor_request.response", 0x16, addresses=[(1, 16)])
@@ -119,7 +119,7 @@ MOTION_REQUEST = Message(
     # One up for each answered motion, 255 wraps to 0; a repeat carries the same number
     "counter" / Default(Int8ub, 0),
     "outputs" / Default(Int8ub, 0),  # Bit 0 is output 1
-    "segments" / Default(Items(Int16ub, 0, 12), []),  # Words of path data for the FIFO
+    "segments" / Default(ArrayField(Int16ub, 0, 12), []),  # Words of path data for the FIFO
     addresses=[(1, 16)],
 )
 MOTION_RESPONSE = Message(
@@ -128,7 +128,7 @@ MOTION_RESPONSE = Message(
     "counter" / Default(Int8ub, 0),  # Counter of the request that is answered
     "inputs" / Default(Int8ub, 0),  # Bit 0 is input 1
     "position" / Default(Int32sb, 0),  # encoder counts: Motor position
-    "motor_status" / Default(Whole(MOTOR_STATUS), 0),  # State of the motor
+    "motor_status" / Default(OpenFlags(MOTOR_STATUS), 0),  # State of the motor
     "fifo_space" / Default(Int8ub, 0),  # words: Words that still fit into the FIFO
     addresses=[(1, 16)],
 )
@@ -166,7 +166,7 @@ READ_REQUEST = Message(
 READ_RESPONSE = Message(
     "read.response",
     0x81,
-    "data" / Default(Octets(1, 26), b"\x00"),  # Input bytes, least significant first
+    "data" / Default(BytesField(1, 26), b"\x00"),  # Input bytes, least significant first
     addresses=[(1, 16)],
 )
 
@@ -175,7 +175,7 @@ WRITE_REQUEST = Message(
     "write.request",
     0x82,
     "offset" / Default(Int8ub, 0),  # First byte, 0 is the least significant
-    "data" / Default(Octets(1, 25), b"\x00"),  # Output bytes, least significant first
+    "data" / Default(BytesField(1, 25), b"\x00"),  # Output bytes, least significant first
     addresses=[(1, 16)],
 )
 WRITE_RESPONSE = Message("write.response", 0x82, addresses=[(1, 16)])
@@ -217,14 +217,14 @@ LOOP_BACK_REQUEST = Message(
     "loop_back.request",
     0xA4,
     "offset" / Default(Int8ub, 0),  # Returned as it is
-    "data" / Default(Octets(1, 25), b"\x00"),  # Returned as it is
+    "data" / Default(BytesField(1, 25), b"\x00"),  # Returned as it is
     addresses=[(1, 16)],
 )
 LOOP_BACK_RESPONSE = Message(
     "loop_back.response",
     0xA4,
     "offset" / Default(Int8ub, 0),  # Offset of the request
-    "data" / Default(Octets(1, 25), b"\x00"),  # Data of the request
+    "data" / Default(BytesField(1, 25), b"\x00"),  # Data of the request
     addresses=[(1, 16)],
 )
 

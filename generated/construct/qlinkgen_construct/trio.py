@@ -8,7 +8,7 @@ from decimal import Decimal
 
 from construct import Default, Enum
 
-from ._fields import Characters, Groups, Message, Ranged, Scaled
+from ._fields import Groups, Message, Ranged, Scaled, TextField
 from ._frames import CRC, Check, Mark, MarkedFrame, Payload, messages_of
 
 # What a keypad sends for a key. (Message types)
@@ -18,7 +18,7 @@ KEYPAD_MODE = Enum(Groups((0, 7)), on_only=0, on_off=127)
 CHARACTER_TRANSFER = Message(
     "character_transfer",
     0x01,
-    "characters" / Default(Characters(1, 256), " "),  # Seven-bit characters, control characters included
+    "characters" / Default(TextField(1, 256), " "),  # Seven-bit characters, control characters included
     addresses=[(1, 15)],
     checksum=False,
 )

@@ -30,8 +30,8 @@ _PACKAGE_DOC = '''\
 
 #: Modules that stand beside every generated one, and what a tree uses of them; all else is construct's own.
 _SUPPORT = {
-    "_fields": "BitFields Bits Boolean Characters Clear Count Groups Items Member Message Octets Ranged "
-    "Scaled Whole like",
+    "_fields": "ArrayField BitFields Bits Boolean BytesField Clear Count Groups Member Message OpenFlags "
+    "Ranged Scaled TextField like",
     "_frames": "CRC Address Check Constant DelimitedFrame Id Length Mark MarkedFrame Packet Payload Stuffing "
     "Sum messages_of",
 }

@@ -1,9 +1,9 @@
 """Payloads: what a described protocol needs beside construct's own classes.
 
 A Message consists of integers, which are construct's own or Groups, wrapped in Ranged, Clear, Boolean, Scaled
-and Whole; of BitFields, whose fields are Bits; of Items, Octets and Characters, counted by a Count or not.
-Construct's Enum and FlagsEnum name numbers and bits; its Default, Const and Rebuild say what is sent when
-nothing is given. All errors are ConstructErrors.
+and OpenFlags; of BitFields, whose fields are Bits; of ArrayField, BytesField and TextField, which a Count may
+count. Construct's Enum and FlagsEnum name numbers and bits; its Default, Const and Rebuild say what is sent
+when nothing is given. All errors are ConstructErrors.
 """
 
 # ruff: noqa: ARG002, SLF001  # construct gives every method the same arguments, and calls its parts by _name
@@ -192,7 +192,7 @@ class Flags(Container):
         return int(self["_rest"] | named)
 
 
-class Whole(Adapter):
+class OpenFlags(Adapter):
     """A FlagsEnum that keeps bits without a name: it is parsed to Flags."""
 
     def __init__(self, named: FlagsEnum) -> None:
@@ -258,7 +258,7 @@ class Count(Subconstruct):
         return self.subcon._build(len(context[self.of]) * self.step, stream, context, path)
 
 
-class Items(Construct):
+class ArrayField(Construct):
     """A list of minimum to maximum items. It takes all bytes: the Message knows how many these are."""
 
     def __init__(self, item: Construct, minimum: int, maximum: int) -> None:
@@ -285,8 +285,8 @@ class Items(Construct):
         return obj
 
 
-class Octets(Items):
-    """A byte string of minimum to maximum bytes, otherwise like Items."""
+class BytesField(ArrayField):
+    """A byte string of minimum to maximum bytes; takes all bytes, like ArrayField."""
 
     def __init__(self, minimum: int, maximum: int) -> None:
         super().__init__(Groups((0, 8)), minimum, maximum)
@@ -300,8 +300,8 @@ class Octets(Items):
         return obj
 
 
-class Characters(Octets):
-    """Text of minimum to maximum 7-bit characters, otherwise like Items."""
+class TextField(BytesField):
+    """Text of minimum to maximum 7-bit characters; takes all bytes, like ArrayField."""
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:
         data: bytes = stream_read_entire(stream, path)
@@ -316,10 +316,10 @@ class Characters(Octets):
         return obj
 
 
-def _run(field: Renamed) -> Items | None:
+def _run(field: Renamed) -> ArrayField | None:
     """The items of a field, None where it is of fixed size."""
     inner = field.subcon.subcon if isinstance(field.subcon, Default) else field.subcon
-    return inner if isinstance(inner, Items) else None
+    return inner if isinstance(inner, ArrayField) else None
 
 
 class Message(Construct):

@@ -132,7 +132,7 @@ class Types:
             case Enum():
                 return self._labels(name, node, same=same)
             case Flags():
-                return Call("Whole", (self._labels(name, node, same=same),))
+                return Call("OpenFlags", (self._labels(name, node, same=same),))
             case _:
                 assert_never(meaning)
 
@@ -177,12 +177,12 @@ class _Field:
                 return self._named(step, Call("BitFields", (integer(step.integer, signed=False), *members)))
             case BytesStep():
                 kind, default = (
-                    ("Characters", step.default.decode()) if step.text else ("Octets", step.default)
+                    ("TextField", step.default.decode()) if step.text else ("BytesField", step.default)
                 )
                 return self._run(step, kind, (), default)
             case ItemsStep():
                 item = self._types.of(step.number, integer(step.item))
-                return self._run(step, "Items", (item,), Sequence(step.default))
+                return self._run(step, "ArrayField", (item,), Sequence(step.default))
             case _:
                 assert_never(step)
 
