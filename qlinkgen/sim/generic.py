@@ -10,12 +10,12 @@ from qlinkgen.link.codec import Codec, Framed, Message
 
 #: What a rule of a generated module is called, to its smallest legal value.
 _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
-    "Whole": lambda rule: rule.ranges[0][0],
-    "Mask": lambda rule: 0,  # noqa: ARG005
-    "Items": lambda rule: [rule.item.ranges[0][0]] * rule.fewest,
-    "Octets": lambda rule: bytes(rule.fewest),
-    "Text": lambda rule: " " * rule.fewest,
-    "Scaled": lambda rule: min(rule.scale.value(rule.scale.low), rule.scale.value(rule.scale.high)),
+    "IntRule": lambda rule: rule.ranges[0][0],
+    "MaskRule": lambda rule: 0,  # noqa: ARG005
+    "ArrayRule": lambda rule: [rule.item.ranges[0][0]] * rule.fewest,
+    "BytesRule": lambda rule: bytes(rule.fewest),
+    "TextRule": lambda rule: " " * rule.fewest,
+    "ScaledRule": lambda rule: min(rule.scale.value(rule.scale.low), rule.scale.value(rule.scale.high)),
 }
 
 

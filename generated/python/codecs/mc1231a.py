@@ -24,12 +24,12 @@ from ._support import (
     DecodeError,
     EncodeError,
     Fault,
+    IntRule,
     LayoutError,
     OpenEnum,
     OutOfRange,
     Scale,
-    Scaled,
-    Whole,
+    ScaledRule,
     as_bytes,
     illegal,
     named,
@@ -466,7 +466,7 @@ class _StatusU16Response(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("status",)
-    RULES = (Whole("status", 0, 65535),)
+    RULES = (IntRule("status", 0, 65535),)
 
     def __init__(self, *, status: int = 0) -> None:
         self.status = status
@@ -520,7 +520,7 @@ class _ValueI32Response(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Whole("value", -2147483648, 2147483647, unit="counts"),)
+    RULES = (IntRule("value", -2147483648, 2147483647, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -551,7 +551,7 @@ class _ValueU16Request(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 32767),)
+    RULES = (IntRule("value", 0, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -587,7 +587,7 @@ class _ValueU16Response(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535),)
+    RULES = (IntRule("value", 0, 65535),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -781,7 +781,7 @@ class SetPosRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Whole("value", -1073741824, 1073741823, unit="counts"),)
+    RULES = (IntRule("value", -1073741824, 1073741823, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -835,7 +835,7 @@ class SetVelRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_VELOCITY, unit="counts/sample"),)
+    RULES = (ScaledRule("value", _SCALE_VELOCITY, unit="counts/sample"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -886,7 +886,7 @@ class SetAccRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_ACCELERATION_LIMIT, unit="counts/sample^2"),)
+    RULES = (ScaledRule("value", _SCALE_ACCELERATION_LIMIT, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -939,7 +939,7 @@ class SetMaxAccRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_PEAK_ACCELERATION, unit="counts/sample^2"),)
+    RULES = (ScaledRule("value", _SCALE_PEAK_ACCELERATION, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -990,7 +990,7 @@ class SetJerkRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_JERK, unit="counts/sample^3"),)
+    RULES = (ScaledRule("value", _SCALE_JERK, unit="counts/sample^3"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1042,7 +1042,7 @@ class SetRatioRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_GEAR_RATIO),)
+    RULES = (ScaledRule("value", _SCALE_GEAR_RATIO),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1212,7 +1212,7 @@ class GetVelResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_VELOCITY, unit="counts/sample"),)
+    RULES = (ScaledRule("value", _SCALE_VELOCITY, unit="counts/sample"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1268,7 +1268,7 @@ class GetAccResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_ACCELERATION, unit="counts/sample^2"),)
+    RULES = (ScaledRule("value", _SCALE_ACCELERATION, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1319,7 +1319,7 @@ class GetMaxAccResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_PEAK_ACCELERATION, unit="counts/sample^2"),)
+    RULES = (ScaledRule("value", _SCALE_PEAK_ACCELERATION, unit="counts/sample^2"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1370,7 +1370,7 @@ class GetJerkResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_JERK, unit="counts/sample^3"),)
+    RULES = (ScaledRule("value", _SCALE_JERK, unit="counts/sample^3"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1420,7 +1420,7 @@ class GetRatioResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_GEAR_RATIO),)
+    RULES = (ScaledRule("value", _SCALE_GEAR_RATIO),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1500,7 +1500,7 @@ class GetTrgtVelResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Scaled("value", _SCALE_SIGNED_VELOCITY, unit="counts/sample"),)
+    RULES = (ScaledRule("value", _SCALE_SIGNED_VELOCITY, unit="counts/sample"),)
 
     def __init__(self, *, value: float = 0.0) -> None:
         self.value = value
@@ -1693,7 +1693,7 @@ class SetMtrBiasRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32767, 32767),)
+    RULES = (IntRule("value", -32767, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -1917,7 +1917,7 @@ class GetMtrLmtResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 32767),)
+    RULES = (IntRule("value", 0, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -1970,7 +1970,7 @@ class GetMtrBiasResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32767, 32767),)
+    RULES = (IntRule("value", -32767, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -2057,7 +2057,7 @@ class GetIntgrResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32768, 32767),)
+    RULES = (IntRule("value", -32768, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -2110,7 +2110,7 @@ class GetActlPosErrResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32768, 32767, unit="counts"),)
+    RULES = (IntRule("value", -32768, 32767, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -2408,7 +2408,7 @@ class SetBrkPntRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Whole("value", -2147483648, 2147483647),)
+    RULES = (IntRule("value", -2147483648, 2147483647),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -2477,7 +2477,7 @@ class MultiUpdateRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("axes",)
-    RULES = (Whole("axes", 0, 65535),)
+    RULES = (IntRule("axes", 0, 65535),)
 
     def __init__(self, *, axes: int = 0) -> None:
         self.axes = axes
@@ -2581,7 +2581,7 @@ class GetBrkPntResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Whole("value", -2147483648, 2147483647),)
+    RULES = (IntRule("value", -2147483648, 2147483647),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -2620,7 +2620,7 @@ class SetIntrptMaskRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("mask",)
-    RULES = (Whole("mask", 0, 65535),)
+    RULES = (IntRule("mask", 0, 65535),)
 
     def __init__(self, *, mask: int = 0) -> None:
         self.mask = mask
@@ -2693,7 +2693,7 @@ class RstIntrptRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("mask",)
-    RULES = (Whole("mask", 0, 65535),)
+    RULES = (IntRule("mask", 0, 65535),)
 
     def __init__(self, *, mask: int = 0) -> None:
         self.mask = mask
@@ -2753,7 +2753,7 @@ class GetIntrptMaskResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("mask",)
-    RULES = (Whole("mask", 0, 65535),)
+    RULES = (IntRule("mask", 0, 65535),)
 
     def __init__(self, *, mask: int = 0) -> None:
         self.mask = mask
@@ -2813,7 +2813,7 @@ class RstStatusRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("mask",)
-    RULES = (Whole("mask", 0, 65535),)
+    RULES = (IntRule("mask", 0, 65535),)
 
     def __init__(self, *, mask: int = 0) -> None:
         self.mask = mask
@@ -3073,7 +3073,7 @@ class SetMtrCmdRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32767, 32767),)
+    RULES = (IntRule("value", -32767, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3136,7 +3136,7 @@ class GetMtrCmdResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32767, 32767),)
+    RULES = (IntRule("value", -32767, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3182,7 +3182,7 @@ class SetBufMtrCmdRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32767, 32767),)
+    RULES = (IntRule("value", -32767, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3249,7 +3249,7 @@ class GetBufMtrCmdResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", -32768, 32767),)
+    RULES = (IntRule("value", -32768, 32767),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3297,7 +3297,7 @@ class GetOutputModeResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("mode",)
-    RULES = (Whole("mode", 0, 65535),)
+    RULES = (IntRule("mode", 0, 65535),)
 
     def __init__(self, *, mode: OutputMode | int = OutputMode.PWM) -> None:
         self.mode = mode
@@ -3377,7 +3377,7 @@ class SetActlPosRequest(Request):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Whole("value", -1073741824, 1073741823, unit="counts"),)
+    RULES = (IntRule("value", -1073741824, 1073741823, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3459,7 +3459,7 @@ class SetLmtSenseRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535),)
+    RULES = (IntRule("value", 0, 65535),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3520,7 +3520,7 @@ class GetLmtSwtchResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535),)
+    RULES = (IntRule("value", 0, 65535),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3641,7 +3641,7 @@ class SetSmplTimeRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535),)
+    RULES = (IntRule("value", 0, 65535),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3785,7 +3785,7 @@ class GetTimeResponse(Response):
     MIN_SIZE = 4
     MAX_SIZE = 4
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 4294967295, unit="cycles"),)
+    RULES = (IntRule("value", 0, 4294967295, unit="cycles"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3825,7 +3825,7 @@ class SetPhaseCntsRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 129, 65535, unit="counts"),)
+    RULES = (IntRule("value", 129, 65535, unit="counts"),)
 
     def __init__(self, *, value: int = 129) -> None:
         self.value = value
@@ -3883,7 +3883,7 @@ class SetPhaseOffsetRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535, unit="counts"),)
+    RULES = (IntRule("value", 0, 65535, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3936,7 +3936,7 @@ class SetPhaseTimeRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535, unit="samples"),)
+    RULES = (IntRule("value", 0, 65535, unit="samples"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -3989,7 +3989,7 @@ class SetPhaseRequest(Request):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535, unit="counts"),)
+    RULES = (IntRule("value", 0, 65535, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -4101,7 +4101,7 @@ class GetPhaseCntsResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535, unit="counts"),)
+    RULES = (IntRule("value", 0, 65535, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -4149,7 +4149,7 @@ class GetPhaseTimeResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535, unit="samples"),)
+    RULES = (IntRule("value", 0, 65535, unit="samples"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value
@@ -4202,7 +4202,7 @@ class GetPhaseOffsetResponse(Response):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("value",)
-    RULES = (Whole("value", 0, 65535, unit="counts"),)
+    RULES = (IntRule("value", 0, 65535, unit="counts"),)
 
     def __init__(self, *, value: int = 0) -> None:
         self.value = value

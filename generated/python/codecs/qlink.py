@@ -19,8 +19,10 @@ from ._support import (
     REFUSALS,
     UNREAD,
     UNREADABLE,
+    ArrayRule,
     BaseMessage,
     Bus,
+    BytesRule,
     Checksum,
     CodecError,
     Command,
@@ -28,14 +30,12 @@ from ._support import (
     DecodeError,
     EncodeError,
     Fault,
-    Items,
+    IntRule,
     LayoutError,
-    Octets,
     OpenEnum,
     OutOfRange,
     Scale,
-    Scaled,
-    Whole,
+    ScaledRule,
     as_bytes,
     find_crc,
     illegal,
@@ -252,7 +252,7 @@ class _Empty(Message):
 
     MIN_SIZE = 0
     MAX_SIZE = 0
-    RULES = (Whole("node", 1, 16),)
+    RULES = (IntRule("node", 1, 16),)
 
     def __init__(self, *, node: int) -> None:
         self.node = node
@@ -309,11 +309,11 @@ class NodeSetupRequest(Message):
     MAX_SIZE = 4
     FIELDS = ("node_number", "t1_delay", "t2_delay", "position_type")
     RULES = (
-        Whole("node", 0, 16),
-        Whole("node_number", 1, 16),
-        Scaled("t1_delay", _SCALE_TENTHS, unit="s"),
-        Scaled("t2_delay", _SCALE_TENTHS, unit="s"),
-        Whole("position_type", 0, 255),
+        IntRule("node", 0, 16),
+        IntRule("node_number", 1, 16),
+        ScaledRule("t1_delay", _SCALE_TENTHS, unit="s"),
+        ScaledRule("t2_delay", _SCALE_TENTHS, unit="s"),
+        IntRule("position_type", 0, 255),
     )
 
     def __init__(
@@ -416,7 +416,7 @@ class NodeInfoRequest(Message):
     MAX_WIRE_SIZE = 9
     MIN_SIZE = 0
     MAX_SIZE = 0
-    RULES = (Whole("node", 0, 16),)
+    RULES = (IntRule("node", 0, 16),)
 
     def __init__(self, *, node: int) -> None:
         self.node = node
@@ -492,14 +492,14 @@ class NodeInfoResponse(Message):
         "serial_number",
     )
     RULES = (
-        Whole("node", 1, 16),
-        Whole("version_major", 0, 255),
-        Whole("version_minor", 0, 255),
-        Whole("product_id", 0, 65535),
-        Scaled("t1_delay", _SCALE_TENTHS, unit="s"),
-        Scaled("t2_delay", _SCALE_TENTHS, unit="s"),
-        Whole("position_type", 0, 255),
-        Whole("serial_number", 0, 4294967295),
+        IntRule("node", 1, 16),
+        IntRule("version_major", 0, 255),
+        IntRule("version_minor", 0, 255),
+        IntRule("product_id", 0, 65535),
+        ScaledRule("t1_delay", _SCALE_TENTHS, unit="s"),
+        ScaledRule("t2_delay", _SCALE_TENTHS, unit="s"),
+        IntRule("position_type", 0, 255),
+        IntRule("serial_number", 0, 4294967295),
     )
 
     def __init__(
@@ -595,7 +595,7 @@ class NodeStartRequest(Message):
     MAX_WIRE_SIZE = 9
     MIN_SIZE = 0
     MAX_SIZE = 0
-    RULES = (Whole("node", 0, 16),)
+    RULES = (IntRule("node", 0, 16),)
 
     def __init__(self, *, node: int) -> None:
         self.node = node
@@ -643,7 +643,7 @@ class NodeStopRequest(Message):
     MAX_WIRE_SIZE = 9
     MIN_SIZE = 0
     MAX_SIZE = 0
-    RULES = (Whole("node", 0, 16),)
+    RULES = (IntRule("node", 0, 16),)
 
     def __init__(self, *, node: int) -> None:
         self.node = node
@@ -695,7 +695,7 @@ class NodeSyncRequest(Message):
     MAX_SIZE = 1
     DEFAULT_ADDRESS = 0
     FIELDS = ("counter",)
-    RULES = (Whole("node", 0, 0), Whole("counter", 0, 255))
+    RULES = (IntRule("node", 0, 0), IntRule("counter", 0, 255))
 
     def __init__(self, *, node: int = 0, counter: int = 0) -> None:
         self.node = node
@@ -752,9 +752,9 @@ class NodeProgramLoadRequest(Message):
     EMPTY = True
     FIELDS = ("counter", "program_data")
     RULES = (
-        Whole("node", 1, 16),
-        Whole("counter", 0, 255),
-        Octets("program_data", 0, 25),
+        IntRule("node", 1, 16),
+        IntRule("counter", 0, 255),
+        BytesRule("program_data", 0, 25),
     )
 
     def __init__(
@@ -837,7 +837,7 @@ class NodeProgramLoadResponse(Message):
     MIN_SIZE = 1
     MAX_SIZE = 1
     FIELDS = ("counter",)
-    RULES = (Whole("node", 1, 16), Whole("counter", 0, 255))
+    RULES = (IntRule("node", 1, 16), IntRule("counter", 0, 255))
 
     def __init__(self, *, node: int, counter: int = 0) -> None:
         self.node = node
@@ -939,9 +939,9 @@ class MotorResponsePollResponse(Message):
     MAX_SIZE = 26
     FIELDS = ("last_completion", "motor_data")
     RULES = (
-        Whole("node", 1, 16),
-        Whole("last_completion", 0, 255),
-        Octets("motor_data", 0, 25),
+        IntRule("node", 1, 16),
+        IntRule("last_completion", 0, 255),
+        BytesRule("motor_data", 0, 25),
     )
 
     def __init__(
@@ -1017,7 +1017,7 @@ class MotorRequestRequest(Message):
     MIN_SIZE = 1
     MAX_SIZE = 26
     FIELDS = ("motor_data",)
-    RULES = (Whole("node", 1, 16), Octets("motor_data", 1, 26))
+    RULES = (IntRule("node", 1, 16), BytesRule("motor_data", 1, 26))
 
     def __init__(self, *, node: int, motor_data: bytes) -> None:
         self.node = node
@@ -1095,10 +1095,10 @@ class MotionRequest(Message):
     MAX_SIZE = 26
     FIELDS = ("counter", "outputs", "segments")
     RULES = (
-        Whole("node", 1, 16),
-        Whole("counter", 0, 255),
-        Whole("outputs", 0, 255),
-        Items("segments", 0, 12, 0, 65535),
+        IntRule("node", 1, 16),
+        IntRule("counter", 0, 255),
+        IntRule("outputs", 0, 255),
+        ArrayRule("segments", 0, 12, 0, 65535),
     )
 
     def __init__(
@@ -1179,12 +1179,12 @@ class MotionResponse(Message):
     MAX_SIZE = 9
     FIELDS = ("counter", "inputs", "position", "motor_status", "fifo_space")
     RULES = (
-        Whole("node", 1, 16),
-        Whole("counter", 0, 255),
-        Whole("inputs", 0, 255),
-        Whole("position", -2147483648, 2147483647, unit="encoder counts"),
-        Whole("motor_status", 0, 65535),
-        Whole("fifo_space", 0, 255, unit="words"),
+        IntRule("node", 1, 16),
+        IntRule("counter", 0, 255),
+        IntRule("inputs", 0, 255),
+        IntRule("position", -2147483648, 2147483647, unit="encoder counts"),
+        IntRule("motor_status", 0, 65535),
+        IntRule("fifo_space", 0, 255, unit="words"),
     )
 
     def __init__(
@@ -1281,8 +1281,8 @@ class MotorPositionResponse(Message):
     MAX_SIZE = 4
     FIELDS = ("position",)
     RULES = (
-        Whole("node", 1, 16),
-        Whole("position", -2147483648, 2147483647, unit="encoder counts"),
+        IntRule("node", 1, 16),
+        IntRule("position", -2147483648, 2147483647, unit="encoder counts"),
     )
 
     def __init__(self, *, node: int, position: int = 0) -> None:
@@ -1365,8 +1365,8 @@ class PresetMotorPositionRequest(Message):
     MAX_SIZE = 4
     FIELDS = ("position",)
     RULES = (
-        Whole("node", 1, 16),
-        Whole("position", -2147483648, 2147483647, unit="encoder counts"),
+        IntRule("node", 1, 16),
+        IntRule("position", -2147483648, 2147483647, unit="encoder counts"),
     )
 
     def __init__(self, *, node: int, position: int = 0) -> None:
@@ -1443,7 +1443,7 @@ class ReadRequest(Message):
     MIN_SIZE = 2
     MAX_SIZE = 2
     FIELDS = ("size", "offset")
-    RULES = (Whole("node", 1, 16), Whole("size", 1, 26), Whole("offset", 0, 255))
+    RULES = (IntRule("node", 1, 16), IntRule("size", 1, 26), IntRule("offset", 0, 255))
 
     def __init__(self, *, node: int, size: int, offset: int = 0) -> None:
         self.node = node
@@ -1498,7 +1498,7 @@ class ReadResponse(Message):
     MIN_SIZE = 1
     MAX_SIZE = 26
     FIELDS = ("data",)
-    RULES = (Whole("node", 1, 16), Octets("data", 1, 26))
+    RULES = (IntRule("node", 1, 16), BytesRule("data", 1, 26))
 
     def __init__(self, *, node: int, data: bytes) -> None:
         self.node = node
@@ -1557,7 +1557,11 @@ class WriteRequest(Message):
     MIN_SIZE = 2
     MAX_SIZE = 26
     FIELDS = ("offset", "data")
-    RULES = (Whole("node", 1, 16), Whole("offset", 0, 255), Octets("data", 1, 25))
+    RULES = (
+        IntRule("node", 1, 16),
+        IntRule("offset", 0, 255),
+        BytesRule("data", 1, 25),
+    )
 
     def __init__(self, *, node: int, offset: int = 0, data: bytes) -> None:
         self.node = node
@@ -1630,7 +1634,7 @@ class WriteReadRequest(Message):
     MIN_SIZE = 3
     MAX_SIZE = 3
     FIELDS = ("outputs",)
-    RULES = (Whole("node", 1, 16), Whole("outputs", 0, 16777215))
+    RULES = (IntRule("node", 1, 16), IntRule("outputs", 0, 16777215))
 
     def __init__(self, *, node: int, outputs: int = 0) -> None:
         self.node = node
@@ -1689,7 +1693,7 @@ class WriteReadResponse(Message):
     MIN_SIZE = 3
     MAX_SIZE = 3
     FIELDS = ("inputs",)
-    RULES = (Whole("node", 1, 16), Whole("inputs", 0, 16777215))
+    RULES = (IntRule("node", 1, 16), IntRule("inputs", 0, 16777215))
 
     def __init__(self, *, node: int, inputs: int = 0) -> None:
         self.node = node
@@ -1748,7 +1752,7 @@ class SetOutputsRequest(Message):
     MIN_SIZE = 3
     MAX_SIZE = 3
     FIELDS = ("mask",)
-    RULES = (Whole("node", 1, 16), Whole("mask", 0, 16777215))
+    RULES = (IntRule("node", 1, 16), IntRule("mask", 0, 16777215))
 
     def __init__(self, *, node: int, mask: int = 0) -> None:
         self.node = node
@@ -1821,7 +1825,7 @@ class ClearOutputsRequest(Message):
     MIN_SIZE = 3
     MAX_SIZE = 3
     FIELDS = ("mask",)
-    RULES = (Whole("node", 1, 16), Whole("mask", 0, 16777215))
+    RULES = (IntRule("node", 1, 16), IntRule("mask", 0, 16777215))
 
     def __init__(self, *, node: int, mask: int = 0) -> None:
         self.node = node
@@ -1895,7 +1899,11 @@ class LoopBackRequest(Message):
     MIN_SIZE = 2
     MAX_SIZE = 26
     FIELDS = ("offset", "data")
-    RULES = (Whole("node", 1, 16), Whole("offset", 0, 255), Octets("data", 1, 25))
+    RULES = (
+        IntRule("node", 1, 16),
+        IntRule("offset", 0, 255),
+        BytesRule("data", 1, 25),
+    )
 
     def __init__(self, *, node: int, offset: int = 0, data: bytes) -> None:
         self.node = node
@@ -1955,7 +1963,11 @@ class LoopBackResponse(Message):
     MIN_SIZE = 2
     MAX_SIZE = 26
     FIELDS = ("offset", "data")
-    RULES = (Whole("node", 1, 16), Whole("offset", 0, 255), Octets("data", 1, 25))
+    RULES = (
+        IntRule("node", 1, 16),
+        IntRule("offset", 0, 255),
+        BytesRule("data", 1, 25),
+    )
 
     def __init__(self, *, node: int, offset: int = 0, data: bytes) -> None:
         self.node = node

@@ -28,13 +28,13 @@ from ._support import (
     DecodeError,
     EncodeError,
     Fault,
+    IntRule,
     LayoutError,
     Marking,
     OpenEnum,
     OutOfRange,
-    Scaled,
-    Text,
-    Whole,
+    ScaledRule,
+    TextRule,
     as_bytes,
     find_crc,
     illegal,
@@ -197,7 +197,7 @@ class CharacterTransfer(Message):
     MIN_SIZE = 1
     MAX_SIZE = 256
     FIELDS = ("characters",)
-    RULES = (Whole("address", 1, 15), Text("characters", 1, 256))
+    RULES = (IntRule("address", 1, 15), TextRule("characters", 1, 256))
 
     def __init__(self, *, address: int, characters: str) -> None:
         self.address = address
@@ -252,9 +252,9 @@ class DirectVariableTransfer(Message):
     MAX_SIZE = 12
     FIELDS = ("number", "value")
     RULES = (
-        Whole("address", 1, 15),
-        Whole("number", 0, 16383),
-        Scaled("value", _SCALE_VALUE),
+        IntRule("address", 1, 15),
+        IntRule("number", 0, 16383),
+        ScaledRule("value", _SCALE_VALUE),
     )
 
     def __init__(
@@ -367,7 +367,7 @@ class KeypadOffset(Message):
     MIN_SIZE = 1
     MAX_SIZE = 1
     FIELDS = ("offset",)
-    RULES = (Whole("address", 1, 15), Whole("offset", 1, 15))
+    RULES = (IntRule("address", 1, 15), IntRule("offset", 1, 15))
 
     def __init__(self, *, address: int, offset: int) -> None:
         self.address = address
@@ -416,7 +416,7 @@ class KeypadMode(Message):
     MIN_SIZE = 1
     MAX_SIZE = 1
     FIELDS = ("mode",)
-    RULES = (Whole("address", 1, 15), Whole("mode", 0, 127))
+    RULES = (IntRule("address", 1, 15), IntRule("mode", 0, 127))
 
     def __init__(
         self,

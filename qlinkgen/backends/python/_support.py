@@ -204,7 +204,7 @@ class Rule:
         )
 
 
-class Whole(Rule):
+class IntRule(Rule):
     """A whole number between two bounds, in several ranges if more bounds follow."""
 
     __slots__ = ("ranges",)
@@ -230,7 +230,7 @@ class Whole(Rule):
         return index(value)
 
 
-class Mask(Rule):
+class MaskRule(Rule):
     """Named bits; the others must be zero."""
 
     __slots__ = ("mask",)
@@ -248,7 +248,7 @@ class Mask(Rule):
         return index(value)
 
 
-class Constant(Rule):
+class ConstantRule(Rule):
     """A number that is always sent, and must be received as it is."""
 
     __slots__ = ()
@@ -261,7 +261,7 @@ class Constant(Rule):
         )
 
 
-class Count(Rule):
+class CountRule(Rule):
     """A number that says how long another field is."""
 
     __slots__ = ()
@@ -272,7 +272,7 @@ class Count(Rule):
         super().__init__(name, f"the size of {counted}")
 
 
-class Items(Rule):
+class ArrayRule(Rule):
     """A list of whole numbers."""
 
     __slots__ = ("fewest", "item", "most")
@@ -282,7 +282,7 @@ class Items(Rule):
     ) -> None:
         self.fewest = fewest
         self.most = most
-        self.item = Whole(name, low, high, unit=unit)
+        self.item = IntRule(name, low, high, unit=unit)
         super().__init__(
             name, f"a list of {_span(fewest, most)} items, each {self.item.legal}"
         )
@@ -300,7 +300,7 @@ class Items(Rule):
         return value if same and value.__class__ is list else numbers
 
 
-class Octets(Rule):
+class BytesRule(Rule):
     """A byte string."""
 
     __slots__ = ("fewest", "most")
@@ -315,7 +315,7 @@ class Octets(Rule):
         return self.fewest <= memoryview(value).nbytes <= self.most
 
 
-class Text(Octets):
+class TextRule(BytesRule):
     """Text of seven-bit characters."""
 
     __slots__ = ()
@@ -383,7 +383,7 @@ class DecimalScale(Scale):
         return Context(prec=100).divide(number, Decimal(self.divisor))
 
 
-class Scaled(Rule):
+class ScaledRule(Rule):
     """A value that is sent in whole steps."""
 
     __slots__ = ("scale",)

@@ -132,7 +132,7 @@ def rules(message: MessagePlan, place: Place, scales: Mapping[str, str]) -> list
     found: list[Call] = []
     if message.allowed is not None and place.address:
         bounds = [str(bound) for each in message.allowed.ranges for bound in (each.low, each.high)]
-        found.append(_rule(place, "Whole", place.address, *bounds))
+        found.append(_rule(place, "IntRule", place.address, *bounds))
     for step in message.payload.steps:
         found += _rules(step, place, scales)
     return found
@@ -147,20 +147,20 @@ def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
     name = attribute(step.name)
     match step:
         case ConstantStep():
-            return [_rule(place, "Constant", name, step.value)]
+            return [_rule(place, "ConstantRule", name, step.value)]
         case CountStep():
-            return [_rule(place, "Count", name, f'"{step.run}"')]
+            return [_rule(place, "CountRule", name, f'"{step.run}"')]
         case ReservedStep():
             return []
         case BitsStep():
             return [rule for member in step.members for rule in _member_rules(member, place, scales)]
         case BytesStep():
-            kind = "Text" if step.text else "Octets"
+            kind = "TextRule" if step.text else "BytesRule"
             return [_rule(place, kind, name, step.length.minimum, step.length.maximum)]
         case ItemsStep():
             length, item = step.length, step.number
             bounds = (length.minimum, length.maximum, item.minimum, item.maximum)
-            return [_rule(place, "Items", name, *bounds, unit=item.unit)]
+            return [_rule(place, "ArrayRule", name, *bounds, unit=item.unit)]
         case ValueStep():
             return [_number_rule(step.name, step.number, place, scales)]
         case _:
@@ -174,10 +174,10 @@ def _member_rules(member: Member, place: Place, scales: Mapping[str, str]) -> li
 def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, str]) -> Call:
     name = attribute(field)
     if number.scaling is not None:
-        return _rule(place, "Scaled", name, scales[field], unit=number.unit)
+        return _rule(place, "ScaledRule", name, scales[field], unit=number.unit)
     if isinstance(number.meaning, Flags) and number.meaning.reserved_zero:
-        return _rule(place, "Mask", name, f"0x{number.meaning.mask:X}")
-    return _rule(place, "Whole", name, number.minimum, number.maximum, unit=number.unit)
+        return _rule(place, "MaskRule", name, f"0x{number.meaning.mask:X}")
+    return _rule(place, "IntRule", name, number.minimum, number.maximum, unit=number.unit)
 
 
 # Descriptions

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qlinkgen.codecs import qlink
-from qlinkgen.codecs._support import Items, Octets
+from qlinkgen.codecs._support import ArrayRule, BytesRule
 
 
 def _bus(name: str) -> int:
@@ -15,7 +15,7 @@ def _bus(name: str) -> int:
 
 def _most(message: type[qlink.Message], field: str) -> int:
     """Return how many items a field of a message can hold."""
-    rules = (rule for rule in message.RULES if isinstance(rule, Items | Octets))
+    rules = (rule for rule in message.RULES if isinstance(rule, ArrayRule | BytesRule))
     return next(rule.most for rule in rules if rule.name == field)
 
 
