@@ -113,9 +113,9 @@ def _readable(message: Message, found: Mapping[str, Any]) -> dict[str, Any]:
 
 def _by_construct(case: Case, protocol: Protocol, message: Message) -> Shown:
     live = construct.live(protocol)
-    asked = live.seal(case.request, live.payload(case.request, {})) if case.request else b""
+    asked = live.wrap(case.request, live.payload(case.request, {})) if case.request else b""
     payload = live.payload(case.message, case.values)
-    wire = live.seal(case.message, payload, next(iter(case.address.values()), 0), asked)
+    wire = live.wrap(case.message, payload, next(iter(case.address.values()), 0), asked)
     found = live.parse(message.direction, wire, asked)
     return Shown(wire, _readable(message, found.fields))
 

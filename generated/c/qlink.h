@@ -517,7 +517,7 @@ static inline uint8_t *qlink_place_(uint8_t *wire, size_t capacity, size_t size)
 /* Completes a frame whose payload ends 2 bytes before the end of the buffer. One pass computes the check value,
  * inserts the stuffing and moves the bytes to the front: the place written to never overtakes the place read from
  * as long as the frame fits. */
-static inline int qlink_seal_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
+static inline int qlink_wrap_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
     const size_t size = (size_t)payload_size;
     size_t from;
@@ -641,21 +641,21 @@ static inline int qlink_scan_(
 }
 
 /* The same for a message that the node 0..16 may have. */
-static inline int qlink_seal_0_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
+static inline int qlink_wrap_0_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
-    return (node <= 16U) ? qlink_seal_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
+    return (node <= 16U) ? qlink_wrap_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
 /* The same for a message that the node 1..16 may have. */
-static inline int qlink_seal_1_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
+static inline int qlink_wrap_1_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
-    return ((node >= 1U) && (node <= 16U)) ? qlink_seal_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
+    return ((node >= 1U) && (node <= 16U)) ? qlink_wrap_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
 /* The same for a message that the node 0 may have. */
-static inline int qlink_seal_0_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
+static inline int qlink_wrap_0_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
-    return (node == 0U) ? qlink_seal_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
+    return (node == 0U) ? qlink_wrap_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
 /* Makes a frame of any payload; returns its size on the wire. */
@@ -671,7 +671,7 @@ static inline int qlink_frame_encode(
             place[index] = payload[index];
         }
     }
-    return qlink_seal_(id, node, wire, capacity, (int)size);
+    return qlink_wrap_(id, node, wire, capacity, (int)size);
 }
 
 /* Bytes that qlink_frame_decode needs for what it unpacks. */
@@ -749,7 +749,7 @@ static inline int qlink_node_setup_request_to_frame(
         size = qlink_node_setup_request_encode(message, qlink_place_(wire, capacity, QLINK_NODE_SETUP_REQUEST_MAX_SIZE),
             QLINK_NODE_SETUP_REQUEST_MAX_SIZE);
     }
-    return qlink_seal_0_to_16_(QLINK_NODE_SETUP_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_0_to_16_(QLINK_NODE_SETUP_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- node_setup.response, id 0x01 (section 7.1): Give a node its number, its output delays and its way of
@@ -763,7 +763,7 @@ static inline int qlink_node_setup_request_to_frame(
 
 static inline int qlink_node_setup_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_NODE_SETUP_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_NODE_SETUP_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_info.request, id 0x02 (section 7.2): Read a node's firmware version, product, settings and
@@ -777,7 +777,7 @@ static inline int qlink_node_setup_response_to_frame(uint8_t node, uint8_t *wire
 
 static inline int qlink_node_info_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_0_to_16_(QLINK_NODE_INFO_REQUEST_ID, node, wire, capacity, 0);
+    return qlink_wrap_0_to_16_(QLINK_NODE_INFO_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_info.response, id 0x02 (section 7.2): Read a node's firmware version, product, settings and
@@ -850,7 +850,7 @@ static inline int qlink_node_info_response_to_frame(
         size = qlink_node_info_response_encode(message, qlink_place_(wire, capacity, QLINK_NODE_INFO_RESPONSE_MAX_SIZE),
             QLINK_NODE_INFO_RESPONSE_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_NODE_INFO_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_NODE_INFO_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- node_start.request, id 0x03 (section 7.3): Start one node, or all of them at the same time. */
@@ -862,7 +862,7 @@ static inline int qlink_node_info_response_to_frame(
 
 static inline int qlink_node_start_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_0_to_16_(QLINK_NODE_START_REQUEST_ID, node, wire, capacity, 0);
+    return qlink_wrap_0_to_16_(QLINK_NODE_START_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_stop.request, id 0x04 (section 7.4): Stop one node, or all of them at the same time. */
@@ -874,7 +874,7 @@ static inline int qlink_node_start_request_to_frame(uint8_t node, uint8_t *wire,
 
 static inline int qlink_node_stop_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_0_to_16_(QLINK_NODE_STOP_REQUEST_ID, node, wire, capacity, 0);
+    return qlink_wrap_0_to_16_(QLINK_NODE_STOP_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_sync.request, id 0x05 (section 7.5): Synchronise all nodes; sent at a fixed interval.
@@ -922,7 +922,7 @@ static inline int qlink_node_sync_request_to_frame(
         size = qlink_node_sync_request_encode(message, qlink_place_(wire, capacity, QLINK_NODE_SYNC_REQUEST_MAX_SIZE),
             QLINK_NODE_SYNC_REQUEST_MAX_SIZE);
     }
-    return qlink_seal_0_(QLINK_NODE_SYNC_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_0_(QLINK_NODE_SYNC_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- node_program_load.request, id 0x06 (section 7.6): Load a program. The first request carries no
@@ -993,7 +993,7 @@ static inline int qlink_node_program_load_request_to_frame(
         size = qlink_node_program_load_request_encode(message, qlink_place_(wire, capacity, payload_size),
             payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_NODE_PROGRAM_LOAD_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_NODE_PROGRAM_LOAD_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- node_program_load.response, id 0x06 (section 7.6): Load a program. The first request carries no
@@ -1033,7 +1033,7 @@ static inline int qlink_node_program_load_response_to_frame(
             qlink_place_(wire, capacity, QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE),
             QLINK_NODE_PROGRAM_LOAD_RESPONSE_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_NODE_PROGRAM_LOAD_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_NODE_PROGRAM_LOAD_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- node_reset.request, id 0x07 (section 7.7): Reset a node; it answers first. */
@@ -1045,7 +1045,7 @@ static inline int qlink_node_program_load_response_to_frame(
 
 static inline int qlink_node_reset_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_NODE_RESET_REQUEST_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_NODE_RESET_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- node_reset.response, id 0x07 (section 7.7): Reset a node; it answers first. */
@@ -1057,7 +1057,7 @@ static inline int qlink_node_reset_request_to_frame(uint8_t node, uint8_t *wire,
 
 static inline int qlink_node_reset_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_NODE_RESET_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_NODE_RESET_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- motor_response_poll.request, id 0x15 (section 7.8): Ask whether the last motor request is completed,
@@ -1071,7 +1071,7 @@ static inline int qlink_node_reset_response_to_frame(uint8_t node, uint8_t *wire
 
 static inline int qlink_motor_response_poll_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_MOTOR_RESPONSE_POLL_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- motor_response_poll.response, id 0x15 (section 7.8): Ask whether the last motor request is
@@ -1136,7 +1136,7 @@ static inline int qlink_motor_response_poll_response_to_frame(
         size = qlink_motor_response_poll_response_encode(message, qlink_place_(wire, capacity, payload_size),
             payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_MOTOR_RESPONSE_POLL_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_MOTOR_RESPONSE_POLL_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- motor_request.request, id 0x16 (section 7.9): Send a request to the motor behind a node; the result
@@ -1196,7 +1196,7 @@ static inline int qlink_motor_request_request_to_frame(
     if (qlink_fits_(capacity, payload_size)) {
         size = qlink_motor_request_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_MOTOR_REQUEST_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_MOTOR_REQUEST_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- motor_request.response, id 0x16 (section 7.9): Send a request to the motor behind a node; the result
@@ -1210,7 +1210,7 @@ static inline int qlink_motor_request_request_to_frame(
 
 static inline int qlink_motor_request_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_MOTOR_REQUEST_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_MOTOR_REQUEST_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- motion.request, id 0x20 (section 7.10): Hand path segments and outputs to a node, and read back its
@@ -1281,7 +1281,7 @@ static inline int qlink_motion_request_to_frame(
     if (qlink_fits_(capacity, payload_size)) {
         size = qlink_motion_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_MOTION_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_MOTION_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- motion.response, id 0x20 (section 7.10): Hand path segments and outputs to a node, and read back its
@@ -1345,7 +1345,7 @@ static inline int qlink_motion_response_to_frame(
         size = qlink_motion_response_encode(message, qlink_place_(wire, capacity, QLINK_MOTION_RESPONSE_MAX_SIZE),
             QLINK_MOTION_RESPONSE_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_MOTION_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_MOTION_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- motor_position.request, id 0x21 (section 7.11): Read the motor position. */
@@ -1357,7 +1357,7 @@ static inline int qlink_motion_response_to_frame(
 
 static inline int qlink_motor_position_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_MOTOR_POSITION_REQUEST_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_MOTOR_POSITION_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- motor_position.response, id 0x21 (section 7.11): Read the motor position.
@@ -1406,7 +1406,7 @@ static inline int qlink_motor_position_response_to_frame(
             qlink_place_(wire, capacity, QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE),
             QLINK_MOTOR_POSITION_RESPONSE_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_MOTOR_POSITION_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_MOTOR_POSITION_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- clear_fifo.request, id 0x22 (section 7.12): Drop all path segments that wait in the FIFO. */
@@ -1418,7 +1418,7 @@ static inline int qlink_motor_position_response_to_frame(
 
 static inline int qlink_clear_fifo_request_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_CLEAR_FIFO_REQUEST_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_CLEAR_FIFO_REQUEST_ID, node, wire, capacity, 0);
 }
 
 /* ---- clear_fifo.response, id 0x22 (section 7.12): Drop all path segments that wait in the FIFO. */
@@ -1430,7 +1430,7 @@ static inline int qlink_clear_fifo_request_to_frame(uint8_t node, uint8_t *wire,
 
 static inline int qlink_clear_fifo_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_CLEAR_FIFO_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_CLEAR_FIFO_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- preset_motor_position.request, id 0x23 (section 7.13): Set the motor position; not allowed while the
@@ -1470,7 +1470,7 @@ static inline int qlink_preset_motor_position_request_to_frame(
             qlink_place_(wire, capacity, QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE),
             QLINK_PRESET_MOTOR_POSITION_REQUEST_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_PRESET_MOTOR_POSITION_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_PRESET_MOTOR_POSITION_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- preset_motor_position.response, id 0x23 (section 7.13): Set the motor position; not allowed while
@@ -1484,7 +1484,7 @@ static inline int qlink_preset_motor_position_request_to_frame(
 
 static inline int qlink_preset_motor_position_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_PRESET_MOTOR_POSITION_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_PRESET_MOTOR_POSITION_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- read.request, id 0x81 (section 7.14): Read bytes of the input image.
@@ -1540,7 +1540,7 @@ static inline int qlink_read_request_to_frame(
         size = qlink_read_request_encode(message, qlink_place_(wire, capacity, QLINK_READ_REQUEST_MAX_SIZE),
             QLINK_READ_REQUEST_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_READ_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_READ_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- read.response, id 0x81 (section 7.14): Read bytes of the input image.
@@ -1597,7 +1597,7 @@ static inline int qlink_read_response_to_frame(
     if (qlink_fits_(capacity, payload_size)) {
         size = qlink_read_response_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_READ_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_READ_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- write.request, id 0x82 (section 7.15): Write bytes of the output image.
@@ -1658,7 +1658,7 @@ static inline int qlink_write_request_to_frame(
     if (qlink_fits_(capacity, payload_size)) {
         size = qlink_write_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_WRITE_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_WRITE_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- write.response, id 0x82 (section 7.15): Write bytes of the output image. */
@@ -1670,7 +1670,7 @@ static inline int qlink_write_request_to_frame(
 
 static inline int qlink_write_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_WRITE_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_WRITE_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- write_read.request, id 0x83 (section 7.16): Write 24 outputs and read 24 inputs at once.
@@ -1721,7 +1721,7 @@ static inline int qlink_write_read_request_to_frame(
         size = qlink_write_read_request_encode(message, qlink_place_(wire, capacity, QLINK_WRITE_READ_REQUEST_MAX_SIZE),
             QLINK_WRITE_READ_REQUEST_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_WRITE_READ_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_WRITE_READ_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- write_read.response, id 0x83 (section 7.16): Write 24 outputs and read 24 inputs at once.
@@ -1772,7 +1772,7 @@ static inline int qlink_write_read_response_to_frame(
         size = qlink_write_read_response_encode(message,
             qlink_place_(wire, capacity, QLINK_WRITE_READ_RESPONSE_MAX_SIZE), QLINK_WRITE_READ_RESPONSE_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_WRITE_READ_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_WRITE_READ_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* ---- set_outputs.request, id 0x84 (section 7.17): Set the outputs whose bits are set in a mask.
@@ -1823,7 +1823,7 @@ static inline int qlink_set_outputs_request_to_frame(
         size = qlink_set_outputs_request_encode(message,
             qlink_place_(wire, capacity, QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE), QLINK_SET_OUTPUTS_REQUEST_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_SET_OUTPUTS_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_SET_OUTPUTS_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- set_outputs.response, id 0x84 (section 7.17): Set the outputs whose bits are set in a mask. */
@@ -1835,7 +1835,7 @@ static inline int qlink_set_outputs_request_to_frame(
 
 static inline int qlink_set_outputs_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_SET_OUTPUTS_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_SET_OUTPUTS_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- clear_outputs.request, id 0x85 (section 7.18): Clear the outputs whose bits are set in a mask.
@@ -1873,7 +1873,7 @@ static inline int qlink_clear_outputs_request_to_frame(
         size = qlink_clear_outputs_request_encode(message,
             qlink_place_(wire, capacity, QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE), QLINK_CLEAR_OUTPUTS_REQUEST_MAX_SIZE);
     }
-    return qlink_seal_1_to_16_(QLINK_CLEAR_OUTPUTS_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_CLEAR_OUTPUTS_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- clear_outputs.response, id 0x85 (section 7.18): Clear the outputs whose bits are set in a mask. */
@@ -1885,7 +1885,7 @@ static inline int qlink_clear_outputs_request_to_frame(
 
 static inline int qlink_clear_outputs_response_to_frame(uint8_t node, uint8_t *wire, size_t capacity)
 {
-    return qlink_seal_1_to_16_(QLINK_CLEAR_OUTPUTS_RESPONSE_ID, node, wire, capacity, 0);
+    return qlink_wrap_1_to_16_(QLINK_CLEAR_OUTPUTS_RESPONSE_ID, node, wire, capacity, 0);
 }
 
 /* ---- loop_back.request, id 0xA4 (section 7.19): Test the line; the node returns what it was sent.
@@ -1925,7 +1925,7 @@ static inline int qlink_loop_back_request_to_frame(
     if (qlink_fits_(capacity, payload_size)) {
         size = qlink_loop_back_request_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_LOOP_BACK_REQUEST_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_LOOP_BACK_REQUEST_ID, node, wire, capacity, size);
 }
 
 /* ---- loop_back.response, id 0xA4 (section 7.19): Test the line; the node returns what it was sent.
@@ -1965,7 +1965,7 @@ static inline int qlink_loop_back_response_to_frame(
     if (qlink_fits_(capacity, payload_size)) {
         size = qlink_loop_back_response_encode(message, qlink_place_(wire, capacity, payload_size), payload_size);
     }
-    return qlink_seal_1_to_16_(QLINK_LOOP_BACK_RESPONSE_ID, node, wire, capacity, size);
+    return qlink_wrap_1_to_16_(QLINK_LOOP_BACK_RESPONSE_ID, node, wire, capacity, size);
 }
 
 /* What a request carries is right: id, address, size, ranges. */

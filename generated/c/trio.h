@@ -149,7 +149,7 @@ static inline uint16_t trio_get_u14_groups_(const uint8_t *at)
         (uint16_t)(at[0] & 0x7FU) |
         (uint16_t)((uint16_t)(at[1] & 0x7FU) << 7));
 }
-static inline bool trio_misfit_u14_groups_(const uint8_t *at)
+static inline bool trio_unused_bits_u14_groups_(const uint8_t *at)
 {
     return ((at[0] & 0x80U) | (at[1] & 0x80U)) != 0U;
 }
@@ -182,7 +182,7 @@ static inline uint64_t trio_get_u64_groups_(const uint8_t *at)
         (uint64_t)((uint64_t)(at[8] & 0x7FU) << 21) |
         (uint64_t)((uint64_t)(at[9] & 0x0FU) << 28));
 }
-static inline bool trio_misfit_u64_groups_(const uint8_t *at)
+static inline bool trio_unused_bits_u64_groups_(const uint8_t *at)
 {
     return ((at[0] & 0x80U) | (at[1] & 0x80U) | (at[2] & 0x80U) | (at[3] & 0x80U) | (at[4] & 0xF0U) | (at[5] & 0x80U) |
         (at[6] & 0x80U) | (at[7] & 0x80U) | (at[8] & 0x80U) | (at[9] & 0xF0U)) != 0U;
@@ -517,7 +517,7 @@ static inline bool trio_shape_(uint8_t id, size_t count, bool *checked)
 }
 
 /* Completes a frame whose payload is in its place already. */
-static inline int trio_seal_(
+static inline int trio_wrap_(
     uint8_t id, uint8_t address, uint8_t *wire, size_t capacity, int payload_size, bool checked)
 {
     const size_t size = (size_t)payload_size;
@@ -603,10 +603,10 @@ static inline int trio_frame_decode(trio_frame_t *frame, const uint8_t *wire, si
 }
 
 /* The same for a message that the address 1..15 may have. */
-static inline int trio_seal_1_to_15_(
+static inline int trio_wrap_1_to_15_(
     uint8_t id, uint8_t address, uint8_t *wire, size_t capacity, int payload_size, bool checked)
 {
-    return ((address >= 1U) && (address <= 15U)) ? trio_seal_(id, address, wire, capacity, payload_size, checked) :
+    return ((address >= 1U) && (address <= 15U)) ? trio_wrap_(id, address, wire, capacity, payload_size, checked) :
         TRIO_ERROR_RANGE;
 }
 
@@ -672,7 +672,7 @@ static inline int trio_character_transfer_to_frame(
     if (trio_fits_(capacity, payload_size)) {
         size = trio_character_transfer_encode(message, trio_place_(wire, capacity, payload_size), payload_size);
     }
-    return trio_seal_1_to_15_(TRIO_CHARACTER_TRANSFER_ID, address, wire, capacity, size, false);
+    return trio_wrap_1_to_15_(TRIO_CHARACTER_TRANSFER_ID, address, wire, capacity, size, false);
 }
 
 /* ---- direct_variable_transfer, id 0x02 (section Message types): Set a variable of a Motion Coordinator;
@@ -734,11 +734,11 @@ static inline int trio_direct_variable_transfer_decode(
     if (size != 12U) {
         return TRIO_ERROR_LENGTH;
     }
-    if (trio_misfit_u14_groups_(payload)) {
+    if (trio_unused_bits_u14_groups_(payload)) {
         return TRIO_ERROR_RANGE;
     }
     message->number = trio_get_u14_groups_(payload);
-    if (trio_misfit_u64_groups_(&payload[2])) {
+    if (trio_unused_bits_u64_groups_(&payload[2])) {
         return TRIO_ERROR_RANGE;
     }
     message->value = (int64_t)trio_get_u64_groups_(&payload[2]);
@@ -755,7 +755,7 @@ static inline int trio_direct_variable_transfer_to_frame(
             trio_place_(wire, capacity, TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE),
             TRIO_DIRECT_VARIABLE_TRANSFER_MAX_SIZE);
     }
-    return trio_seal_1_to_15_(TRIO_DIRECT_VARIABLE_TRANSFER_ID, address, wire, capacity, size, true);
+    return trio_wrap_1_to_15_(TRIO_DIRECT_VARIABLE_TRANSFER_ID, address, wire, capacity, size, true);
 }
 
 /* ---- keypad_offset, id 0x03 (section Message types): Put a keypad into network mode and tell it where to
@@ -810,7 +810,7 @@ static inline int trio_keypad_offset_to_frame(
         size = trio_keypad_offset_encode(message, trio_place_(wire, capacity, TRIO_KEYPAD_OFFSET_MAX_SIZE),
             TRIO_KEYPAD_OFFSET_MAX_SIZE);
     }
-    return trio_seal_1_to_15_(TRIO_KEYPAD_OFFSET_ID, address, wire, capacity, size, false);
+    return trio_wrap_1_to_15_(TRIO_KEYPAD_OFFSET_ID, address, wire, capacity, size, false);
 }
 
 /* ---- keypad_mode, id 0x04 (section Message types): Choose what a keypad sends for a key.
@@ -863,7 +863,7 @@ static inline int trio_keypad_mode_message_to_frame(
         size = trio_keypad_mode_message_encode(message, trio_place_(wire, capacity, TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE),
             TRIO_KEYPAD_MODE_MESSAGE_MAX_SIZE);
     }
-    return trio_seal_1_to_15_(TRIO_KEYPAD_MODE_MESSAGE_ID, address, wire, capacity, size, false);
+    return trio_wrap_1_to_15_(TRIO_KEYPAD_MODE_MESSAGE_ID, address, wire, capacity, size, false);
 }
 
 /* What a message carries is right: id, address, size, ranges. */

@@ -83,9 +83,9 @@ class Codec:
         whom = message.message.default_address if address is None else address
         if message.allowed is not None and not message.allowed.holds(whom):
             raise Unsendable(self.plan.frame.address, whom)
-        return self.seal(name, content.pack(message.payload, values), whom, request)
+        return self.wrap(name, content.pack(message.payload, values), whom, request)
 
-    def seal(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
+    def wrap(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
         """The frame of a payload that may be wrong, right in all else."""
         message = self.plan.message(name)
         return self.join(message, self.cells(message, self.sent(payload), address), request)

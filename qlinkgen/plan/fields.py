@@ -111,7 +111,7 @@ class Fields:
     def _items(self, step: ItemsStep, raw: bytes, places: tuple[int, ...]) -> None:
         bad = None
         for at in reversed(range(0, len(raw), step.item_size)):
-            if _misfit(step.item, step.conditions, raw[at : at + step.item_size]):
+            if _is_refused(step.item, step.conditions, raw[at : at + step.item_size]):
                 bad = places[at]
         self._span(step, places, None, bad)
 
@@ -120,7 +120,7 @@ class Fields:
     ) -> int:
         raw = bytes(self._payload[at] for at in places)
         number = integer.unpack(raw)
-        self._span(step, places, number, places[0] if _misfit(integer, rules, raw) else None)
+        self._span(step, places, number, places[0] if _is_refused(integer, rules, raw) else None)
         return number
 
     def _members(self, step: BitsStep, whole: int, places: tuple[int, ...]) -> None:
@@ -151,5 +151,5 @@ class Fields:
         return self._payload[at]
 
 
-def _misfit(integer: Integer, rules: tuple[Condition, ...], raw: bytes) -> bool:
+def _is_refused(integer: Integer, rules: tuple[Condition, ...], raw: bytes) -> bool:
     return integer.stray(raw) or broken(rules, integer.unpack(raw))

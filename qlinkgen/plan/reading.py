@@ -228,10 +228,10 @@ class FrameReader:
             case _:
                 assert_never(part)
         if self._bare:
-            self._admit(cursor, taken)
+            self._check_known(cursor, taken)
         return 0
 
-    def _admit(self, cursor: Cursor, taken: Taken) -> None:
+    def _check_known(self, cursor: Cursor, taken: Taken) -> None:
         """Without a constant in front, only number and address tell a frame from noise."""
         if taken.number is None:
             return

@@ -78,7 +78,7 @@ def _answers(plan: Plan, driver: Driver) -> None:
         asked, answer = plan.by_name[command.request.name], plan.by_name[command.response.name]
         for number in range(6):
             request = wire(plan, asked, rng)
-            frame = Codec(plan).seal(answer.name, rng.randbytes(answer.payload.most), request=request)
+            frame = Codec(plan).wrap(answer.name, rng.randbytes(answer.payload.most), request=request)
             frame = damaged(frame, rng, b"\x00") if number % 3 else frame
             said = driver.ask("decode", answer.name, frame.hex() or "-", request.hex()).split()
             due = kind(plan, "response", frame, request)

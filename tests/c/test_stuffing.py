@@ -140,7 +140,7 @@ def test_round_trip(frame: Stuffed, tmp_path: Path, require_tool: Callable[..., 
             assert driver.ask("encode", "set.request", "-", *values).split()[2] == wire.hex()
             assert driver.ask("decode", "set.request", wire.hex()).split() == ["ok", "-", *values]
             message = module.SetRequest(a=a, b=b)
-            assert message.to_frame() == live.seal("set.request", payload) == wire
+            assert message.to_frame() == live.wrap("set.request", payload) == wire
             assert message.to_bytes() == payload
             assert module.decode_request(wire) == message
             assert live.parse("request", wire).fields.a == a

@@ -41,8 +41,8 @@ MISTAKES = {
     ),
     "an address": Mistake(
         "trio",
-        "((address >= 1U) && (address <= 15U)) ? trio_seal_(",
-        "((address >= 1U) && (address <= 16U)) ? trio_seal_(",
+        "((address >= 1U) && (address <= 15U)) ? trio_wrap_(",
+        "((address >= 1U) && (address <= 16U)) ? trio_wrap_(",
         {"character_transfer", "direct_variable_transfer", "keypad_offset", "keypad_mode"},
         {"refuse"},
     ),

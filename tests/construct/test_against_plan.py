@@ -124,14 +124,14 @@ def test_payloads_and_frames_are_read_as_the_plan_says(name: str) -> None:
             request = b""
             if one.plan.frame.needs_request and direction == "response":
                 request = bytes((message.id,)) + chance.randbytes(chance.randrange(5))
-            wire = one.codec.seal(message.name, payload, address, request)
+            wire = one.codec.wrap(message.name, payload, address, request)
             assert one.live.payload(message.name, one.natives(message, raws)) == payload
-            assert one.live.seal(message.name, payload, address, request) == wire
+            assert one.live.wrap(message.name, payload, address, request) == wire
             spoilt = damaged(payload, chance, payload or b"\0")[: one.plan.frame.max_payload]
             for each in (payload, spoilt, payload[:-1]):
                 one.same_payload(message, each)
-                sealed = one.codec.seal(message.name, each, address, request)
-                one.same_frame(direction, sealed, request)
+                wrapped = one.codec.wrap(message.name, each, address, request)
+                one.same_frame(direction, wrapped, request)
             for each in (
                 wire,
                 damaged(wire, chance, wire),

@@ -118,7 +118,7 @@ def _frames(plan: Plan, direction: Direction, chance: random.Random) -> list[tup
             payloads.append(pack(message.payload, {}))
         except Unsendable:  # the caller has to choose a value
             payloads.append(bytes(least))
-        frames += [(codec.seal(message.name, each, address, request), request) for each in payloads]
+        frames += [(codec.wrap(message.name, each, address, request), request) for each in payloads]
     return frames
 
 

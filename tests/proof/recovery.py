@@ -72,7 +72,7 @@ def qlink() -> Subject:
         else:
             data = number.to_bytes(2, "big") + chance.randbytes(chance.randint(0, 23))
             name, fields = "loop_back.response", {"offset": 0xA5, "data": data}
-        frames.append(live.seal(name, live.payload(name, fields), node))
+        frames.append(live.wrap(name, live.payload(name, fields), node))
     return Subject(
         frames, lambda each: bytes([0xA5, 0xA5, each.randint(4, 30)]), _delivered("qlink", "response")
     )
@@ -92,7 +92,7 @@ def trio() -> Subject:
             )
         else:
             name, fields = "character_transfer", {"characters": f"{number:04}" + "x" * chance.randint(0, 20)}
-        frames.append(live.seal(name, live.payload(name, fields), chance.randint(1, 15)))
+        frames.append(live.wrap(name, live.payload(name, fields), chance.randint(1, 15)))
     return Subject(
         frames, lambda each: bytes([0x80 | each.randint(1, 15) << 3 | each.randint(1, 4)]), _delivered("trio")
     )

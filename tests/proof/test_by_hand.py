@@ -33,7 +33,7 @@ def test_checksum(name: str, row: Mapping[str, Any]) -> None:
         message = next(iter(names["MESSAGES"]))
         request = bytes.fromhex(row["request"])
         assert (
-            cases.reference(name).seal(message.replace("request", "response"), plain, 0, request)
+            cases.reference(name).wrap(message.replace("request", "response"), plain, 0, request)
             == plain + check
         )
     else:

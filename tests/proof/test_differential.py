@@ -106,11 +106,11 @@ def test_any_frame_becomes_the_same_message_or_is_refused(name: str, data: st.Da
 
 @every_protocol
 @given(data=st.data())
-def test_any_sealed_payload_is_refused_for_the_same_reason(name: str, data: st.DataObject) -> None:
+def test_any_wrapped_payload_is_refused_for_the_same_reason(name: str, data: st.DataObject) -> None:
     message = data.draw(some_message(name))
     payload = data.draw(mutated(payloads(name, message)))
     request = request_of(name, message)
-    wire = cases.reference(name).seal(message.name, payload, message.default_address, request)
+    wire = cases.reference(name).wrap(message.name, payload, message.default_address, request)
     expected, found = both(name, lambda each: plain(each.decode(message, wire, request)))
     assert as_reason(name, message, found) == as_reason(name, message, expected)
 

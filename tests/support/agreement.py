@@ -46,7 +46,7 @@ def wire(plan: Plan, message: MessagePlan, rng: random.Random, request: bytes = 
     payload = rng.randbytes(rng.choice((message.payload.least, message.payload.most)))
     if isinstance(plan.frame.transparency, SevenBit):
         payload = bytes(byte & 0x7F for byte in payload)
-    return codec.seal(message.name, payload, rng.choice((address, 0)), request)
+    return codec.wrap(message.name, payload, rng.choice((address, 0)), request)
 
 
 def streams(plan: Plan, direction: Direction, rng: random.Random, number: int) -> Iterator[bytes]:

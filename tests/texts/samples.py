@@ -33,7 +33,7 @@ ORDINARY = (
     "<b> & [bold]red[/bold] [/] :warning:",
     "größe in µm, 25 °C, 単位, \U0001f600",
     "no\u00a0break",
-    "Decimal( Steps( Callable struct_error unpack_from( MeasureRequest",
+    "Decimal( Scale( Callable struct_error unpack_from( MeasureRequest",
     "def public(): pass",
     "null",
     "7.10",

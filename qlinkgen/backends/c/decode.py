@@ -7,9 +7,9 @@ from typing import assert_never
 
 from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.encode import item_offset, loop
-from qlinkgen.backends.c.extents import Learner, index_of, local, size_text
 from qlinkgen.backends.c.layout import pointer
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
+from qlinkgen.backends.c.sizes import Learner, index_of, local, size_text
 from qlinkgen.model import naming
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Scalar
@@ -131,8 +131,8 @@ class Decoder(Learner):
         """The bits of an integer, once it is checked that they are those of one."""
         index = index_of(place, local, further)
         self.reads = True
-        if misfit := self.layouts.misfit(integer, "payload", index):
-            self.refuse([misfit], "RANGE")
+        if unused := self.layouts.unused_bits(integer, "payload", index):
+            self.refuse([unused], "RANGE")
         return self.layouts.get(integer, "payload", index)
 
     def _assign(self, target: str, number: Scalar, raw: str) -> None:

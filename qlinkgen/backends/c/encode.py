@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.c import checks
-from qlinkgen.backends.c.extents import index_of, local, local_size, size_text
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
+from qlinkgen.backends.c.sizes import index_of, local, local_size, size_text
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.naming import member as member_of
 from qlinkgen.model.types import Scalar

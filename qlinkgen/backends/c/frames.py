@@ -78,7 +78,7 @@ class FrameSection:
     @property
     def needs_ids(self) -> bool:
         """Receiving a frame needs to know the messages, so their ids come before it."""
-        by_message = self.view.bare or self.view.needs_extent
+        by_message = self.view.bare or self.view.sized_by_message
         return by_message or isinstance(self.plan.frame.receiver, Marks | InStep)
 
     @property
@@ -150,15 +150,15 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
         case Hunt() | Rescan():
             views = parts_views(plan, layouts)
             frame = "frame_stuffed" if views.stuffed else "frame_plain"
-            templates = ("place", frame, "seal", "frame_public")
+            templates = ("place", frame, "wrap", "frame_public")
             hears = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
             value = crc.render(check.algorithm) if check else None
             return FrameSection(plan, views.f, views.others, value, templates, hears)
         case Marks():
             value = crc.render(check.algorithm) if check else None
             marked: Mapping[str, View] = {"place": PLACE, "marked": marked_view(plan)}
-            view = frame_view(plan, seal_checked=bool(check))
-            return FrameSection(plan, view, marked, value, ("place", "marked", "seal"), "receiver_marked")
+            view = frame_view(plan, check_optional=bool(check))
+            return FrameSection(plan, view, marked, value, ("place", "marked", "wrap"), "receiver_marked")
         case InStep():
             packet = {"packet": packet_view(plan)}
             return FrameSection(plan, frame_view(plan), packet, None, ("packet",), "receiver_packet")

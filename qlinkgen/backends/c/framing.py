@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.backends.c.extents import size_terms
 from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
+from qlinkgen.backends.c.sizes import size_terms
 from qlinkgen.model.message import Message
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import ByMark, FramePlan
@@ -54,7 +54,7 @@ class Expected:
 
     Attributes:
         allowed: condition of the address in ``frame``, "" where it may be any.
-        admits: the same for the address in a parameter.
+        address_allowed: the same for the address in a parameter.
     """
 
     constant: str
@@ -62,7 +62,7 @@ class Expected:
     has_struct: bool
     has_bytes: bool
     allowed: str
-    admits: str
+    address_allowed: str
 
 
 def allowed(addresses: OneOf | None, value: str, bits: int) -> str:
@@ -103,9 +103,9 @@ def to_frame(frame: FramePlan, names: Names, address: Address, message: MessageP
     struct = struct_parameter(names, stated, const=True)
     lines, size = _payload_lines(names, stated, bool(struct)) if stated.fields else ([], "0")
     group = address_group(message, address)
-    seal = f"{names.prefix}_seal_{group.name}_" if group else f"{names.prefix}_seal_"
+    wrap = f"{names.prefix}_wrap_{group.name}_" if group else f"{names.prefix}_wrap_"
     arguments = f"{names.constant(stated)}_ID, {address.argument}wire, capacity, {size}"
-    lines.append(f"return {seal}({arguments}{_checked(frame, message)});")
+    lines.append(f"return {wrap}({arguments}{_checked(frame, message)});")
     return Function(struct + address.parameter, lines)
 
 
@@ -145,7 +145,7 @@ def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
         has_struct=bool(message.message.values),
         has_bytes=bool(message.message.fields),
         allowed=allowed(message.allowed, address.name and f"frame->{address.name}", address.bits),
-        admits=allowed(message.allowed, address.name, address.bits),
+        address_allowed=allowed(message.allowed, address.name, address.bits),
     )
 
 

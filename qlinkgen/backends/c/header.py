@@ -14,11 +14,11 @@ from qlinkgen.backends.c.constants import EnumView, enum_views, limits
 from qlinkgen.backends.c.crc import CrcView
 from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
-from qlinkgen.backends.c.extents import Extent, extent
 from qlinkgen.backends.c.frames import FrameSection, frame_section
 from qlinkgen.backends.c.layout import Helper, Layouts
 from qlinkgen.backends.c.messages import MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
+from qlinkgen.backends.c.sizes import SizeView, size_view
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.model.message import Message
@@ -53,7 +53,7 @@ class Group:
     """What is known of the messages of a direction."""
 
     direction: str
-    messages: Sequence[framing.Expected | Extent]
+    messages: Sequence[framing.Expected | SizeView]
 
 
 class Header:
@@ -128,16 +128,18 @@ class Header:
         texts = ["\n", *(self._id_constant(message) for message in self._kept)]
         unheard = self._unheard()
         if view.bare:
-            admits = [Group(d, self._expected(messages)) for d, messages in received]
-            limited = any(each.admits for _, messages in received for each in self._expected(messages))
+            header_checks = [Group(d, self._expected(messages)) for d, messages in received]
+            limited = any(
+                each.address_allowed for _, messages in received for each in self._expected(messages)
+            )
             unused = [*unheard, *([view.address] if view.address and not limited else [])]
-            texts.append(self._place("admit", f=view, admits=admits, unused=unused))
-        if view.needs_extent:
-            sizes_known = [
-                Group(d, [extent(names, message, self._layouts) for message in heard])
+            texts.append(self._place("header_check", f=view, header_checks=header_checks, unused=unused))
+        if view.sized_by_message:
+            size_groups = [
+                Group(d, [size_view(names, message, self._layouts) for message in heard])
                 for d, heard in received
             ]
-            texts.append(self._place("extent", f=view, extents=sizes_known, unused=unheard))
+            texts.append(self._place("payload_size", f=view, size_groups=size_groups, unused=unheard))
         return texts
 
     def _expected(self, messages: Sequence[MessagePlan]) -> list[framing.Expected]:

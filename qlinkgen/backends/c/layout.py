@@ -9,8 +9,8 @@ from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import Scalar
 
 Chunks = tuple[Chunk, ...]
-#: What lies in bytes: an integer; parts of a frame have it as a integer.
-Whole = Integer | Scalar
+#: What lies in bytes: an integer; for parts of a frame an Integer.
+AnyInteger = Integer | Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Layouts:
     #: Widths of the C types of signed integers that the wire has fewer bits for.
     extended: set[int] = field(default_factory=set)
 
-    def put(self, integer: Whole, place: str, index: str, value: str) -> str:
+    def put(self, integer: AnyInteger, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
         if integer.size == 1:
             if integer.signed and integer.bits < 8:  # no sign in bits that the wire does not have
@@ -40,21 +40,21 @@ class Layouts:
             return f"{place}[{index}] = {value};"
         return f"{self._call('put', integer)}({pointer(place, index)}, {value});"
 
-    def get(self, integer: Whole, place: str, index: str) -> str:
-        """An expression for the unsigned value that is there, once it is known that nothing is a misfit."""
+    def get(self, integer: AnyInteger, place: str, index: str) -> str:
+        """An expression for the unsigned value at a place whose unused bits are known to be zero."""
         if integer.size == 1:
             return f"{place}[{index}]"
         return f"{self._call('get', integer)}({pointer(place, index)})"
 
-    def peek(self, integer: Whole, place: str, index: str) -> str:
-        """An expression for the unsigned value that is there, whatever the bits of no chunk are."""
+    def peek(self, integer: AnyInteger, place: str, index: str) -> str:
+        """An expression for the unsigned value at a place, unused bits masked out."""
         value, mask = self.get(integer, place, index), integer.chunks[0].mask
         if integer.size > 1 or mask == 0xFF:
             return value
         return f"({value} & {unsigned(mask, 8, hexadecimal=True)})"
 
-    def misfit(self, integer: Whole, place: str, index: str) -> str | None:
-        """A condition that holds where bits of no chunk are set, None where there are no such bits."""
+    def unused_bits(self, integer: AnyInteger, place: str, index: str) -> str | None:
+        """A condition that holds where unused bits are set, None if all bits are used."""
         if all(chunk.bits == 8 for chunk in integer.chunks):
             return None
         if integer.size == 1:
@@ -62,7 +62,7 @@ class Layouts:
                 f"({place}[{index}] & {unsigned(integer.chunks[0].mask ^ 0xFF, 8, hexadecimal=True)}) != 0U"
             )
         self._partial.add((integer.bits, integer.chunks))
-        return f"{self._call('misfit', integer)}({pointer(place, index)})"
+        return f"{self._call('unused_bits', integer)}({pointer(place, index)})"
 
     def extend(self, raw: str, bits: int) -> str:
         """An expression with the sign of so many bits in all upper bits."""
@@ -75,14 +75,14 @@ class Layouts:
         """The functions of every layout in use."""
         return [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
 
-    def _call(self, verb: str, integer: Whole) -> str:
+    def _call(self, verb: str, integer: AnyInteger) -> str:
         key = (integer.bits, integer.chunks)
         self._used.add((verb, *key))
         if key not in self._names:
             self._names[key] = self._name(integer)
         return f"{self.prefix}_{verb}_{self._names[key]}_"
 
-    def _name(self, integer: Whole) -> str:
+    def _name(self, integer: AnyInteger) -> str:
         if integer.byteorder:
             return f"u{integer.bits}_{'be' if integer.byteorder == 'big' else 'le'}"
         known = sum(1 for name in self._names.values() if name.startswith(f"u{integer.bits}_groups"))
@@ -115,7 +115,7 @@ class Layouts:
         masks = [(index, chunk.mask ^ 0xFF) for index, chunk in enumerate(chunks) if chunk.bits < 8]
         terms = " | ".join(f"(at[{index}] & {unsigned(mask, 8, hexadecimal=True)})" for index, mask in masks)
         return [
-            f"static inline bool {self.prefix}_misfit_{name}_(const uint8_t *at)",
+            f"static inline bool {self.prefix}_unused_bits_{name}_(const uint8_t *at)",
             "{",
             f"    return ({terms}) != 0U;",
             "}",

@@ -163,7 +163,7 @@ class PartWriter:
                     yield "}"
                 case IdPart() | AddressPart() if bare:
                     before.add(type(part))
-                    yield from self._admission(f"{reached}{end}U", before, directed)
+                    yield from self._header_check(f"{reached}{end}U", before, directed)
                 case IdPart() | AddressPart():
                     pass
                 case CheckPart() | PayloadPart() | MarkPart():
@@ -178,7 +178,7 @@ class PartWriter:
         if not all_there:
             yield f"total = payload + {self.head + self.envelope.trailer_size}U;"
 
-    def _admission(self, reached: str, before: set[type[Part]], directed: str) -> Iterator[str]:
+    def _header_check(self, reached: str, before: set[type[Part]], directed: str) -> Iterator[str]:
         """Number and address, as far as they are there, must be those of a message."""
         if IdPart not in before:
             return
@@ -186,7 +186,7 @@ class PartWriter:
         if self.envelope.address:
             found += f", {self.get(self.envelope.address) if AddressPart in before else '0U'}"
         yield f"if ({reached}) {{"
-        yield f"    status = {self.prefix}_admits_({directed}{found});"
+        yield f"    status = {self.prefix}_header_check_({directed}{found});"
         wrong = f"!= {self.prefix.upper()}_OK"
         if self.envelope.address and AddressPart not in before:
             wrong = f"== {self.prefix.upper()}_ERROR_UNKNOWN"

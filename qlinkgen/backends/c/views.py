@@ -20,9 +20,9 @@ class FrameView:
 
     Attributes:
         bare: message id and address alone tell a frame from noise.
-        needs_extent: the end of a frame follows from its message.
+        sized_by_message: the end of a frame follows from its message.
         body_size: bytes of the buffer that taking a frame apart needs.
-        seal_checked: a message says whether a check value follows.
+        check_optional: a message says whether a check value follows.
         max_wire: bytes of a receiver that holds whole frames, 0 for another one.
     """
 
@@ -39,13 +39,15 @@ class FrameView:
     pass_decode_direction: str
     check_name: str
     bare: bool
-    needs_extent: bool
+    sized_by_message: bool
     body_size: int
-    seal_checked: bool
+    check_optional: bool
     max_wire: int
 
 
-def frame_view(plan: Plan, *, body_size: int = 0, seal_checked: bool = False, max_wire: int = 0) -> FrameView:
+def frame_view(
+    plan: Plan, *, body_size: int = 0, check_optional: bool = False, max_wire: int = 0
+) -> FrameView:
     """What every frame has."""
     prefix, sender, receiver = plan.protocol.name, sender_of(plan.frame), plan.frame.receiver
     ring, directed = plan.protocol.directions == ("message",), _directed(plan)
@@ -64,9 +66,9 @@ def frame_view(plan: Plan, *, body_size: int = 0, seal_checked: bool = False, ma
         pass_decode_direction="direction, " if directed else "",
         check_name="message_check" if ring else answered,
         bare=isinstance(receiver, Rescan) and receiver.bare,
-        needs_extent=isinstance(receiver, Hunt | Rescan) and isinstance(plan.frame.end, ByMessage),
+        sized_by_message=isinstance(receiver, Hunt | Rescan) and isinstance(plan.frame.end, ByMessage),
         body_size=body_size,
-        seal_checked=seal_checked,
+        check_optional=check_optional,
         max_wire=max_wire,
     )
 
@@ -127,7 +129,7 @@ class PartsView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlainView:
-    """Seal and scan where the header is on the wire as it is; all lists are statements."""
+    """Wrap and scan for frames whose header is sent unstuffed; all lists are statements."""
 
     put_header: list[str]
     put_trailer: list[str]
@@ -139,7 +141,7 @@ class PlainView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StuffedView:
-    """Seal and scan where the finished frame is stuffed; ``lead_checks`` are conditions and bytes needed."""
+    """Wrap and scan for frames stuffed as a whole; ``lead_checks`` are conditions and bytes needed."""
 
     lead: int
     lead_bytes: list[str]

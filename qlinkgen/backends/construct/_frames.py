@@ -240,7 +240,7 @@ class Frame(Construct):
         """Bytes beside the payload of a message."""
         return sum(_size(part) for part in self.parts if message.checksum or part is not self.check)
 
-    def seal(
+    def wrap(
         self,
         message: Message,
         payload: bytes,
@@ -285,7 +285,7 @@ class Frame(Construct):
         if not _allowed(message, address):
             raise ValidationError(f"{message.name} cannot be sent to {self.address} {address!r}", path=path)
         payload = message.build(obj.get("fields") or {})
-        wire = self.seal(message, payload, address, context._params.get("request", b""))
+        wire = self.wrap(message, payload, address, context._params.get("request", b""))
         stream_write(stream, wire, len(wire), path)
         return obj
 

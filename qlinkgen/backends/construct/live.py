@@ -31,12 +31,12 @@ class Live:
         """The payload of a message; fields that are not given have their defaults."""
         return bytes(self.messages[message].build(fields))
 
-    def seal(
+    def wrap(
         self, message: str, payload: bytes, address: int = 0, request: bytes = b"", number: int | None = None
     ) -> bytes:
         """The frame around a payload, whatever the payload is; ``number`` replaces the message id."""
         frame = next(each for each in self.frames.values() if message in each.by_name)
-        return bytes(frame.seal(self.messages[message], payload, address, request, number))
+        return bytes(frame.wrap(self.messages[message], payload, address, request, number))
 
     def parse(self, direction: str, wire: bytes, request: bytes = b"") -> Value:
         """Message, address and fields of exactly one frame. Raises construct's ConstructError."""

@@ -392,7 +392,7 @@ def _check_letter(check: Check, byteorder: ByteOrder) -> str:
     return {1: "B", 2: "H", 4: "I"}.get(check.size, "")
 
 
-def seal_lines(view: UniqueView, fixed: int | None) -> list[str]:
+def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
     """The last step of an encoder; ``fixed`` is the size of the body where that is always the same."""
     size = view.check.size
     parts = [f"crc >> {8 * index}" if index else "crc" for index in range(size)]

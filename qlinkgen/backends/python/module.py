@@ -136,7 +136,7 @@ class Module:
         texts = [
             template.render(
                 each=each,
-                seal=self._seal(each, view) if each.has_codec else [],
+                wrap=self._wrap(each, view) if each.has_codec else [],
                 encoder="to_frame" if whole else "to_bytes",
                 encoder_doc=f"The {kind}. Raises EncodeError.",
                 data=self.place.data,
@@ -146,12 +146,12 @@ class Module:
         return "".join(texts).strip("\n")
 
     @staticmethod
-    def _seal(each: ClassModel, view: FrameView) -> list[str]:
+    def _wrap(each: ClassModel, view: FrameView) -> list[str]:
         match view:
             case UniqueView():
-                return frames.seal_lines(view, each.body_size)
+                return frames.wrap_lines(view, each.body_size)
             case PartsView():
-                return ["return _sealed(body)"]
+                return ["return _wrapped(body)"]
             case MarkedView() | PacketView():
                 return []
 

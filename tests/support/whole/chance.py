@@ -47,11 +47,11 @@ def wrong_frames(
     found = [_spoilt(wire, rng) for _ in range(3)]
     found += [wire[: rng.randrange(len(wire) + 1)], wire + bytes([rng.randrange(256)])]
     for _ in range(4):
-        found += sealed(reference, message, payload, place, rng, request=request)
+        found += wrapped(reference, message, payload, place, rng, request=request)
     return found
 
 
-def sealed(
+def wrapped(
     reference: Reference,
     message: Message,
     payload: bytes,
@@ -62,7 +62,7 @@ def sealed(
 ) -> list[bytes]:
     """A good frame around a payload that may be wrong, if one can hold it."""
     spoilt = _spoilt(payload, rng)
-    return [reference.seal(message.name, spoilt, place, request)] if fits(reference, spoilt) else []
+    return [reference.wrap(message.name, spoilt, place, request)] if fits(reference, spoilt) else []
 
 
 def fits(reference: Reference, payload: bytes) -> bool:

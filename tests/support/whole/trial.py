@@ -356,9 +356,9 @@ class _Trial:
             given, place = chance.values(message, self.rng, self.mark), chance.address(message, self.rng)
             payload, wire = self.reference.encode(message.name, given, place)
             frames.append(wire)
-            odd += chance.sealed(self.reference, message, payload, place, self.rng)
+            odd += chance.wrapped(self.reference, message, payload, place, self.rng)
             if chance.fits(self.reference, wire):
-                nested.append(self.reference.seal(message.name, wire, place))
+                nested.append(self.reference.wrap(message.name, wire, place))
         return [*sorted(frames, key=len)[:2], *sorted(odd, key=len)[:1], *sorted(nested, key=len)[:1]]
 
     def _stream(self, direction: Direction, data: bytes, asked: tuple[bytes, ...] = ()) -> None:

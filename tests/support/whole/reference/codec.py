@@ -67,16 +67,16 @@ class Reference:
         if not message.allows(address):
             raise Wrong("range", "address")
         payload = values.encode(message, given)
-        return payload, self.seal(name, payload, address, request)
+        return payload, self.wrap(name, payload, address, request)
 
-    def seal(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
+    def wrap(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
         """The wire bytes around a payload, whatever it is."""
         message, frame = self.by_name[name], self.frame
         if isinstance(frame, Frame):
-            return frame.seal(message.number, payload, address)
+            return frame.wrap(message.number, payload, address)
         if isinstance(frame, Marked):
-            return frame.seal(message, payload, address)
-        return frame.seal(message, payload, request)
+            return frame.wrap(message, payload, address)
+        return frame.wrap(message, payload, request)
 
     def decode(self, direction: Direction, wire: bytes, request: bytes = b"") -> Seen:
         """What exactly one frame says. Raises Wrong."""
@@ -92,7 +92,7 @@ class Reference:
         if isinstance(self.frame, Frame):
             event = Searcher(self.frame, known).whole(wire)
         else:
-            self.frame.check_extent(wire)
+            self.frame.check_ends(wire)
             event = MarkedReceiver(self.frame, known).ended(wire)
         if event.kind != "message":
             raise Wrong(event.kind)

@@ -133,7 +133,7 @@ class Frame:
 
     # Building
 
-    def seal(self, number: int, payload: bytes, address: int) -> bytes:
+    def wrap(self, number: int, payload: bytes, address: int) -> bytes:
         """The wire bytes around a payload, whatever it is."""
         if self.stuffing and self.stuffing.payload_alone:
             payload = self.stuffing.stuff(payload)

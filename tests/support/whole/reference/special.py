@@ -30,7 +30,7 @@ class Marked:
         """The id bits are those of an end."""
         return self._bits(byte, self._message) == self._end
 
-    def seal(self, message: Message, payload: bytes, address: int) -> bytes:
+    def wrap(self, message: Message, payload: bytes, address: int) -> bytes:
         """The wire bytes around a payload."""
         place = self.marker | address << self._address[0]
         first, last = place | message.number << self._message[0], place | self._end << self._message[0]
@@ -42,7 +42,7 @@ class Marked:
         covered = payload if "payload" in self._check.spec["over"] else b""
         return put(self._check.pieces, checks.compute(self._check.spec["algorithm"], covered))
 
-    def check_extent(self, wire: bytes) -> None:
+    def check_ends(self, wire: bytes) -> None:
         """Refuse bytes that are not one header, and an end after bytes without the marker. Raises Wrong."""
         marks = [at for at, byte in enumerate(wire) if byte & self.marker]
         if not wire or (marks == [0] and not self.is_end(wire[0])):
@@ -80,7 +80,7 @@ class Packets:
         check = self._check.size if self._check and message.direction == "response" else 0
         return message.sizes[1] + (check if message.direction == "response" else 1)
 
-    def seal(self, message: Message, payload: bytes, request: bytes) -> bytes:
+    def wrap(self, message: Message, payload: bytes, request: bytes) -> bytes:
         """A request, or a response to one."""
         if message.direction == "request":
             return bytes([message.number]) + payload

@@ -93,19 +93,19 @@ class Learner:
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class SizeView:
     """The statements that find the size of a message."""
 
     constant: str
     lines: list[str]
 
 
-def extent(names: Names, message: MessagePlan, layouts: Layouts) -> Extent:
+def size_view(names: Names, message: MessagePlan, layouts: Layouts) -> SizeView:
     """How the size of a message is found."""
-    return Extent(names.constant(message.message), _extent(Learner(message.payload, layouts)))
+    return SizeView(names.constant(message.message), _statements(Learner(message.payload, layouts)))
 
 
-def _extent(learner: Learner) -> list[str]:
+def _statements(learner: Learner) -> list[str]:
     """Lines of the case, which return in the end."""
     upper = learner.layouts.prefix.upper()
     ok, truncated = f"{upper}_OK", f"{upper}_ERROR_TRUNCATED"
