@@ -1,16 +1,16 @@
-"""What a protocol means for code: decided here once, printed by every back-end.
+"""The plan: layout, framing and receiving of a protocol, decided once for all back-ends.
 
-The model says what the document states. The plan says what follows from it: where each field's bytes begin,
-how many items a field of variable size has, which bytes a check value covers, how a receiver finds the next
-frame. It is a frozen tree of small classes without a word of the schema's prose in its steps, so equal
-layouts are equal objects.
+The model holds what the document states. The plan holds what follows from it: the offset of each field, the
+number of items of a field of variable size, the bytes that a check value covers, how a receiver finds the
+next frame. It is a frozen tree of small classes. Steps hold no text of the schema, so equal layouts compare
+equal.
 
-* `select` keeps what an output is for: a role, some messages.
+* `select` filters messages by role and name.
 * `payload` turns the fields of a message into steps.
 * `framing` turns a frame into parts, their `transparency`, their `check` and the `receiver` that finds them.
-* `codec` and `receive` run the plan without generating code: the reference for every target. `dissect` says
-  what each byte of a frame is.
-* `describe` has the words for parts and steps. docs/plan.md shows them.
+* `codec` and `receive` interpret the plan: the reference for every target. `dissect` explains each byte of a
+  frame.
+* `describe` puts parts and steps into words. docs/plan.md shows them.
 """
 
 from __future__ import annotations

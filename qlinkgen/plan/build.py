@@ -1,4 +1,4 @@
-"""From the model to the plan."""
+"""Builds the plan of a protocol from its model."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _message(frame: FramePlan, message: Message, options: Options) -> MessagePla
 
 
 def _growth(frame: FramePlan, envelope: Envelope, message: Message) -> int:
-    """Most bytes that transparency adds to a frame of the message."""
+    """Maximum number of bytes that transparency adds to a frame of the message."""
     transparency = frame.transparency
     match transparency:
         case Plain() | SevenBit():
@@ -78,7 +78,7 @@ def _growth(frame: FramePlan, envelope: Envelope, message: Message) -> int:
 
 
 def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
-    """Bytes of a part that may be stuffed ones; a value's known range leaves many of them out."""
+    """Maximum number of bytes of a part that need stuffing; the range of a value rules many out."""
     after = stuffing.rule.after
     if len(after) > 1:
         return message.max_size if isinstance(part, PayloadPart) else part.size

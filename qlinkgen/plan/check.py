@@ -1,4 +1,4 @@
-"""The check value of a frame: over which bytes, and how it is sent."""
+"""The check value of a frame: the bytes it covers and its encoding."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Check:
 
     Attributes:
         value: algorithm, wire bytes and covered parts, as the document states them.
-        word: bytes that a sum adds as one big-endian number; 1 where it adds bytes.
-        chained: the sum continues over the request that is answered: its id as a number, then its payload.
-        rejected: the value by which a request is refused, None where there is none.
+        word: size of the big-endian words that a sum adds; 1 for a sum of bytes.
+        chained: the sum includes the request: its id as a number, then its payload.
+        rejected: the value that signals a refused request, None if there is none.
     """
 
     value: Checksum
@@ -27,7 +27,7 @@ class Check:
 
     @property
     def algorithm(self) -> Algorithm | Sum:
-        """How the value is computed."""
+        """The algorithm that computes the value."""
         return self.value.algorithm
 
     @property
@@ -37,7 +37,7 @@ class Check:
 
     @property
     def over(self) -> tuple[str, ...]:
-        """Names of the parts covered, in wire order."""
+        """Names of the covered parts, in wire order."""
         return self.value.over
 
     @property
@@ -47,16 +47,16 @@ class Check:
 
     @property
     def regular(self) -> ByteOrder | None:
-        """Byte order of a value that is sent whole, None where bits are left out or regrouped."""
+        """Byte order of a value that is sent whole, None if bits are omitted or regrouped."""
         return self.value.regular
 
     @property
     def complete(self) -> bool:
-        """Every bit of the value is sent."""
+        """Whether every bit of the value is sent."""
         return self.mask == self.algorithm.mask
 
     def of(self, *runs: bytes, start: int = 0) -> int:
-        """The value over runs of bytes; a sum takes words of each run apart, and ``start`` first."""
+        """The value over runs of bytes; a sum begins with ``start`` and splits each run into words."""
         if isinstance(self.algorithm, Algorithm):
             return self.algorithm.compute(b"".join(runs))
         words = [run[at : at + self.word] for run in runs for at in range(0, len(run), self.word)]
@@ -67,5 +67,5 @@ class Check:
         return self.value.pack(value)
 
     def unpack(self, data: bytes) -> int:
-        """The value in its wire bytes; bits that are not sent are 0."""
+        """The value of wire bytes; bits that are not sent are 0."""
         return unpack_chunks(data, self.value.chunks)

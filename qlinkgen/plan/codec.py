@@ -1,21 +1,21 @@
-"""Runs a frame plan, messages to wire bytes and back: the reference for every target.
+"""Interprets a plan: encodes and decodes messages as the reference for every target.
 
-The checks of a whole frame come in one order, the same in every target:
+Every target checks a whole frame in this order:
 
-1. no bytes at all, or fewer than the frame has: ``truncated``;
-2. in wire order, up to the end of the header: a constant that is another one is ``frame``; an inserted byte
-   that is another one is ``stuffing``; a length that no frame has is ``length``; without a length, a message
-   number that is not known is ``unknown``, and a count that its run cannot have is ``length``;
-3. a constant after the payload is ``frame``; a payload stuffed alone with a wrong inserted byte is
-   ``stuffing``, one that is too long is ``length``;
+1. data that is empty or shorter than the frame: ``truncated``;
+2. in wire order, up to the end of the header: a wrong constant is ``frame``, a wrong inserted byte
+   ``stuffing``, a length out of range ``length``; in a frame without a length an unknown message number is
+   ``unknown``, and a count out of range ``length``;
+3. a wrong constant after the payload: ``frame``; where only the payload is stuffed, a wrong inserted byte is
+   ``stuffing`` and a payload that is too long ``length``;
 4. bytes after the end: ``length``;
-5. the check value: ``crc``, or ``illegal`` where it is that of a refusal;
+5. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
 6. a message number that the direction does not have: ``unknown``;
-7. the payload: its sizes are ``length``, then its values ``range``; at last the address, ``range``.
+7. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address, ``range``.
 
-A marked frame has no length: fewer or more bytes than its message can have are ``frame``, as are a header or
-an end that does not fit, and bytes after the end. In a frame without leading constants an unknown number or
-a forbidden address is found in step 2.
+A marked frame has no length: a payload size that its message cannot have is ``frame``, as are a wrong header
+or end, and bytes after the end. In a frame without leading constants an unknown number or an illegal address
+is found in step 2.
 """
 
 from __future__ import annotations
@@ -45,19 +45,19 @@ from qlinkgen.plan.reading import Astray, BadFrame, FrameReader, Missing, Taken,
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
-#: Parts whose bytes do not depend on those of others.
+#: Parts whose bytes do not depend on other parts.
 Unchecked = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | PayloadPart
 
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """A message that was received.
+    """A received message.
 
     Attributes:
-        message: which one.
-        address: the address in its frame, None where that has none.
-        values: by name, as they are on the wire.
-        payload: its bytes, without stuffing.
+        message: its plan.
+        address: the address in its frame, None if the frame has none.
+        values: raw values by field name.
+        payload: the unstuffed payload.
     """
 
     message: MessagePlan
@@ -70,7 +70,7 @@ class Codec:
     """Encodes and decodes the messages of a plan."""
 
     def __init__(self, plan: Plan) -> None:
-        """``plan`` is what is run."""
+        """Interpret ``plan``."""
         self.plan = plan
 
     # To the wire
@@ -78,7 +78,7 @@ class Codec:
     def encode(
         self, name: str, values: Mapping[str, Raw], address: int | None = None, request: bytes = b""
     ) -> bytes:
-        """The frame of a message; ``request`` is the packet that is answered. Raises Unsendable."""
+        """The frame of a message; ``request`` is the packet that it answers. Raises Unsendable."""
         message = self.plan.message(name)
         whom = message.message.default_address if address is None else address
         if message.allowed is not None and not message.allowed.holds(whom):
@@ -86,17 +86,17 @@ class Codec:
         return self.wrap(name, content.pack(message.payload, values), whom, request)
 
     def wrap(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """The frame of a payload that may be wrong, right in all else."""
+        """A valid frame around a payload, which is not checked."""
         message = self.plan.message(name)
         return self.join(message, self.cells(message, self.sent(payload), address), request)
 
     def sent(self, payload: bytes) -> bytes:
-        """The payload as a length counts it: with its inserted bytes, where it is stuffed alone."""
+        """The payload as a length counts it: with inserted bytes if only the payload is stuffed."""
         transparency = self.plan.frame.transparency
         return transparency.rule.stuff(payload) if isinstance(transparency, PayloadStuffing) else payload
 
     def cells(self, message: MessagePlan, sent: bytes, address: int = 0) -> dict[str, bytes]:
-        """The bytes of each part but the check value."""
+        """The bytes of each part except the check value."""
         return {
             part.name: _cell(part, sent, message.id, address)
             for part in message.envelope.parts
@@ -104,7 +104,7 @@ class Codec:
         }
 
     def join(self, message: MessagePlan, cells: Mapping[str, bytes], request: bytes = b"") -> bytes:
-        """The frame of these parts as it is sent; a check value that is not among them is the right one."""
+        """The frame of these parts as sent; computes the check value if it is not among them."""
         part, transparency = message.envelope.check, self.plan.frame.transparency
         if part is not None and part.name not in cells:
             cells = {**cells, part.name: part.check.pack(self.check_value(message.envelope, cells, request))}
@@ -118,7 +118,7 @@ class Codec:
                 assert_never(transparency)
 
     def check_value(self, envelope: Envelope, cells: Mapping[str, bytes], request: bytes = b"") -> int:
-        """The check value over the bytes of the covered parts, as they are sent."""
+        """The check value over the bytes of the covered parts as sent."""
         part = envelope.check
         assert part is not None
         if part.check.chained:
@@ -128,7 +128,7 @@ class Codec:
     # From the wire
 
     def decode(self, wire: bytes, direction: Direction, request: bytes = b"") -> Decoded:
-        """The message of exactly one frame; ``request`` is the packet that is answered. Raises BadFrame."""
+        """The message of exactly one frame; ``request`` is the packet that it answers. Raises BadFrame."""
         if not wire:
             raise BadFrame("truncated", 0)
         try:
@@ -155,7 +155,7 @@ class Codec:
                 assert_never(frame.receiver)
 
     def judge(self, taken: Taken, direction: Direction, request: bytes = b"") -> Decoded:
-        """The message of a frame that was taken off the wire. Raises BadFrame."""
+        """Check a frame whose parts have been read and decode its message. Raises BadFrame."""
         message = self.plan.known(direction).get(-1 if taken.number is None else taken.number)
         envelope = message.envelope if message else self.plan.frame.envelopes[direction]
         if part := envelope.check:

@@ -1,6 +1,6 @@
-"""Runs the steps of a payload: values to bytes and back, without generating code.
+"""Interprets the steps of a payload: encodes values to bytes and decodes them.
 
-Values are raw: an integer as it is on the wire, bytes for bytes and text, a list of integers for an array.
+Values are raw: the integer on the wire, bytes for bytes and text, a list of integers for an array.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ class Unsendable(ValueError):
     """A value that cannot be sent; ``field`` names it."""
 
     def __init__(self, field: str, value: object) -> None:
-        """Word the message."""
+        """Compose the error text."""
         super().__init__(f"{field}: {value!r} cannot be sent")
         self.field = field
 
 
 class BadContent(ValueError):
-    """Bytes that are not a payload of the message.
+    """Bytes that are not a valid payload of the message.
 
     Attributes:
         kind: length or range.
-        field: what is wrong, "" where it is the size of the whole.
-        offset: where it begins in the payload.
+        field: the wrong field, "" if the size of the payload is wrong.
+        offset: its offset in the payload.
     """
 
     def __init__(self, kind: str, field: str = "", offset: int = 0) -> None:
-        """Word the message."""
+        """Compose the error text."""
         super().__init__(f"{kind}: {field or 'payload'} at {offset}")
         self.kind = kind
         self.field = field
@@ -59,11 +59,11 @@ class BadContent(ValueError):
 
 
 class MoreNeeded(Exception):
-    """The bytes so far do not tell how long the payload is.
+    """The size of the payload does not follow from the bytes so far.
 
     Attributes:
-        least: fewest bytes that it has.
-        needed: bytes up to the end of the next count.
+        least: minimum size of the payload.
+        needed: number of bytes up to the end of the next count.
     """
 
     def __init__(self, least: int, needed: int) -> None:
@@ -77,14 +77,14 @@ class MoreNeeded(Exception):
 
 
 def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
-    """The payload with these values; one that is missing has its default. Raises Unsendable."""
+    """The payload with these values, defaults for missing ones. Raises Unsendable."""
     whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
     counts = {run.name: _count(run, whole[run.name]) for run in plan.runs}
     return b"".join(_packed(step, whole, counts) for step in plan.steps)
 
 
 def default_of(each: ValueStep | Member | RunStep) -> Raw:
-    """What is sent where the caller gives nothing."""
+    """The default of a field."""
     match each:
         case ValueStep() | Member():
             return each.number.default
@@ -145,7 +145,7 @@ def _count(step: RunStep, value: object) -> int:
 
 
 def broken(rules: tuple[Condition, ...], value: int) -> bool:
-    """A condition does not hold of a number."""
+    """Whether a number violates one of the conditions."""
     return not all(rule.holds(value) for rule in rules)
 
 
@@ -153,7 +153,7 @@ def broken(rules: tuple[Condition, ...], value: int) -> bool:
 
 
 def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
-    """The values of a payload: its sizes first, then every step in wire order. Raises BadContent."""
+    """The values of a payload; checks sizes first, then each step in wire order. Raises BadContent."""
     if not payload and plan.empty_is_default:
         return {each.name: default_of(each) for each in plan.settable}
     counts = count_items(plan, payload)
@@ -165,7 +165,7 @@ def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
 
 
 def count_items(plan: PayloadPlan, payload: bytes) -> dict[str, int]:
-    """Items of each run of variable size. Raises BadContent with the kind length where sizes disagree."""
+    """Number of items of each run of variable size. Raises BadContent of kind length."""
     if not plan.least <= len(payload) <= plan.most:
         raise BadContent("length")
     counts: dict[str, int] = {}
@@ -189,9 +189,9 @@ def count_items(plan: PayloadPlan, payload: bytes) -> dict[str, int]:
 
 
 def measure(plan: PayloadPlan, start: bytes) -> int:
-    """The size of the payload that begins so, where its counts alone tell it.
+    """The size of the payload that begins with ``start``, derived from its counts.
 
-    Raises MoreNeeded while counts are missing, BadContent where one is not allowed.
+    Raises MoreNeeded while counts are missing, BadContent if one is out of range.
     """
     counts = {run.name: run.length.minimum for run in plan.runs}
     for each in plan.sizing:
@@ -219,7 +219,7 @@ def _number(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:
 
 
 def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> dict[str, Raw]:
-    """The values of one step whose bytes begin ``data``."""
+    """The values of the step at the beginning of ``data``."""
     match step:
         case ValueStep():
             return {step.name: _valid(step.name, step.integer, step.conditions, data, at)}
@@ -245,7 +245,7 @@ def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> di
 
 
 def _valid(name: str, integer: Integer, rules: tuple[Condition, ...], data: bytes, at: int) -> int:
-    """The integer that begins ``data``, if its bytes are those of one and it keeps the rules."""
+    """The integer at the beginning of ``data``, checked against the rules."""
     own = data[: integer.size]
     value = integer.unpack(own)
     if integer.stray(own) or broken(rules, value):

@@ -1,4 +1,4 @@
-"""The plan in words: what parts and steps hold, for tables, comments and documentation."""
+"""The plan in words: texts on parts and steps for tables, comments and documentation."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, Se
 
 
 def span_text(low: object, high: object) -> str:
-    """``low..high``, or one number where they are the same."""
+    """``low..high``, or one number if they are equal."""
     return str(low) if low == high else f"{low}..{high}"
 
 
@@ -73,7 +73,7 @@ def limits_text(scalar: Scalar) -> str:
 
 
 def range_text(scalar: Scalar) -> str:
-    """Legal values in the unit; "" for a bool, an enum or flags that may hold anything."""
+    """Legal values in the unit; "" for a bool, enum or flags without limits."""
     match scalar.role:
         case Constant():
             return f"always {number_text(scalar.physical(scalar.default))}"
@@ -120,7 +120,7 @@ def value_text(scalar: Scalar, raw: int) -> str:
 
 
 def number_of(step: Step | Member) -> Scalar | None:
-    """What the number of a step means, or that of each of its items; None where it holds no value."""
+    """The number of a step, or of each of its items; None if it does not hold a value."""
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep() | Member():
             return step.number
@@ -131,7 +131,7 @@ def number_of(step: Step | Member) -> Scalar | None:
 
 
 def type_text(step: Step | Member) -> str:
-    """A type as a schema would name it: u16, i32 little, text[1..256], u16[0..12]."""
+    """A type in schema notation: u16, i32 little, text[1..256], u16[0..12]."""
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | Member():
             return _scalar_text(step.number)
@@ -181,7 +181,7 @@ def _length_text(length: Length) -> str:
 
 
 def holds_text(step: Step | Member) -> str:
-    """What a step may hold, beyond its type: a range, a constant, or what it counts."""
+    """The content of a step beyond its type: a range, a constant, or the run that it counts."""
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep() | Member():
             return range_text(step.number)
@@ -196,7 +196,7 @@ def holds_text(step: Step | Member) -> str:
 
 
 def kind_text(step: Step | Member) -> str:
-    """What a step does, in a word."""
+    """The kind of a step, in a word."""
     match step:
         case ValueStep() | Member():
             return "value"
@@ -217,7 +217,7 @@ def kind_text(step: Step | Member) -> str:
 
 
 def must_text(step: Step | Member) -> str:
-    """What must hold of the raw number of a step, or of each of its items, beyond what its bits can hold."""
+    """Conditions on the raw number of a step, or of each of its items, beyond the limits of its bits."""
     match step:
         case ValueStep() | ItemsStep() | Member():
             return " and ".join(map(condition_text, step.conditions))
@@ -236,7 +236,7 @@ def must_text(step: Step | Member) -> str:
 
 
 def count_unit(step: CountStep) -> str:
-    """What a count counts."""
+    """The unit of a count."""
     return "items" if step.scale == 1 else "bytes"
 
 
@@ -260,7 +260,7 @@ def condition_text(rule: Condition) -> str:
 
 
 def sizing_text(each: Sizing) -> str:
-    """How the number of items of a run is found."""
+    """The derivation of the number of items of a run."""
     match each:
         case Learn():
             count, bounds = each.count, condition_text(each.count.bounds)
@@ -284,7 +284,7 @@ def _counted_text(count: CountStep) -> str:
 
 
 def part_text(part: Part, frame: FramePlan) -> str:
-    """What a part of a frame holds."""
+    """The content of a part of a frame."""
     match part:
         case ConstantPart():
             return part.data.hex(" ").upper()
@@ -321,7 +321,7 @@ def _sent_bits_text(check: Check) -> str:
 
 
 def id_text(frame: FramePlan, number: int) -> str:
-    """A message id as its frame carries it: hexadecimal where it has bytes of its own."""
+    """A message id: decimal if it shares a byte, otherwise hexadecimal."""
     end = frame.end
     match end:
         case ByMark():
@@ -333,14 +333,14 @@ def id_text(frame: FramePlan, number: int) -> str:
 
 
 def end_text(frame: FramePlan) -> str:
-    """What tells where a frame ends."""
+    """The rule that determines the end of a frame."""
     end = frame.end
     match end:
         case ByLength():
             bias = f" - {end.part.bias}" if end.part.bias else ""
             return f"the payload has {end.part.name}{bias} bytes"
         case ByMessage():
-            return "the message and the counts in its payload tell its size"
+            return "the size follows from the message and the counts in its payload"
         case ByMark():
             return f"the next byte with bit 0x{end.header.marker:02X} set"
         case _:
@@ -348,7 +348,7 @@ def end_text(frame: FramePlan) -> str:
 
 
 def transparency_text(frame: FramePlan) -> str:
-    """How the bytes of a frame travel."""
+    """The stuffing of a frame."""
     way, envelope = frame.transparency, frame.envelope
     match way:
         case Plain():
@@ -372,25 +372,25 @@ def _after_text(way: FrameStuffing | PayloadStuffing) -> str:
 
 
 def receiver_text(frame: FramePlan) -> tuple[str, str]:
-    """How a receiver finds frames, and why so."""
+    """The strategy of a receiver, and its reason."""
     way, preamble = frame.receiver, frame.envelope.preamble.hex(" ").upper()
     match way:
         case Hunt():
             return "hunt", (
-                f"{preamble} appears nowhere inside a frame, so every byte is looked at once and nothing but "
-                "the frame itself is kept"
+                f"{preamble} does not occur inside a frame, so each byte is processed once and only the frame "
+                "itself is buffered"
             )
         case Rescan():
-            seen = f"{preamble} may also be data" if preamble else "no constant begins a frame"
+            seen = f"{preamble} may also be data" if preamble else "frames do not begin with a constant"
             proof = (
-                "the check value proves a frame, so one with wrong contents is skipped as a whole"
+                "a frame with a valid check value but wrong contents is skipped as a whole"
                 if way.verified
-                else "no check value proves a frame"
+                else "frames have no check value"
             )
-            return "rescan", f"{seen}, so a failed search goes on from the next byte; {proof}"
+            return "rescan", f"{seen}, so after a failure the search continues at the next byte; {proof}"
         case Marks():
-            return "marks", "a bit tells header and end from all other bytes"
+            return "marks", "header and end have a marker bit that all other bytes lack"
         case InStep():
-            return "in step", "nothing marks a packet, so both sides must agree where one begins"
+            return "in step", "packets have no delimiter, so both sides must stay in step"
         case _:
             assert_never(way)

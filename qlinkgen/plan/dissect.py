@@ -1,8 +1,8 @@
-"""Says what each byte of one frame is, and which rules the frame breaks.
+"""Assigns each byte of a frame to a span, and lists the rules that the frame violates.
 
-`Codec.decode` stops at the first fault; `dissect` goes on, so that every byte belongs to a span. Both agree:
-`Dissection.kind` is what `decode` raises, and one of `Dissection.faults` has that kind. A fault that only
-follows from another one is not listed: after a wrong inserted byte, say, the check value is not judged.
+`Codec.decode` stops at the first fault; `dissect` continues until every byte belongs to a span. Both agree:
+`Dissection.kind` is the kind that `decode` raises, and one of `Dissection.faults` has it. Consequences of
+another fault are not listed: after a wrong inserted byte, for example, the check value is not checked.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Named = Part | Step | Member | None
 
 
 def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"") -> Dissection:
-    """Dissect exactly one frame; ``request`` is the packet that a response answers."""
+    """Dissect exactly one frame; ``request`` is the packet that it answers."""
     codec = Codec(plan)
     try:
         codec.decode(wire, direction, request)
@@ -53,7 +53,7 @@ def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"")
 
 
 def request_size(plan: Plan, wire: bytes) -> int:
-    """Bytes of the packet that begins ``wire``; all of them where that cannot be told."""
+    """Size of the packet at the beginning of ``wire``; the size of ``wire`` if it cannot be determined."""
     message = plan.known("request").get(wire[0]) if wire else None
     if message is None:
         return len(wire)
@@ -66,23 +66,23 @@ def request_size(plan: Plan, wire: bytes) -> int:
 
 
 class _Cursor(Cursor):
-    """Takes a wrong inserted byte for a byte of the frame, and goes on."""
+    """Takes a wrong inserted byte as a byte of the frame and continues."""
 
     def __init__(self, wire: bytes, at: int, stuffing: FrameStuffing | None, *, hunting: bool) -> None:
         super().__init__(wire, at, stuffing.rule if stuffing else None, hunting=hunting)
-        #: Places at which an inserted byte is due and another one is.
+        #: Offsets of wrong inserted bytes.
         self.wrong: list[int] = []
-        #: Where a new frame begins inside this one.
+        #: Offset of a new frame inside this one.
         self.next: int | None = None
 
     def some(self, size: int, *, stuffed: bool) -> None:
-        """Take so many bytes, or all that there are."""
+        """Take ``size`` bytes, or all that are left."""
         if self.next is None:
             with suppress(Missing):
                 self.take(size, stuffed=stuffed)
 
     def misplaced(self, *, again: bool) -> None:
-        """Note it."""
+        """Record the offset."""
         if again:
             self.at = self.next = self.at - 2
             raise Missing
@@ -91,7 +91,7 @@ class _Cursor(Cursor):
 
 
 class _Walk:
-    """Divides one frame into parts, then judges them."""
+    """Divides one frame into parts, then checks them."""
 
     def __init__(self, codec: Codec, wire: bytes, direction: Direction, request: bytes, kind: str) -> None:
         self.codec, self.plan, self.frame = codec, codec.plan, codec.plan.frame
@@ -111,13 +111,13 @@ class _Walk:
         self.wanted: dict[str, int] = {}
         self.spans: list[Span] = []
         self.faults: list[Fault] = []
-        #: The preamble is not there: what is taken for the length may be anything.
+        #: The preamble is missing, so the length may be any byte.
         self.astray = False
-        #: A count cannot be: the payload is taken to be what is left.
+        #: A count is out of range; the payload is assumed to be the rest.
         self.miscounted = False
 
     def run(self) -> Dissection:
-        """The whole."""
+        """Dissect the frame."""
         front = self._begin()
         if front is not None:
             self._divide(front)
@@ -135,7 +135,7 @@ class _Walk:
     # Places
 
     def _begin(self) -> tuple[Part, ...] | None:
-        """Find the beginning; the parts to take before the payload, None where there is no frame."""
+        """Find the beginning. Returns the parts to take before the payload, None without a frame."""
         first, *others = self.envelope.parts
         match first:
             case ConstantPart() if self.kind == "frame" and not self.wire.startswith(first.data):
@@ -164,7 +164,7 @@ class _Walk:
         return bool(byte & part.marker) and part.id_of(byte) != self.frame.end.end.end_id
 
     def _lost(self, first: ConstantPart) -> None:
-        """The preamble is nowhere: it may end with the first bytes, and a check value may cover it."""
+        """Handle a missing preamble: the first bytes may be its end, and a check value may cover it."""
         self.astray = True
         self._fault("frame", Rule.BEGINNING, 0, first)
         ends = (first.data[at:] for at in range(1, first.size))
@@ -175,7 +175,7 @@ class _Walk:
         self.cursor.at = len(rest)
 
     def _divide(self, front: Sequence[Part]) -> None:
-        """Take the parts one after the other."""
+        """Take the parts in wire order."""
         for part in front:
             self._take(part, part.size)
             if isinstance(part, LengthPart) and not self.astray:
@@ -190,14 +190,14 @@ class _Walk:
             self._take(part, self.wanted.get(part.name, part.size))
 
     def _interrupted(self, part: MarkPart) -> bool:
-        """A header is where the end should be."""
+        """Whether a header occurs in place of the end."""
         at = self.cursor.at
         if at < len(self.wire) and self._is_header(part, self.wire[at]):
             self.cursor.next = at
         return self.cursor.next is not None
 
     def _take(self, part: Part, size: int) -> None:
-        """Take a part, after what was taken of it already."""
+        """Take a part, or the rest of it."""
         before = self._found(part)
         taken = len(self.cursor.places)
         self.cursor.some(size, stuffed=part.name in self.stuffed)
@@ -225,7 +225,7 @@ class _Walk:
         self._take(part, max(0, size))
 
     def _marked_size(self, end: ByMark) -> int:
-        """Bytes of payload between two marks; where they are too few for a check value, there is none."""
+        """Size of the payload between two marks; without room for a check value none is assumed."""
         rest = self.wire[self.cursor.at :]
         between = next((at for at, byte in enumerate(rest) if byte & end.header.marker), None)
         least = self.message.payload.least if self.message else 0
@@ -239,7 +239,7 @@ class _Walk:
         return between - beside
 
     def _measured(self, part: PayloadPart) -> int:
-        """Bytes still to take of a payload whose counts tell its size."""
+        """Bytes still to take of a payload whose size follows from its counts."""
         if self.message is None:
             return self._left() - self.envelope.trailer_size
         while True:
@@ -255,7 +255,7 @@ class _Walk:
                 return self._left() - self.envelope.trailer_size
 
     def _left(self) -> int:
-        """Bytes that are left, without inserted ones."""
+        """Number of bytes left, without inserted ones."""
         cursor = _Cursor(self.wire, self.cursor.at, self.whole, hunting=False)
         cursor.due = self.cursor.due
         if self.cursor.next is None:
@@ -263,7 +263,7 @@ class _Walk:
         return len(cursor.places)
 
     def _identify(self) -> None:
-        """Number, address and message, as far as they are there."""
+        """Set number, address and message as far as received."""
         if self.frame.needs_request and self.direction == "response":
             self.number = self.request[0] if self.request else None
         for part in self.envelope.front:
@@ -289,7 +289,7 @@ class _Walk:
         return self.cells.get(part.name, Cell(b"", (), b""))
 
     def _close(self) -> None:
-        """What is left when all parts are taken, and what was taken too much."""
+        """Add spans for bytes outside of parts; report missing and surplus bytes."""
         cursor, size = self.cursor, len(self.wire)
         self._close_cells()
         for at in cursor.inserted:
@@ -309,7 +309,7 @@ class _Walk:
             self._fault("truncated", Rule.WHOLE, size, short[0], sum(map(self._short, short)))
 
     def _close_cells(self) -> None:
-        """A part was sent up to where the next one begins, inserted bytes included."""
+        """Extend the sent bytes of each part up to the next one, inserted bytes included."""
         end = self.cursor.at
         for name, cell in reversed(self.cells.items()):
             if cell.places:
@@ -317,7 +317,7 @@ class _Walk:
                 end = cell.places[0]
 
     def _cut(self, at: int) -> None:
-        """A new frame begins: no byte from there on belongs to this one."""
+        """Remove the bytes from ``at`` on, which belong to a new frame."""
         marked = isinstance(self.frame.end, ByMark)
         self._fault("frame" if marked else "truncated", Rule.ALONE, at)
         self._around(Around.NEXT, range(at, len(self.wire)), "frame" if marked else "truncated")
@@ -337,13 +337,13 @@ class _Walk:
             self._around(Around.AFTER, rest, kind)
 
     def _short(self, part: Part) -> int:
-        """Bytes of a part that are missing."""
+        """Number of missing bytes of a part."""
         return self.wanted.get(part.name, part.size) - len(self._found(part).data)
 
-    # Judgement
+    # Checks
 
     def _judge(self) -> int | None:
-        """Judge the parts in wire order; the check value that would be right."""
+        """Check the parts in wire order. Returns the right check value, None if unknown."""
         expected: int | None = None
         for part in self.envelope.parts:
             match part:
@@ -391,7 +391,7 @@ class _Walk:
         return True
 
     def _addressed(self, part: AddressPart | MarkPart) -> str:
-        """The kind of fault that the address is, "" where it is none."""
+        """The kind of fault in the address, "" if there is none."""
         allowed = self.message.allowed if self.message else None
         if self.address is None or allowed is None or allowed.holds(self.address):
             return ""
@@ -425,7 +425,7 @@ class _Walk:
         if data == right:
             self._span(part, received)
             return expected
-        # Wrong stuffing or a wrong length moves the bytes: then the check value says nothing.
+        # Wrong stuffing or a wrong length shifts the bytes, so the check value is meaningless.
         if self.astray or any(each.rule in (Rule.STUFFING, Rule.LENGTH, Rule.WHOLE) for each in self.faults):
             self._span(part, received)
             return None
@@ -453,7 +453,7 @@ class _Walk:
         whole = self._short(part) == 0
         moved = any(each.rule in (Rule.STUFFING, Rule.ALONE) for each in self.faults)
         check = self.envelope.check
-        # No room is left for the check value of a marked frame.
+        # A marked frame without room for its check value.
         crowded = check is not None and self.wanted.get(check.name) == 0
         fields = Fields(message.payload, data, sound=whole and not moved and not crowded)
         if fields.bad or crowded or self.miscounted:
@@ -465,7 +465,7 @@ class _Walk:
         self.spans += (replace(span, places=tuple(places[i] for i in span.places)) for span in fields.spans)
 
     def _plain(self, cell: Cell, *, whole: bool) -> tuple[bytes, tuple[int, ...]]:
-        """The payload and its places without the bytes inserted into it alone."""
+        """The payload and its offsets without the bytes inserted by payload stuffing."""
         if self.alone is None:
             return cell.data, cell.places
         inserted = set()
@@ -491,7 +491,7 @@ class _Walk:
             self.spans.append(Span(where, tuple(places), raw, len(raw), None, fault))
 
     def _span(self, part: Part, number: int | None, fault: str = "") -> None:
-        """The bytes of a part that were found."""
+        """Add a span for the received bytes of a part."""
         cell = self._found(part)
         if cell.places:
             fault = fault or ("truncated" if self._short(part) else "")

@@ -1,4 +1,4 @@
-"""Sizes that depend on counts, and conditions on numbers: the two kinds of expression that targets print."""
+"""Sizes that depend on counts, and conditions on numbers: the expressions that targets print."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """A number of bytes: ``fixed``, and some for each item of runs of variable size, in wire order."""
+    """A size: ``fixed`` bytes plus a term for each run of variable size, in wire order."""
 
     fixed: int = 0
     terms: tuple[Term, ...] = ()
 
     def __add__(self, other: int) -> Size:
-        """The same with more fixed bytes."""
+        """This size with more fixed bytes."""
         return Size(self.fixed + other, self.terms)
 
     def plus(self, run: str, factor: int) -> Size:
-        """The same with the bytes of one more run."""
+        """This size with a term for one more run."""
         return Size(self.fixed, (*self.terms, Term(run, factor)))
 
     def value(self, counts: Mapping[str, int]) -> int:
-        """The number, given how many items each run has."""
+        """The size in bytes for the given number of items of each run."""
         return self.fixed + sum(term.factor * counts[term.run] for term in self.terms)
 
 
 @dataclass(frozen=True, slots=True)
 class Within:
-    """The number lies between two bounds, both included."""
+    """The number is between two bounds, inclusive."""
 
     low: int
     high: int
@@ -48,7 +48,7 @@ class Within:
 
 @dataclass(frozen=True, slots=True)
 class Clear:
-    """No bit of the mask is set."""
+    """All bits of the mask are zero."""
 
     mask: int
 
@@ -59,7 +59,7 @@ class Clear:
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """The number lies in one of several ranges."""
+    """The number is in one of several ranges."""
 
     ranges: tuple[Within, ...]
 

@@ -1,4 +1,4 @@
-"""Divides a payload into its fields, also one that is not a payload of the message."""
+"""Divides a payload into fields, even one that the message cannot have."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from qlinkgen.plan.spans import Around, Span
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
-    """A value that its field cannot have, and where it begins in the payload."""
+    """An illegal value of a field, and its offset in the payload."""
 
     of: Step | Member
     seen: int
@@ -36,16 +36,16 @@ class Wrong:
 
 
 class Fields:
-    """The spans of a payload; their places count from its first byte.
+    """The spans of a payload; offsets count from its first byte.
 
     Attributes:
-        bad: its sizes are not those of the message.
+        bad: the sizes of its fields do not match the message.
         spans: in wire order, a member after its integer.
-        wrong: values that are not allowed; none are looked for where sizes are bad.
+        wrong: illegal values; empty if sizes are bad.
     """
 
     def __init__(self, plan: PayloadPlan, payload: bytes, *, sound: bool) -> None:
-        """Nothing is judged unless the payload is ``sound``, neither cut nor wrongly stuffed."""
+        """Values are checked only if the payload is ``sound``: neither cut short nor wrongly stuffed."""
         self._plan, self._payload, self._sound = plan, payload, sound
         self._learned: dict[str, int] = {}
         self.bad = False
@@ -72,7 +72,7 @@ class Fields:
             self.spans.append(Span(Around.EXTRA, places, self._payload[at:], len(places), None, "length"))
 
     def _size(self, step: Step, counts: Mapping[str, int], left: int) -> int:
-        """Bytes of a step: by the counts, as far as they are right, else by what is left."""
+        """Size of a step: by its count if that is right, otherwise by the bytes left."""
         match step:
             case BytesStep() | ItemsStep() if not step.fixed:
                 number = counts.get(step.name, self._learned.get(step.name))
@@ -135,7 +135,7 @@ class Fields:
     def _span(
         self, of: Step | Member, places: tuple[int, ...], number: int | None, bad: int | None = None
     ) -> None:
-        """Add a span; ``bad`` is where a value begins that is not allowed."""
+        """Add a span; ``bad`` is the offset of an illegal value."""
         wrong = bad is not None and self._judging
         if bad is not None and wrong:
             seen = number if number is not None else self._seen(of, bad)

@@ -1,8 +1,8 @@
-"""A frame as parts in wire order, and what follows from them: sizes, coverage, the end, the receiver.
+"""A frame as parts in wire order, with sizes, coverage of the check value, end and receiver.
 
-Three kinds of document lead to one kind of plan. A frame of parts is an envelope whose end follows from a
-length or from its message; a marked frame is one whose header and end are single bytes with a marker bit; a
-packet is one whose request is an id and a payload, and whose response is a payload and a check value.
+All three kinds of frame have the same kind of plan. The end of a delimited frame follows from a length or
+from its message. Header and end of a marked frame are single bytes with a marker bit. The request of a packet
+protocol is an id and a payload, its response a payload and a check value.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from qlinkgen.plan.transparency import (
 
 @dataclass(frozen=True, slots=True)
 class ConstantPart:
-    """Bytes that are always the same."""
+    """Constant bytes."""
 
     name: str
     data: bytes
@@ -44,7 +44,7 @@ class ConstantPart:
 
 @dataclass(frozen=True, slots=True)
 class LengthPart:
-    """The number of payload bytes as they are sent, plus ``bias``; from ``least`` to ``most``."""
+    """The number of payload bytes as sent, plus ``bias``; ``least`` to ``most``."""
 
     name: str
     integer: Integer
@@ -73,7 +73,7 @@ class IdPart:
 
 @dataclass(frozen=True, slots=True)
 class AddressPart:
-    """The node that is addressed, or that answers."""
+    """The address of the node: the recipient of a request, the sender of a response."""
 
     name: str
     integer: Integer
@@ -89,7 +89,7 @@ class MarkPart:
     """A byte with the marker bit, the address and the number of the message.
 
     Attributes:
-        end_id: number that makes it an end byte, None in a header.
+        end_id: the message number that marks an end byte, None in a header.
     """
 
     name: str
@@ -119,14 +119,14 @@ class MarkPart:
 
 @dataclass(frozen=True, slots=True)
 class PayloadPart:
-    """The payload: fewest and most bytes, before stuffing and (``most_sent``) as a length counts them."""
+    """The payload: minimum and maximum size before stuffing, and maximum size as a length counts it."""
 
     name: str
     least: int
     most: int
     most_sent: int
 
-    #: Bytes of no payload.
+    #: Size of an empty payload.
     size = 0
 
 
@@ -146,19 +146,19 @@ class CheckPart:
 Part = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | PayloadPart | CheckPart
 
 
-# Where a frame ends -----------------------------------------------------------------------------------------
+# The end of a frame -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class ByLength:
-    """A length says how many bytes of payload follow."""
+    """A length gives the number of payload bytes."""
 
     part: LengthPart
 
 
 @dataclass(frozen=True, slots=True)
 class ByMessage:
-    """The size of the payload follows from its message and the counts in it."""
+    """The size of the payload follows from the message and its counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,10 +177,10 @@ End = ByLength | ByMessage | ByMark
 
 @dataclass(frozen=True, slots=True)
 class Hunt:
-    """The preamble is found nowhere else: each byte is looked at once, nothing is kept but the frame itself.
+    """The preamble occurs nowhere else: each byte is processed once, and only the frame itself is buffered.
 
     Attributes:
-        mark: the byte of which the preamble is two, and after which ``insert`` follows inside a frame.
+        mark: the byte that the preamble consists of, twice; inside a frame ``insert`` follows it.
     """
 
     mark: int
@@ -189,12 +189,13 @@ class Hunt:
 
 @dataclass(frozen=True, slots=True)
 class Rescan:
-    """What looks like the start of a frame may be data: a failed search goes on from the next byte.
+    """An apparent start of a frame may be data: after a failed attempt the search continues at the next byte.
 
     Attributes:
-        bare: no constant begins a frame, so only a known message number and an allowed address tell one from
-            noise.
-        verified: a check value proves a frame, so one whose contents are wrong is consumed as a whole.
+        bare: frames do not begin with a constant, so only a known message number and an allowed address
+            distinguish them from noise.
+        verified: frames have a check value, so one with a valid check value is consumed even if its contents
+            are wrong.
     """
 
     bare: bool
@@ -203,12 +204,12 @@ class Rescan:
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """A bit tells header and end from all other bytes."""
+    """Header and end have a marker bit that all other bytes lack."""
 
 
 @dataclass(frozen=True, slots=True)
 class InStep:
-    """Nothing marks a frame: both sides must agree where one begins."""
+    """Frames have no delimiter: both sides must stay in step."""
 
 
 Receiver = Hunt | Rescan | Marks | InStep
@@ -219,7 +220,7 @@ Receiver = Hunt | Rescan | Marks | InStep
 
 @dataclass(frozen=True)
 class Envelope:
-    """The parts of a frame in wire order, as they are before stuffing."""
+    """The parts of a frame in wire order, before stuffing."""
 
     parts: tuple[Part, ...]
 
@@ -257,33 +258,33 @@ class Envelope:
 
     @property
     def overhead(self) -> int:
-        """Bytes beside the payload."""
+        """Bytes before and after the payload."""
         return self.header_size + self.trailer_size
 
     @property
     def max_frame(self) -> int:
-        """Most bytes of a frame of any payload, as a length counts them."""
+        """Maximum size of a frame, with the payload as a length counts it."""
         return self.overhead + self.payload.most_sent
 
     @property
     def preamble(self) -> bytes:
-        """Constant bytes that begin the frame, b"" where there are none."""
+        """Constant bytes at the start of the frame, b"" if there are none."""
         first = self.parts[0]
         return first.data if isinstance(first, ConstantPart) else b""
 
     @property
     def length(self) -> LengthPart | None:
-        """The length, None where there is none."""
+        """The length, None if there is none."""
         return next((part for part in self.parts if isinstance(part, LengthPart)), None)
 
     @property
     def id(self) -> IdPart | None:
-        """The number of the message, None where it shares a byte or is not sent."""
+        """The number of the message, None if it shares a byte or is not sent."""
         return next((part for part in self.parts if isinstance(part, IdPart)), None)
 
     @property
     def address(self) -> AddressPart | None:
-        """The address, None where it shares a byte or there is none."""
+        """The address, None if it shares a byte or is not sent."""
         return next((part for part in self.parts if isinstance(part, AddressPart)), None)
 
     @property
@@ -292,15 +293,15 @@ class Envelope:
         return next((part for part in self.parts if isinstance(part, CheckPart)), None)
 
     def offset(self, wanted: Part) -> int:
-        """Bytes before a part; those after the payload are counted as if it were empty."""
+        """Offset of a part; the payload counts as empty."""
         return sum(part.size for part in self.parts[: self.parts.index(wanted)])
 
     def from_end(self, wanted: Part) -> int:
-        """Bytes from the first one of a part after the payload to the end of the frame."""
+        """Distance of a part after the payload from the end of the frame."""
         return sum(part.size for part in self.parts[self.parts.index(wanted) :])
 
     def between(self, front: int, back: int) -> tuple[Part, ...]:
-        """Parts but for those in the first ``front`` and the last ``back`` bytes."""
+        """All parts except those in the first ``front`` and last ``back`` bytes."""
         return tuple(
             part
             for index, part in enumerate(self.parts)
@@ -309,12 +310,12 @@ class Envelope:
         )
 
     def covered(self, part: Part) -> bool:
-        """The check value covers the part."""
+        """Whether the check value covers the part."""
         return self.check is not None and part.name in self.check.check.over
 
     @cached_property
     def coverage(self) -> tuple[tuple[Part, ...], ...]:
-        """Covered parts, those that follow one another together."""
+        """Covered parts, adjacent ones grouped."""
         runs: list[list[Part]] = []
         last = -2
         for index, part in enumerate(self.parts):
@@ -329,14 +330,14 @@ class Envelope:
 
 @dataclass(frozen=True)
 class FramePlan:
-    """How messages travel.
+    """The frame around each message.
 
     Attributes:
-        envelopes: by direction; equal ones are the same object.
-        end: what tells where a frame ends.
-        transparency: how its bytes travel.
+        envelopes: by direction; directions with equal envelopes share one object.
+        end: what determines the end of a frame.
+        transparency: the stuffing of its bytes.
         receiver: how frames are found in a stream.
-        address: name of the address, "" where there is none.
+        address: name of the address, "" if there is none.
         id_name: name of the message number.
     """
 
@@ -349,7 +350,7 @@ class FramePlan:
 
     @property
     def envelope(self) -> Envelope:
-        """The envelope where every direction has the same; that of responses where they differ."""
+        """The envelope of responses; in most protocols every direction has the same."""
         return self.envelopes["response"]
 
     @property
@@ -360,23 +361,23 @@ class FramePlan:
 
     @property
     def needs_request(self) -> bool:
-        """A response means nothing without the request that it answers."""
+        """Whether a response can be decoded only with its request."""
         return isinstance(self.receiver, InStep)
 
     @property
     def max_payload(self) -> int:
-        """Most payload bytes that the frame allows."""
+        """Maximum payload size of the frame."""
         return self.envelope.payload.most
 
     @property
     def max_wire(self) -> int:
-        """Most bytes on the wire that anything can have which begins like a frame."""
+        """Maximum size on the wire of a frame, valid or not."""
         most = self.envelope.max_frame
         stuffing = self.transparency
         return stuffing.most_frame(most) if isinstance(stuffing, FrameStuffing) else most
 
     def with_check(self, direction: Direction, *, checked: bool) -> Envelope:
-        """The envelope of a message that carries the check value, or does not."""
+        """The envelope of a message with (``checked``) or without a check value."""
         envelope = self.envelopes[direction]
         if checked or envelope.check is None:
             return envelope
@@ -453,17 +454,18 @@ def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transpa
 
 
 def _receiver(envelope: Envelope, transparency: Transparency) -> Receiver:
-    """The one decision between hunting and rescanning, for every target."""
+    """Choose between hunting and rescanning, for all targets."""
     if isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
         return Hunt(transparency.rule.after[0], transparency.rule.insert)
     return Rescan(bare=not envelope.preamble, verified=envelope.check is not None)
 
 
 def _unique(envelope: Envelope, stuffing: FrameStuffing) -> bool:
-    """The preamble cannot appear in a frame, and the rest is plain enough to be taken byte by byte.
+    """Whether the preamble cannot occur in a frame, and the frame can be processed byte by byte.
 
-    The preamble is a byte twice, alone exempt from stuffing after that byte. A length of one byte follows
-    that cannot be that byte. The check value is sent whole, comes last and covers everything between.
+    The preamble is one byte twice, and alone exempt from stuffing after that byte. A length of one byte
+    follows, whose range excludes that byte. The check value is sent whole, comes last and covers everything
+    between.
     """
     rule, length, check = stuffing.rule, envelope.length, envelope.check
     if len(rule.after) != 1 or rule.after * 2 != envelope.preamble or rule.insert in rule.after:

@@ -1,8 +1,8 @@
 """The payload of a message as steps in wire order.
 
-A step says what its bytes are and where they begin. Sizes come first: `Sizing` tells how many items each run
-of variable size has, from the payload's size and from the counts in it. Only a payload whose sizes are
-consistent has values, so a decoder reports `length` before `range`, whatever the order of the fields.
+A step holds the layout of its bytes and their offset. Sizes come first: `Sizing` derives the number of items
+of each run of variable size from the size of the payload and the counts in it. Values are decoded only if
+sizes are consistent, so a decoder reports `length` before `range`, in any order of fields.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from qlinkgen.plan.expr import Clear, Limit, Size, Within
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where the bytes of a step begin.
+    """The offset of a step.
 
     Attributes:
-        front: bytes of payload before it.
-        back: bytes of payload from its first byte to the end, None where a run of variable size follows.
+        front: offset from the beginning of the payload.
+        back: distance from the end of the payload, None if a run of variable size follows.
     """
 
     front: Size
@@ -44,7 +44,7 @@ class Place:
 
     @property
     def offset(self) -> int | None:
-        """Bytes before it where their number is always the same, else None."""
+        """The offset from the beginning if it is constant, else None."""
         return None if self.front.terms else self.front.fixed
 
 
@@ -53,7 +53,7 @@ class Place:
 
 @dataclass(frozen=True)
 class ValueStep:
-    """An integer that the caller chooses and reads."""
+    """An integer with a value of the message."""
 
     name: str
     place: Place
@@ -62,13 +62,13 @@ class ValueStep:
 
     @property
     def conditions(self) -> tuple[Limit, ...]:
-        """What must hold of the integer on the wire, beyond what its bits can hold."""
+        """Conditions on the integer on the wire, beyond the limits of its bits."""
         return conditions(self.number)
 
 
 @dataclass(frozen=True)
 class ConstantStep:
-    """An integer that is always the same, and must be received as it is."""
+    """A constant integer; receivers reject other values."""
 
     name: str
     place: Place
@@ -78,13 +78,13 @@ class ConstantStep:
 
     @property
     def conditions(self) -> tuple[Limit, ...]:
-        """What must hold of the integer on the wire."""
+        """Conditions on the integer on the wire."""
         return (Within(self.value, self.value),)
 
 
 @dataclass(frozen=True)
 class ReservedStep:
-    """An integer that is sent as ``value`` and ignored when received."""
+    """An integer sent as ``value`` and ignored when received."""
 
     name: str
     place: Place
@@ -95,12 +95,12 @@ class ReservedStep:
 
 @dataclass(frozen=True)
 class CountStep:
-    """An integer that the codec fills: how many units of ``run`` there are.
+    """The size of ``run``, in items or bytes; filled by the codec.
 
     Attributes:
-        scale: the number is the run's items times this: 1 where items are counted, an item's bytes where
-            bytes are.
-        bounds: the least and most that the run allows, as this number.
+        scale: factor from items to the number sent: 1 if items are counted, the size of an item if bytes
+            are.
+        bounds: minimum and maximum of the number sent.
     """
 
     name: str
@@ -113,7 +113,7 @@ class CountStep:
 
 @dataclass(frozen=True)
 class Member:
-    """Bits that the caller chooses and reads."""
+    """Bits with a value of the message."""
 
     name: str
     shift: int
@@ -122,13 +122,13 @@ class Member:
 
     @property
     def conditions(self) -> tuple[Limit, ...]:
-        """What must hold of the number, beyond what its bits can hold."""
+        """Conditions on the number, beyond the limits of its bits."""
         return conditions(self.number)
 
 
 @dataclass(frozen=True)
 class BitsStep:
-    """An integer divided into members; bits of no member are sent as 0 and ignored when received."""
+    """An integer divided into members; other bits are sent as 0 and ignored when received."""
 
     name: str
     place: Place
@@ -149,12 +149,12 @@ class BytesStep:
 
     #: Bytes of one item.
     item_size = 1
-    #: What the number of items is called.
+    #: Suffix for the name of the number of bytes.
     quantity = "size"
 
     @property
     def fixed(self) -> bool:
-        """The number of bytes is always the same."""
+        """Whether the number of bytes is constant."""
         return self.length.fixed
 
 
@@ -170,7 +170,7 @@ class ItemsStep:
     default: tuple[int, ...]
     required: bool
 
-    #: What the number of items is called.
+    #: Suffix for the name of the number of items.
     quantity = "count"
 
     @property
@@ -180,12 +180,12 @@ class ItemsStep:
 
     @property
     def fixed(self) -> bool:
-        """The number of items is always the same."""
+        """Whether the number of items is constant."""
         return self.length.fixed
 
     @property
     def conditions(self) -> tuple[Limit, ...]:
-        """What must hold of each item, beyond what its bits can hold."""
+        """Conditions on each item, beyond the limits of its bits."""
         return conditions(self.number)
 
 
@@ -193,26 +193,26 @@ RunStep = BytesStep | ItemsStep
 Step = ValueStep | ConstantStep | ReservedStep | CountStep | BitsStep | BytesStep | ItemsStep
 
 
-# How many items there are -----------------------------------------------------------------------------------
+# Numbers of items -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Learn:
-    """A count says how many items its run has; a multiple of ``count.scale``, and within the run's bounds."""
+    """Take the number of items from a count: a multiple of ``count.scale`` within ``count.bounds``."""
 
     count: CountStep
 
 
 @dataclass(frozen=True, slots=True)
 class Compare:
-    """A count must agree with what is already known of its run."""
+    """Check that a count agrees with the known number of items."""
 
     count: CountStep
 
 
 @dataclass(frozen=True, slots=True)
 class Infer:
-    """An uncounted run takes what ``others``, all other bytes of the payload, leave of its size."""
+    """Derive the number of items from the size of the payload less ``others``, all its other bytes."""
 
     run: RunStep
     others: Size
@@ -223,16 +223,16 @@ Sizing = Learn | Compare | Infer
 
 @dataclass(frozen=True)
 class PayloadPlan:
-    """Everything that code needs to know of a payload.
+    """The layout of a payload.
 
     Attributes:
         steps: in wire order.
-        sizing: in the order in which they can be carried out; afterwards every run's count is known and the
-            size of the payload must equal ``size``.
-        size: bytes of payload, given the counts.
-        least: fewest bytes, `empty_is_default` not considered.
-        most: most bytes.
-        empty_is_default: a payload of no bytes stands for every default.
+        sizing: in order of execution; afterwards the number of items of every run is known, and the payload
+            must have the size ``size``.
+        size: size of the payload as a function of the counts.
+        least: minimum size, without regard to `empty_is_default`.
+        most: maximum size.
+        empty_is_default: an empty payload means that every field has its default.
     """
 
     steps: tuple[Step, ...]
@@ -244,7 +244,7 @@ class PayloadPlan:
 
     @property
     def fixed(self) -> bool:
-        """The size is always the same."""
+        """Whether the size is constant."""
         return not self.size.terms
 
     @property
@@ -255,25 +255,25 @@ class PayloadPlan:
         )
 
     def least_of(self, known: Collection[str]) -> Size:
-        """Fewest bytes where only some runs have a known number of items; `size` where all have."""
+        """Minimum size if the numbers of items of some runs are known; `size` if all are."""
         fixed = sum(run.length.minimum * run.item_size for run in self.runs if run.name not in known)
         return Size(self.size.fixed + fixed, tuple(term for term in self.size.terms if term.run in known))
 
     def sendable(self, run: RunStep) -> Within:
-        """How many items may be sent: no more than each count of them can tell."""
+        """Numbers of items that can be sent: at most what each of its counts can hold."""
         counts = [step for step in self.steps if isinstance(step, CountStep) and step.run == run.name]
         most = min([run.length.maximum, *(each.integer.maximum // each.scale for each in counts)])
         return Within(run.length.minimum, most)
 
     def run(self, name: str) -> RunStep:
-        """A run by its name, of fixed or variable size."""
+        """The run with a name, of fixed or variable size."""
         return next(
             step for step in self.steps if isinstance(step, BytesStep | ItemsStep) and step.name == name
         )
 
     @property
     def settable(self) -> tuple[ValueStep | Member | BytesStep | ItemsStep, ...]:
-        """What a caller sets and reads, in wire order."""
+        """Steps and members with a value of the message, in wire order."""
         found: list[ValueStep | Member | BytesStep | ItemsStep] = []
         for step in self.steps:
             match step:
@@ -289,7 +289,7 @@ class PayloadPlan:
 
 
 def least_size(step: Step) -> int:
-    """Fewest bytes of a step."""
+    """Minimum size of a step."""
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
             return step.integer.size
@@ -300,12 +300,12 @@ def least_size(step: Step) -> int:
 
 
 def conditions(number: Scalar) -> tuple[Limit, ...]:
-    """What must hold of a number on the wire, beyond what its bits can hold."""
+    """Conditions on a received number, beyond the limits of its bits."""
     return limits(number)[1:] if number.full_range else limits(number)
 
 
 def limits(number: Scalar) -> tuple[Limit, ...]:
-    """What must hold of any integer that is to be sent as a number."""
+    """Conditions on an integer before it is sent."""
     found: list[Limit] = [Within(number.minimum, number.maximum)]
     meaning = number.meaning
     match meaning:
@@ -383,7 +383,7 @@ class _Planner:
                 assert_never(scalar.role)
 
     def _sizing(self, steps: list[Step], size: Size) -> Iterator[Sizing]:
-        """Wire order: the count that a run names precedes it; lint refuses a count after an open run."""
+        """In wire order: the count of a run precedes it, and lint rejects a count after an uncounted run."""
         for step in steps:
             match step:
                 case CountStep():

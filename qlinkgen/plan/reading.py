@@ -1,7 +1,7 @@
-"""Takes one frame off the wire, part by part in wire order.
+"""Reads one frame, part by part in wire order.
 
-What shows that no frame begins here is found as early as the bytes allow, so it does not depend on how they
-are cut.
+A wrong start is detected at the earliest possible byte, so the result does not depend on how the stream is
+split.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from qlinkgen.plan.tree import MessagePlan
 
 
 class BadFrame(ValueError):
-    """Bytes that are not a frame with a message.
+    """Bytes that are not a valid frame.
 
     Attributes:
         kind: frame, stuffing, length, truncated, crc, illegal, unknown or range.
-        end: wire bytes of the frame up to where it was found out.
-        field: the field that is wrong, "" where it is none.
+        end: wire offset at which the error was detected.
+        field: the wrong field, "" for other errors.
     """
 
     def __init__(self, kind: str, end: int, field: str = "") -> None:
-        """Word the message."""
+        """Compose the error text."""
         super().__init__(f"{kind} at {end}{field and f': {field}'}")
         self.kind = kind
         self.end = end
@@ -52,8 +52,8 @@ class Astray(Exception):
     """No frame begins here.
 
     Attributes:
-        kind: what a decoder of one whole frame calls it; a receiver goes on silently.
-        at: place on the wire.
+        kind: the error of a decoder of one whole frame; receivers do not report it.
+        at: wire offset.
     """
 
     def __init__(self, kind: str, at: int) -> None:
@@ -64,7 +64,7 @@ class Astray(Exception):
 
 
 class Missing(Exception):
-    """The bytes so far may be the beginning of a frame; fewer than ``size`` tell nothing new."""
+    """The bytes so far may be the beginning of a frame; at least ``size`` are needed to decide."""
 
     def __init__(self, size: int = 0) -> None:
         """Note the size."""
@@ -74,15 +74,15 @@ class Missing(Exception):
 
 @dataclass
 class Taken:
-    """A frame as it was taken off the wire.
+    """A received frame, divided into parts.
 
     Attributes:
-        cells: bytes of each part without inserted ones; a payload that is stuffed alone is as it was sent.
-        payload: the payload without stuffing.
-        number: number of the message, None where the frame has none.
-        address: the address, None where the frame has none.
-        end: place on the wire after its last byte.
-        due: the inserted byte that may follow the end, b"" where none may.
+        cells: unstuffed bytes of each part; where only the payload is stuffed, the payload as sent.
+        payload: the unstuffed payload.
+        number: number of the message, None if the frame has none.
+        address: the address, None if the frame has none.
+        end: wire offset of its end.
+        due: the inserted byte that may follow the end, b"" if none may.
     """
 
     cells: dict[str, bytes] = field(default_factory=dict)
@@ -94,23 +94,23 @@ class Taken:
 
 
 class Cursor:
-    """A place on the wire; takes bytes without the inserted ones."""
+    """A wire offset; reads bytes and skips inserted ones."""
 
     def __init__(self, wire: bytes, at: int, rule: Insertion | None, *, hunting: bool = False) -> None:
-        """``rule`` is that of the stuffed parts, None where the frame is not stuffed as a whole."""
+        """``rule`` applies to the stuffed parts, None if the frame is not stuffed as a whole."""
         self._wire = wire
         self._rule = rule
         self._hunting = hunting
         self._recent = b""
         self.at = at
-        #: An inserted byte must come next, if anything does.
+        #: The next byte must be an inserted one.
         self.due = False
-        #: Places of the bytes taken, and of the inserted ones between them.
+        #: Offsets of the bytes taken, and of the inserted ones between them.
         self.places: list[int] = []
         self.inserted: list[int] = []
 
     def take(self, size: int, *, stuffed: bool) -> bytes:
-        """Bytes of a part. Raises Missing, or BadFrame where an inserted byte is another one."""
+        """Bytes of a part. Raises Missing, or BadFrame for a wrong inserted byte."""
         taken = b""
         rule = self._rule if stuffed else None
         while len(taken) < size:
@@ -125,7 +125,7 @@ class Cursor:
         return taken
 
     def _run(self, most: int, rule: Insertion | None) -> bytes:
-        """The next bytes before which none is inserted, but for the first."""
+        """The bytes up to the next inserted one."""
         start, left = self.at, len(self._wire) - self.at
         if left == 0:
             raise Missing(start + 1)
@@ -147,7 +147,7 @@ class Cursor:
             self.due, self._recent = False, b""
 
     def misplaced(self, *, again: bool) -> None:
-        """The byte before ``at`` is not the inserted one; ``again``: it is the second one of a preamble."""
+        """Raise for a wrong byte before ``at``; ``again``: it is the second byte of a preamble."""
         # A preamble inside a frame: the frame ends before it.
         raise BadFrame("truncated", self.at - 2) if again else BadFrame("stuffing", self.at)
 
@@ -159,10 +159,10 @@ class Cursor:
 
 
 class FrameReader:
-    """Reads frames of parts that a length or the message itself ends."""
+    """Reads frames that end by length or by message."""
 
     def __init__(self, plan: FramePlan, known: Mapping[int, MessagePlan], direction: Direction) -> None:
-        """``known`` are the messages that the direction has, by number."""
+        """``known`` are the messages of the direction, by number."""
         self._plan = plan
         self._known = known
         self._envelope = plan.envelopes[direction]
@@ -174,7 +174,7 @@ class FrameReader:
         self._bare = isinstance(plan.receiver, Rescan) and plan.receiver.bare
 
     def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
-        """The frame that begins at ``start``, its check value and contents not looked at.
+        """The frame that begins at ``start``; check value and contents are not checked.
 
         Raises Astray, Missing or BadFrame.
         """
@@ -195,7 +195,7 @@ class FrameReader:
         return cursor.take(size, stuffed=part.name in self._stuffed)
 
     def _head(self, cursor: Cursor, part: Part, taken: Taken) -> int:
-        """Take a part of the header; gives the value of a length."""
+        """Take a part of the header; returns the value of a length, 0 for other parts."""
         match part:
             case ConstantPart():
                 taken.cells[part.name] = b""
@@ -232,7 +232,7 @@ class FrameReader:
         return 0
 
     def _check_known(self, cursor: Cursor, taken: Taken) -> None:
-        """Without a constant in front, only number and address tell a frame from noise."""
+        """Without a leading constant, only number and address distinguish a frame from noise."""
         if taken.number is None:
             return
         message = self._known.get(taken.number)
@@ -271,7 +271,7 @@ class FrameReader:
                 return sent + self._take(cursor, part, size - len(sent))
 
     def _judged(self, taken: Taken, sent: bytes) -> bytes:
-        """The payload without stuffing, if what surrounds it is right."""
+        """The unstuffed payload; checks the constants after it."""
         for part in self._envelope.back:
             if isinstance(part, ConstantPart) and taken.cells[part.name] != part.data:
                 raise BadFrame("frame", taken.end)
@@ -286,7 +286,7 @@ class FrameReader:
 
 
 def read_marked(plan: FramePlan, known: Mapping[int, MessagePlan], wire: bytes) -> Taken:
-    """The frame from a header to the next end, if that is all there is. Raises Missing or BadFrame."""
+    """The frame from a header to the next end, which must be the whole data. Raises Missing or BadFrame."""
     assert isinstance(plan.end, ByMark)
     header, end = plan.end.header, plan.end.end
     marks = [at for at, byte in enumerate(wire) if byte & header.marker]
@@ -303,7 +303,7 @@ def read_marked(plan: FramePlan, known: Mapping[int, MessagePlan], wire: bytes) 
 
 
 def take_marked(plan: FramePlan, known: Mapping[int, MessagePlan], wire: bytes) -> Taken:
-    """The parts of a frame that begins with a header and ends with the next end. Raises BadFrame."""
+    """The parts of a frame with a header and an end. Raises BadFrame."""
     assert isinstance(plan.end, ByMark)
     header, end = plan.end.header, plan.end.end
     number, address = header.id_of(wire[0]), header.address_of(wire[0])

@@ -1,7 +1,7 @@
-"""Finds frames in a stream of bytes: the reference for the receivers of every target, simple and slow.
+"""Finds frames in a byte stream: a simple and slow reference for the receivers of every target.
 
-Every byte is fed alone, so what is delivered cannot depend on how a stream is cut. `docs/receiver.md`
-describes the four strategies.
+Bytes are fed one at a time, so events cannot depend on how the stream is split. `docs/receiver.md` describes
+the four strategies.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ class Event:
     """A message or a fault.
 
     Attributes:
-        kind: "message", or what is wrong.
-        at: number of the byte that completed it; that of the next byte where the end of the stream did.
-        offset: place of its first byte in the stream.
-        raw: its bytes as they were received.
+        kind: "message", or the kind of fault.
+        at: offset of the byte that completed it; the length of the stream if its end did.
+        offset: offset of its first byte in the stream.
+        raw: its bytes as received.
         decoded: the message, None for a fault.
     """
 
@@ -38,17 +38,17 @@ class Event:
 
 
 class Receiver:
-    """What the strategies have in common."""
+    """Base class of the strategies."""
 
     def __init__(self, plan: Plan, direction: Direction) -> None:
-        """Listen to one direction."""
+        """Receive messages of one direction."""
         self.plan = plan
         self.direction = direction
         self.codec = Codec(plan)
         self.known = plan.known(direction)
         #: Bytes taken so far.
         self.taken = 0
-        #: Nothing more comes; the next byte taken begins a new stream.
+        #: The stream has ended; the next byte begins a new one.
         self.ended = False
 
     def run(self, stream: bytes) -> list[Event]:
@@ -62,16 +62,16 @@ class Receiver:
         yield from self.take(byte)
 
     def take(self, byte: int) -> Iterator[Event]:
-        """Take one byte, the one before ``taken``."""
+        """Take one byte; its offset is ``taken`` - 1."""
         raise NotImplementedError
 
     def finish(self) -> Iterator[Event]:
-        """The stream has ended; the receiver is as new."""
+        """End the stream and reset the receiver."""
         self.ended = True
         yield from self.give_up()
 
     def give_up(self) -> Iterator[Event]:
-        """What is left of a stream that has ended."""
+        """The events of the bytes left at the end of the stream."""
         raise NotImplementedError
 
     @property
@@ -79,12 +79,12 @@ class Receiver:
         return self.taken if self.ended else self.taken - 1
 
     def event(self, kind: str, raw: bytes, offset: int | None = None) -> Event:
-        """A fault; without an offset it ends with the byte taken last."""
+        """A fault; by default it ends at the last byte taken."""
         start = self.taken - len(raw) if offset is None else offset
         return Event(kind, self._at, start, bytes(raw))
 
     def judged(self, taken: Taken, raw: bytes, offset: int, request: bytes = b"") -> Event:
-        """The message of a frame, or what is wrong with it."""
+        """The message of a frame, or its fault."""
         try:
             decoded = self.codec.judge(taken, self.direction, request)
         except BadFrame as bad:
@@ -109,7 +109,7 @@ def receiver(plan: Plan, direction: Direction) -> Receiver:
 
 
 class HuntingReceiver(Receiver):
-    """The preamble is found nowhere else: every byte is looked at once."""
+    """The preamble occurs nowhere else: every byte is processed once."""
 
     def __init__(self, plan: Plan, direction: Direction) -> None:
         """Hunt for a preamble."""
@@ -119,11 +119,11 @@ class HuntingReceiver(Receiver):
         self._reader = FrameReader(plan.frame, self.known, direction)
         self._marks = 0
         self._raw = b""
-        #: With fewer bytes the frame is not complete.
+        #: Minimum size of the frame.
         self._needed = 0
 
     def take(self, byte: int) -> Iterator[Event]:
-        """One step."""
+        """Search for a preamble, or collect a frame."""
         if not self._raw:
             yield from self._hunt(byte)
             return
@@ -165,7 +165,7 @@ class HuntingReceiver(Receiver):
 
 
 class RescanningReceiver(Receiver):
-    """Bytes are kept until a frame has proven right; else the search goes on from the next byte."""
+    """Buffers bytes until a frame is valid; otherwise the search continues at the next byte."""
 
     def __init__(self, plan: Plan, direction: Direction) -> None:
         """Begin with an empty buffer."""
@@ -175,11 +175,11 @@ class RescanningReceiver(Receiver):
         self._reader = FrameReader(plan.frame, self.known, direction)
         self._longest = plan.frame.envelopes[direction].max_frame
         self._buffer, self._skipped, self._due = b"", b"", b""
-        #: With fewer bytes the frame that may begin the buffer is not complete.
+        #: Minimum size of the frame that may start the buffer.
         self._needed = 0
 
     def take(self, byte: int) -> Iterator[Event]:
-        """Everything that the buffer now holds."""
+        """Buffer the byte and search for frames."""
         self._buffer += bytes((byte,))
         if len(self._buffer) >= self._needed:
             yield from self._scan()
@@ -222,7 +222,7 @@ class RescanningReceiver(Receiver):
         self._due = taken.due
 
     def _drop(self, kind: str, raw: bytes) -> Iterator[Event]:
-        """No frame begins with the first byte."""
+        """Drop the first byte, which does not begin a frame."""
         if kind and not self._strategy.bare:
             yield self.event(kind, raw, self._start)
         if self._strategy.bare:
@@ -232,13 +232,13 @@ class RescanningReceiver(Receiver):
         self._buffer = self._buffer[1:]
 
     def _report(self, end: int) -> Iterator[Event]:
-        """The bytes skipped in a row, as one fault."""
+        """Report consecutive skipped bytes as one fault."""
         if self._skipped:
             yield self.event("frame", self._skipped, end - len(self._skipped))
         self._skipped = b""
 
     def give_up(self) -> Iterator[Event]:
-        """The frame that is not complete is given up, and others are looked for in its bytes."""
+        """Give up the incomplete frame and search its bytes for others."""
         if self._due and self._buffer[:1] == self._due:
             self._buffer = self._buffer[1:]
         self._due = b""
@@ -251,7 +251,7 @@ class RescanningReceiver(Receiver):
 
 
 class MarkReceiver(Receiver):
-    """Header and end carry a bit that nothing between them has."""
+    """Header and end have a marker bit that the bytes between them lack."""
 
     def __init__(self, plan: Plan, direction: Direction) -> None:
         """Wait for a header."""
@@ -261,11 +261,11 @@ class MarkReceiver(Receiver):
         envelope = plan.frame.envelopes[direction]
         self._most = envelope.payload.most + (envelope.check.size if envelope.check else 0)
         self._raw = b""
-        #: Everything up to the next header belongs to a fault that was reported.
+        #: Bytes up to the next header belong to a fault already reported.
         self._hunting = False
 
     def take(self, byte: int) -> Iterator[Event]:
-        """One step."""
+        """Wait for a header, or collect a frame."""
         marked = bool(byte & self._header.marker)
         if marked and self._header.id_of(byte) != self._end_id:
             if self._raw:
@@ -298,7 +298,7 @@ class MarkReceiver(Receiver):
 
 
 class PacketReceiver(Receiver):
-    """Nothing marks a packet: its first byte tells the size of a request, the request that of a response."""
+    """No delimiters: the first byte gives the size of a request, the request that of a response."""
 
     def __init__(self, plan: Plan, direction: Direction) -> None:
         """Begin between packets."""
@@ -307,12 +307,12 @@ class PacketReceiver(Receiver):
         self._requests: list[bytes] = []
 
     def expect(self, request: bytes) -> None:
-        """The next bytes, after what is expected already, answer this request."""
+        """Expect the response to this request, after those already expected."""
         if request[0] in self.known:
             self._requests.append(request)
 
     def take(self, byte: int) -> Iterator[Event]:
-        """One step."""
+        """Collect a packet."""
         self._raw += bytes((byte,))
         answers = self.direction == "response"
         if answers and not self._requests:

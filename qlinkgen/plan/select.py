@@ -1,4 +1,4 @@
-"""What an output is for: the role of its user, and the messages that are kept."""
+"""Selects the messages of an output by role and name."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from qlinkgen.model.types import Enum, Flags, Scalar
 
 Role = Literal["both", "master", "slave"]
 
-#: The role that sends messages of a direction alone, "" where both do.
+#: The only role that sends messages of a direction, "" if both do.
 _SENDERS: dict[Direction, str] = {"request": "master", "response": "slave", "message": ""}
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What is left out of the output, and where the Python package goes.
+    """Selects the messages of the output and the folder of the Python package.
 
     Attributes:
-        role: side that the output is for; what the other side alone needs is left out where a target can.
-        only: commands or messages that are kept, all where it is empty.
+        role: the role that the output is for; targets may omit code that only the other role needs.
+        only: names of the selected commands or messages; empty for all.
         package: folder of the Python package, below the output folder.
     """
 
@@ -31,18 +31,18 @@ class Options:
 
 
 def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
-    """The messages that are kept, in schema order."""
+    """The selected messages, in schema order."""
     wanted = set(options.only)
     return tuple(m for m in protocol.messages if not wanted or {m.name, m.command} & wanted)
 
 
 def encoded(message: Message, role: Role) -> bool:
-    """The role sends the message."""
+    """Whether the role sends the message."""
     return role in ("both", _SENDERS[message.direction]) or message.direction == "message"
 
 
 def decoded(message: Message, role: Role) -> bool:
-    """The role receives the message."""
+    """Whether the role receives the message."""
     return role != _SENDERS[message.direction]
 
 
@@ -59,7 +59,7 @@ def heard(protocol: Protocol, role: Role) -> tuple[Direction, ...]:
 
 
 def named(messages: tuple[Message, ...]) -> frozenset[str]:
-    """Names of the enums and flags that values of the messages have."""
+    """Names of the enums and flags that the messages use."""
     scalars = (value.type for message in messages for value in message.values)
     meanings = (scalar.meaning for scalar in scalars if isinstance(scalar, Scalar))
     return frozenset(each.name for each in meanings if isinstance(each, Enum | Flags))

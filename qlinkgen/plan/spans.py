@@ -1,4 +1,4 @@
-"""A dissected frame: spans of bytes, and the rules that are broken."""
+"""A dissected frame: spans of bytes and violated rules."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 class Around(Enum):
-    """Bytes that belong to neither a part nor a step."""
+    """The role of bytes outside of parts and steps."""
 
     #: Before the frame.
     BEFORE = "before"
-    #: The last bytes of a preamble that is not whole.
+    #: The last bytes of an incomplete preamble.
     LOST = "lost"
     #: An inserted byte.
     INSERTED = "inserted"
@@ -30,7 +30,7 @@ class Around(Enum):
 
 
 class Rule(Enum):
-    """What a frame may break."""
+    """A rule that a frame may violate."""
 
     #: The frame has a beginning: a preamble, or a header.
     BEGINNING = "beginning"
@@ -38,11 +38,11 @@ class Rule(Enum):
     FIRST = "first"
     #: A constant part has its value.
     CONSTANT = "constant"
-    #: All bytes are there; ``seen`` are missing.
+    #: The frame is complete; ``seen`` bytes are missing.
     WHOLE = "whole"
-    #: No frame begins inside another.
+    #: No other frame begins inside the frame.
     ALONE = "alone"
-    #: The inserted byte follows; ``seen`` is another one, None the end of the payload.
+    #: The inserted byte follows; ``seen`` is the wrong byte, None at the end of the payload.
     STUFFING = "stuffing"
     #: The length is within its bounds.
     LENGTH = "length"
@@ -50,17 +50,17 @@ class Rule(Enum):
     LAST = "last"
     #: The message number is known.
     MESSAGE = "message"
-    #: The payload has a size that the message can have; ``seen`` is its size.
+    #: The message can have a payload of this size; ``seen`` is the size.
     SIZE = "size"
-    #: The end has the address of the header.
+    #: The end byte has the address of the header.
     END = "end"
     #: The message may carry the address.
     ADDRESS = "address"
     #: The check value is right.
     CHECK = "check"
-    #: The check value is not that of a refusal.
+    #: The check value does not signal a refused request.
     REFUSED = "refused"
-    #: A value is one that its field may have.
+    #: A value is legal for its field.
     VALUE = "value"
 
 
@@ -72,12 +72,12 @@ class Span:
     """Bytes that belong together.
 
     Attributes:
-        of: the part, step or member that they are, or where they lie.
-        places: wire offsets, in rising order; a member has those of its integer.
-        raw: the bytes at these places.
-        size: bytes that it should have.
-        number: the integer in them, None where they are not whole or hold none.
-        fault: kind of what is wrong with them, "" where nothing is.
+        of: the part, step or member, or the role of bytes outside of them.
+        places: wire offsets, ascending; a member has those of its integer.
+        raw: the bytes at these offsets.
+        size: the expected number of bytes.
+        number: the integer that they encode, None if they are incomplete or not an integer.
+        fault: kind of the fault in them, "" if there is none.
     """
 
     of: Owner
@@ -90,14 +90,14 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A rule that is broken.
+    """A violated rule.
 
     Attributes:
-        kind: what `decode` calls it.
-        rule: which rule.
-        at: wire offset of the first byte that shows it; the size of the wire where bytes are missing.
-        of: the part, step or member that is wrong, None where it is the frame.
-        seen: the number that is wrong, see `Rule`.
+        kind: the kind of error that `decode` raises.
+        rule: the rule.
+        at: wire offset of the first wrong byte; the size of the data if bytes are missing.
+        of: the wrong part, step or member, None for the frame.
+        seen: the wrong number, see `Rule`.
     """
 
     kind: str
@@ -109,7 +109,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """A part as it was found: its bytes without inserted ones, their places, its bytes as they were sent."""
+    """A received part: its bytes without inserted ones, their wire offsets, its bytes as received."""
 
     data: bytes
     places: tuple[int, ...]
@@ -121,18 +121,18 @@ class Dissection:
     """A frame in spans.
 
     Attributes:
-        plan: of the protocol.
-        direction: the direction that the frame is taken for.
+        plan: plan of the protocol.
+        direction: the assumed direction.
         wire: all bytes.
-        request: the packet that is answered, b"" where the protocol has none.
-        message: the message that the number in the frame means, None where that is missing or unknown.
-        number: number of the message, None where it is not in the frame or not whole.
-        address: the address, None where it is not in the frame or not whole.
-        spans: by their first place, a member after its integer; without members they are the wire exactly.
-        faults: what is wrong, that of `kind` first; () where `kind` is "".
-        kind: what `Codec.decode` raises, "" where it gives a message.
-        cells: the parts that were found.
-        expected: the check value that would be right, None where it cannot be told.
+        request: the packet that the frame answers, b"" if responses do not depend on it.
+        message: the message with the number in the frame, None if the number is missing or unknown.
+        number: number of the message, None if missing or incomplete.
+        address: the address, None if missing or incomplete.
+        spans: by first offset, a member after its integer; those that are not members cover the wire once.
+        faults: the violated rules, the one of `kind` first; () if `kind` is "".
+        kind: the kind of error that `Codec.decode` raises, "" for a valid frame.
+        cells: the parts found.
+        expected: the right check value, None if it is not known.
     """
 
     plan: Plan

@@ -1,7 +1,7 @@
-"""How the bytes of a frame travel: inserted bytes, and what that costs.
+"""Transparency: byte stuffing, and the bytes it adds.
 
-Each class is one kind of transparency with its encoding, its decoding and its growth; nothing else in the
-compiler knows how stuffing works.
+Each class is one kind of transparency with its encoding, its decoding and its growth. No other module of the
+compiler implements stuffing.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """Bytes travel as they are."""
+    """Bytes are sent unchanged."""
 
     def most_sent(self, payload: int) -> int:
         """Most bytes that a payload of so many bytes takes on the wire, as far as a length counts them."""
@@ -21,7 +21,7 @@ class Plain:
 
 @dataclass(frozen=True, slots=True)
 class SevenBit:
-    """No byte of the payload has the marker bit, so header and end can be told from it."""
+    """Payload bytes do not have the marker bit, which header and end have."""
 
     marker: int
 
@@ -32,22 +32,22 @@ class SevenBit:
 
 @dataclass(frozen=True, slots=True)
 class Insertion:
-    """After each occurrence of ``after`` an ``insert`` byte is added; occurrences do not overlap."""
+    """Inserts an ``insert`` byte after each occurrence of ``after``; occurrences do not overlap."""
 
     after: bytes
     insert: int
 
     @property
     def inserted(self) -> bytes:
-        """``after`` with the byte that follows it."""
+        """``after`` and the inserted byte."""
         return self.after + bytes((self.insert,))
 
     def stuff(self, data: bytes) -> bytes:
-        """The bytes as they are sent."""
+        """The bytes with inserted ones."""
         return data.replace(self.after, self.inserted)
 
     def places(self, sent: bytes) -> Iterator[int]:
-        """Places at which an inserted byte is due; the last may lie past the end."""
+        """Offsets at which an inserted byte is due; the last may be the end of the data."""
         at = sent.find(self.after)
         while at >= 0:
             at += len(self.after)
@@ -55,15 +55,15 @@ class Insertion:
             at = sent.find(self.after, at + (sent[at : at + 1] == bytes((self.insert,))))
 
     def growth(self, size: int) -> int:
-        """Most bytes that are added to so many."""
+        """Maximum number of bytes inserted into ``size`` bytes."""
         return size // len(self.after)
 
 
 @dataclass(frozen=True, slots=True)
 class FrameStuffing:
-    """The finished frame is stuffed, its check value included; ``front`` and ``back`` bytes of it are not.
+    """The whole frame is stuffed, check value included, except its first ``front`` and last ``back`` bytes.
 
-    The byte inserted after the frame's very last byte is sent, but no receiver waits for it.
+    A byte inserted after the last byte of the frame is sent, but receivers do not wait for it.
     """
 
     rule: Insertion
@@ -75,18 +75,18 @@ class FrameStuffing:
         return payload
 
     def most_frame(self, size: int) -> int:
-        """Most bytes on the wire that a frame of so many bytes takes, whatever it holds."""
+        """Maximum size on the wire of a frame of ``size`` bytes."""
         return size + self.rule.growth(size - self.front - self.back)
 
     def stuff(self, frame: bytes) -> bytes:
-        """The frame as it is sent."""
+        """The stuffed frame."""
         end = len(frame) - self.back
         return frame[: self.front] + self.rule.stuff(frame[self.front : end]) + frame[end:]
 
 
 @dataclass(frozen=True, slots=True)
 class PayloadStuffing:
-    """The payload alone is stuffed; the length counts and the check value covers what is sent."""
+    """Only the payload is stuffed; length and check value apply to the stuffed payload."""
 
     rule: Insertion
 
@@ -95,7 +95,7 @@ class PayloadStuffing:
         return payload + self.rule.growth(payload)
 
     def unstuff(self, sent: bytes) -> bytes | None:
-        """The payload without the inserted bytes, None where one is missing or another one."""
+        """The payload without inserted bytes, None if one is missing or wrong."""
         plain = sent.replace(self.rule.inserted, self.rule.after)
         return plain if self.rule.stuff(plain) == sent else None
 

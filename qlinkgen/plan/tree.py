@@ -1,4 +1,4 @@
-"""The root of a plan: a protocol as every back-end prints it."""
+"""The root of a plan."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from qlinkgen.plan.select import Role
 
 @dataclass(frozen=True, eq=False)
 class MessagePlan:
-    """A message: what the document says of it, and the steps of its payload.
+    """A message: its description in the document, and the steps of its payload.
 
     Attributes:
         message: names, numbers and texts, as the document states them.
-        payload: the steps; equal layouts are equal.
-        envelope: the parts of its frame, without a check value where it carries none.
-        allowed: addresses that it may carry, None where the frame has no address.
-        frame_size: most bytes of its frame before stuffing.
-        wire_size: most bytes on the wire.
-        encoded: the role that the plan is for sends it.
-        decoded: the role that the plan is for receives it.
+        payload: the steps; equal layouts compare equal.
+        envelope: the parts of its frame, without the check value if the message has none.
+        allowed: addresses that it may carry, None if the frame has no address.
+        frame_size: maximum size of its frame before stuffing.
+        wire_size: maximum size on the wire.
+        encoded: whether the role of the plan sends it.
+        decoded: whether the role of the plan receives it.
     """
 
     message: Message
@@ -52,27 +52,27 @@ class MessagePlan:
 
     @property
     def direction(self) -> Direction:
-        """Who sends it."""
+        """Whether the master or the slave sends it, or both."""
         return self.message.direction
 
     @property
     def checked(self) -> bool:
-        """It carries a check value."""
+        """Whether it has a check value."""
         return self.envelope.check is not None
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A protocol, less what an output leaves out.
+    """A protocol, reduced to the messages of an output.
 
     Attributes:
         protocol: names, texts and transactions, as the document states them.
-        role: side that the output is for.
-        frame: how messages travel.
-        messages: those that are kept, in schema order.
-        commands: transactions whose request is kept; a response that is not kept is in none of ``messages``.
-        enums: those that some kept value has; all where nothing is left out.
-        flags: the same for flags.
+        role: the role that the output is for.
+        frame: the frame around each message.
+        messages: the selected messages, in schema order.
+        commands: transactions whose request is selected; the response may not be in ``messages``.
+        enums: enums used by selected messages; all enums if no message is left out.
+        flags: likewise for flags.
         heard: directions that the role receives.
     """
 
@@ -91,11 +91,11 @@ class Plan:
         return {message.name: message for message in self.messages}
 
     def message(self, name: str) -> MessagePlan:
-        """Message of a full name; a command's name alone is its request. Raises KeyError."""
+        """The message with a full name; the name of a command gives its request. Raises KeyError."""
         return self.by_name.get(f"{name}.request") or self.by_name[name]
 
     def received(self, direction: Direction) -> tuple[MessagePlan, ...]:
-        """Messages that a decoder for a direction accepts: its own, and those that both sides may send."""
+        """Messages that a decoder for a direction accepts, those that both sides send included."""
         return tuple(m for m in self.messages if m.direction in (direction, "message"))
 
     def known(self, direction: Direction) -> Mapping[int, MessagePlan]:
@@ -103,10 +103,10 @@ class Plan:
         return {message.id: message for message in self.received(direction)}
 
     def hears(self, message: MessagePlan) -> Direction:
-        """The direction in which a decoder is told to listen for a message."""
+        """The direction that a decoder of the message has to be set to."""
         return self.heard[0] if message.direction == "message" else message.direction
 
     @property
     def max_wire_size(self) -> int:
-        """Most bytes that a kept message takes on the wire."""
+        """Maximum size of a selected message on the wire."""
         return max((message.wire_size for message in self.messages), default=0)
