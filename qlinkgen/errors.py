@@ -1,27 +1,27 @@
-"""Errors of qlinkgen, so that one `except` clause can be as wide or as narrow as needed.
+"""Exceptions of qlinkgen.
 
-* `QlinkgenError`: everything raised on purpose by this package
-    * `SchemaError`: a protocol description is wrong; carries every fault found, each with its place
-    * `GenerationError`: a correct description cannot be turned into the output asked for
-    * `CodecError`: values and bytes do not fit the description (also a `ValueError`)
-        * `EncodeError`: these values cannot be sent
-        * `DecodeError`: these bytes are not what the description allows
-    * `LinkError`: a transaction on the wire failed; the bus can be used again
-        * `NoReply`: nothing usable came in time (also a `TimeoutError`)
-        * `BadReply`: something came, but not the answer
-            * `IllegalCommand`: the device does not know the command
-        * `CommandError`: the device knows the command, but it is not valid at this moment
-        * `Collision`: what was sent came back changed, so others were sending too
-        * `LoadError`: a program was not loaded to its end
-    * `PortError`: the port itself failed (also an `OSError`)
-        * `PortMissing`: there is no such port
-        * `PortBusy`: another program has it
-        * `PortLost`: it went away while it was used
-        * `CapabilityMissing`: it cannot do what was asked for
+* `QlinkgenError`: base class
+    * `SchemaError`: a schema is wrong; holds every fault found, with its location
+    * `GenerationError`: a valid schema cannot be generated for the requested target
+    * `CodecError`: a value or a frame violates the schema (also a `ValueError`)
+        * `EncodeError`: a value cannot be sent
+        * `DecodeError`: received bytes are not a valid message
+    * `LinkError`: a transaction failed; the bus remains usable
+        * `NoReply`: no reply arrived in time (also a `TimeoutError`)
+        * `BadReply`: a reply was corrupt or did not match the request
+            * `IllegalCommand`: the device rejected the command as unknown
+        * `CommandError`: the device rejected the command in its present state
+        * `Collision`: the echo of a request was garbled by another sender
+        * `LoadError`: loading a program failed
+    * `PortError`: the port failed (also an `OSError`)
+        * `PortMissing`: the port does not exist
+        * `PortBusy`: another program uses the port
+        * `PortLost`: the port disappeared while in use
+        * `CapabilityMissing`: the port does not support an operation
     * `HexFileError`: an Intel HEX file cannot be sent to a node (also a `ValueError`)
-    * `ExtraMissing`: an optional part of the installation is needed (also an `ImportError`)
+    * `ExtraMissing`: an optional dependency is not installed (also an `ImportError`)
 
-The generated modules import nothing from here and have an `EncodeError` and a `DecodeError` of their own.
+Generated modules do not import this module; they define their own `EncodeError` and `DecodeError`.
 """
 
 from __future__ import annotations
@@ -56,21 +56,21 @@ __all__ = [
 
 
 class QlinkgenError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base class of the exceptions of this package."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Fault:
-    """One thing wrong in one place of a schema file; its text is a line that editors can jump to.
+    """An error or a warning at a location in a schema; its text has the format that editors jump to.
 
     Attributes:
-        file: path of the file as the user gave it.
-        line: line counted from 1.
-        column: column counted from 1.
-        rule: id of the rule that was broken, as listed in the documentation of the rules.
-        message: what is wrong.
-        hint: what would put it right, or empty.
-        severity: a warning does not stop the file from being used.
+        file: path of the file as given by the user.
+        line: line, from 1.
+        column: column, from 1.
+        rule: id of the violated rule, as listed in docs/rules.md.
+        message: the error.
+        hint: the fix, or empty.
+        severity: a schema with only warnings can be used.
     """
 
     file: str
@@ -88,36 +88,36 @@ class Fault:
 
 
 class SchemaError(QlinkgenError):
-    """A protocol description is wrong.
+    """A schema is wrong.
 
-    A file is checked to its end, so there may be several faults; they are kept in the order of the text.
+    A file is checked to its end, so there may be several faults; they are in the order of the text.
 
     Attributes:
         faults: every fault found, at least one.
     """
 
     def __init__(self, faults: Iterable[Fault]) -> None:
-        """Collect the faults and sort them by place."""
+        """Sort the faults by location."""
         self.faults = tuple(sorted(faults))
         super().__init__("\n".join(map(str, self.faults)))
 
     def __reduce__(self) -> tuple[type[SchemaError], tuple[tuple[Fault, ...]]]:
-        """Pickle by the faults: the inherited way would hand the text to `__init__`."""
+        """Pickle by the faults; the default would pass the text to `__init__`."""
         return type(self), (self.faults,)
 
 
 class GenerationError(QlinkgenError):
-    """A correct description cannot be turned into the output asked for."""
+    """A valid schema cannot be generated for the requested target."""
 
 
 class CodecError(QlinkgenError, ValueError):
-    """Values and bytes do not fit the description.
+    """A value or a frame violates the schema.
 
     Attributes:
-        message: what was seen and which rule it breaks.
-        kind: a word for programs, `crc`, `stuffing`, `length`, `range`, `unknown`, `truncated` or `frame`.
-        field: path of the field, such as `motion.response.segments[3]`; empty when it is not about one.
-        offset: index of the byte in `data` where the fault shows, when there is one.
+        message: what was seen and the violated rule.
+        kind: `crc`, `stuffing`, `length`, `range`, `unknown`, `truncated` or `frame`.
+        field: path of the field, such as `motion.response.segments[3]`; empty for other errors.
+        offset: index of the wrong byte in `data`, None if unknown.
         data: the bytes concerned, as far as known.
     """
 
@@ -130,7 +130,7 @@ class CodecError(QlinkgenError, ValueError):
         offset: int | None = None,
         data: bytes = b"",
     ) -> None:
-        """Keep the particulars as attributes; the text names the field and the offset."""
+        """Set the attributes; the text includes field and offset."""
         self.message = message
         self.kind = kind
         self.field = field
@@ -139,22 +139,22 @@ class CodecError(QlinkgenError, ValueError):
         super().__init__(message)
 
     def __str__(self) -> str:
-        """Return the message with the field before it and the offset behind it."""
+        """Return `field: message (offset N)`."""
         where = f"{self.field}: " if self.field else ""
         offset = f" (offset {self.offset})" if self.offset is not None else ""
         return f"{where}{self.message}{offset}"
 
 
 class EncodeError(CodecError):
-    """These values cannot be sent."""
+    """A value cannot be sent."""
 
 
 class DecodeError(CodecError):
-    """These bytes are not what the description allows."""
+    """Received bytes are not a valid message."""
 
 
 class Particulars(TypedDict, total=False):
-    """What a LinkError may be given beside its text; see there."""
+    """Optional arguments of LinkError."""
 
     node: int | None
     attempts: int
@@ -163,14 +163,14 @@ class Particulars(TypedDict, total=False):
 
 
 class LinkError(QlinkgenError):
-    """A transaction failed on the wire. The port is in order and the bus can be used again.
+    """A transaction failed on the wire. The port and the bus remain usable.
 
     Attributes:
-        message: what was asked, what came, and what to look at.
-        node: address that was asked, None where the protocol has none.
-        attempts: how many times the request was sent.
+        message: the request, what was received, and what to check.
+        node: address of the request, None if the protocol has no addresses.
+        attempts: number of times that the request was sent.
         elapsed: seconds from the call to the failure.
-        received: the last bytes that came, for a look at them.
+        received: the last bytes received, for diagnosis.
     """
 
     def __init__(
@@ -191,24 +191,24 @@ class LinkError(QlinkgenError):
 
 
 class NoReply(LinkError, TimeoutError):
-    """Nothing usable came in time."""
+    """No reply arrived in time."""
 
 
 class BadReply(LinkError):
-    """Something came in time, but it was not the answer: damaged, or of another shape."""
+    """A reply arrived in time but was corrupt or did not match the request."""
 
 
 class IllegalCommand(BadReply):
-    """The device says that it does not know the command."""
+    """The device rejected the command as unknown."""
 
 
 class CommandError(LinkError):
-    """The device knows the command, but it is not valid at this moment: its change was dropped.
+    """The device rejected the command in its present state; it had no effect.
 
-    With `attempts` 0 the last status said so beforehand, and nothing was sent.
+    With `attempts` 0 the last known status ruled the command out, and nothing was sent.
 
     Attributes:
-        status: the status word that says so.
+        status: the status word with the rejection.
     """
 
     def __init__(self, message: str, *, status: int = 0, **particulars: Unpack[Particulars]) -> None:
@@ -217,15 +217,15 @@ class CommandError(LinkError):
 
 
 class Collision(LinkError):
-    """What was sent came back changed: another station was sending at the same time."""
+    """The echo of a request was garbled: another node was sending at the same time."""
 
 
 class LoadError(LinkError):
-    """A program was not loaded to its end.
+    """Loading a program failed.
 
     Attributes:
-        acknowledged: bytes of the program's text that the node has acknowledged.
-        total: bytes of the program's text.
+        acknowledged: number of bytes of the program acknowledged by the node.
+        total: size of the program in bytes.
     """
 
     def __init__(
@@ -237,10 +237,10 @@ class LoadError(LinkError):
 
 
 class PortError(QlinkgenError, OSError):
-    """The port itself failed.
+    """The port failed.
 
     Attributes:
-        port: name of the port, as the user gave it.
+        port: name of the port, as given by the user.
     """
 
     def __init__(self, message: str, *, port: str = "") -> None:
@@ -249,28 +249,28 @@ class PortError(QlinkgenError, OSError):
 
 
 class PortMissing(PortError, FileNotFoundError):
-    """There is no such port."""
+    """The port does not exist."""
 
 
 class PortBusy(PortError):
-    """Another program has the port, or this user may not open it."""
+    """Another program uses the port, or the user lacks permission."""
 
 
 class PortLost(PortError, ConnectionError):
-    """The port went away while it was used: unplugged, or its other side closed."""
+    """The port disappeared while in use: unplugged, or closed by the other side."""
 
 
 class CapabilityMissing(PortError):
-    """The port cannot do what was asked for."""
+    """The port does not support an operation."""
 
 
 class HexFileError(QlinkgenError, ValueError):
     """An Intel HEX file cannot be sent to a node. Nothing has been sent.
 
     Attributes:
-        message: what was seen, the rule, and what to do.
-        file: path of the file as the user gave it.
-        line: line counted from 1, 0 where the file as a whole is meant.
+        message: what was seen, the rule, and the fix.
+        file: path of the file as given by the user.
+        line: line, from 1; 0 for the file as a whole.
     """
 
     def __init__(self, message: str, *, file: str = "", line: int = 0) -> None:
@@ -285,4 +285,4 @@ class HexFileError(QlinkgenError, ValueError):
 
 
 class ExtraMissing(QlinkgenError, ImportError):
-    """Something needs a package that only an extra of this one installs."""
+    """A feature needs a package that an extra of this package installs."""

@@ -1,1 +1,1 @@
-"""The one frozen description of a protocol that every back-end and the runtime read."""
+"""The model: the immutable description of a protocol for all back-ends and the runtime."""

@@ -1,10 +1,9 @@
 """Checksums by name: the catalogue of CRC algorithms, 3 to 64 bits wide, and plain sums.
 
 The parameters of a CRC are those of the RevEng catalogue: `init` and `poly` describe a register that shifts
-towards its high bit, whatever `refin` says. Real code keeps a reflected CRC's register reflected, so that
-nothing has to be turned round for each byte. That second form is called the *register form* here: `start`,
-`feedback`, `residue` and all that `register` and `before` take and return are in it, ready for print in any
-language.
+towards its high bit, regardless of `refin`. Implementations keep the register of a reflected CRC reflected,
+which saves reflecting each byte. Here this is called the *register form*: `start`, `feedback`, `residue` and
+the arguments and results of `register` and `before` have it, so that back-ends can print them directly.
 """
 
 from __future__ import annotations
@@ -23,19 +22,19 @@ __all__ = ["SUMS", "Algorithm", "Checksum", "Sum", "UnknownAlgorithm", "candidat
 
 
 class UnknownAlgorithm(QlinkgenError, LookupError):
-    """No algorithm has this name, or several have.
+    """The name of an algorithm is unknown or ambiguous.
 
     Attributes:
-        name: the name asked for.
-        suggestions: names that exist and may have been meant, the likeliest first.
+        name: the name.
+        suggestions: similar known names, the likeliest first.
     """
 
     def __init__(self, name: str, suggestions: tuple[str, ...] = ()) -> None:
-        """Word the message with the suggestions."""
+        """Compose the error text with the suggestions."""
         self.name = name
         self.suggestions = suggestions
         hint = f"; did you mean {' or '.join(suggestions)}?" if suggestions else ""
-        super().__init__(f"no checksum algorithm is called {name!r}{hint}")
+        super().__init__(f"unknown checksum algorithm {name!r}{hint}")
 
     def __reduce__(self) -> tuple[type[UnknownAlgorithm], tuple[str, tuple[str, ...]]]:
         """Pickle by the arguments, not by the message."""
@@ -50,10 +49,10 @@ class Algorithm:
         name: name in the catalogue, in lower case.
         width: bits of the CRC.
         poly: polynomial without its highest term.
-        init: what the register starts with, not reflected.
-        refin: bytes are taken in with their low bit first.
-        refout: the register is reflected before it is given out.
-        xorout: what the result is combined with at last.
+        init: initial register, not reflected.
+        refin: bytes are processed low bit first.
+        refout: the final register is reflected.
+        xorout: XORed with the result.
         check: CRC of the nine characters 123456789.
         aliases: other names in use.
     """
@@ -71,13 +70,13 @@ class Algorithm:
     aliases: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse parameters that are no CRC."""
+        """Reject parameters that do not describe a CRC."""
         if not 3 <= self.width <= 64:
-            raise ValueError(f"{self.name}: width is {self.width}; CRCs of 3 to 64 bits are known here")
+            raise ValueError(f"{self.name}: width is {self.width}; use 3 to 64 bits")
         for parameter in ("poly", "init", "xorout", "check"):
             if not 0 <= getattr(self, parameter) <= self.mask:
                 raise ValueError(f"{self.name}: {parameter} does not fit into {self.width} bits")
-        # Without the constant term a step forgets a bit: some errors go unseen, and `before` has no answer.
+        # Without the constant term a step loses a bit: some errors go undetected, and `before` is undefined.
         if not self.poly & 1:
             raise ValueError(f"{self.name}: poly must be odd")
 
@@ -93,17 +92,17 @@ class Algorithm:
 
     @property
     def start(self) -> int:
-        """What the register starts with, in register form."""
+        """The initial register, in register form."""
         return _reflect(self.init, self.width) if self.refin else self.init
 
     @property
     def feedback(self) -> int:
-        """The polynomial as a bit-by-bit loop applies it, in register form."""
+        """The polynomial for a bit-by-bit loop, in register form."""
         return _reflect(self.poly, self.width) if self.refin else self.poly
 
     @property
     def residue(self) -> int:
-        """What the register holds after any data followed by its own CRC, in register form.
+        """The register after any data followed by its own CRC, in register form.
 
         The CRC must follow in its natural order: low byte first if `refout` is set, else high byte first. A
         receiver can then run over the whole frame and compare once.
@@ -118,11 +117,11 @@ class Algorithm:
         return self.finish(self.register(data, self.start))
 
     def finish(self, register: int) -> int:
-        """Return the CRC that a register stands for once all bytes have gone through it."""
+        """Return the CRC of the final register."""
         return (_reflect(register, self.width) if self.refin != self.refout else register) ^ self.xorout
 
     def register(self, data: Iterable[int], start: int) -> int:
-        """Return what the register holds after the bytes, beginning with `start`."""
+        """Return the register after the bytes, beginning with `start`."""
         table, register, shift, mask = self.table(), start, self.width - 8, self.mask
         if self.refin:
             for byte in data:
@@ -138,8 +137,8 @@ class Algorithm:
     def before(self, prefix: bytes, value: int) -> int:
         """Return the register from which `prefix` leads to `value`: `register` run backwards.
 
-        A checksum that leaves out a constant preamble can so be taken over the whole frame in one go: from
-        `before(preamble, start)` the preamble itself brings the register to `start`.
+        It allows a checksum that excludes a constant preamble to be computed over the whole frame: beginning
+        with `before(preamble, start)` the register is `start` after the preamble.
         """
         order = range(8) if not self.refin else range(7, -1, -1)
         for byte in reversed(prefix):
@@ -148,10 +147,10 @@ class Algorithm:
         return value
 
     def table(self, bits: int = 8) -> tuple[int, ...]:
-        """Return what `bits` bits of input at once (8, or 4 for a small table) change in the register.
+        """Return the table for `bits` bits of input per step (8, or 4 for a small table).
 
-        Reflected, a step is `register >> bits ^ table[(register ^ input) & (1 << bits) - 1]`, low bits of a
-        byte first; else `register << bits & mask ^ table[register >> width - bits ^ input]`, high bits first.
+        A reflected step is `register >> bits ^ table[(register ^ input) & (1 << bits) - 1]`, low bits first;
+        otherwise `register << bits & mask ^ table[register >> width - bits ^ input]`, high bits first.
         """
         return _table(self, bits)
 
@@ -161,7 +160,7 @@ class Algorithm:
         return register << 1 & self.mask ^ (self.feedback if register >> self.width - 1 ^ bit else 0)
 
     def _unclock(self, register: int, bit: int) -> int:
-        # The polynomial is odd, so the bit that the step shifted in tells whether the polynomial was applied.
+        # The polynomial is odd, so the bit shifted in shows whether the polynomial was applied.
         if self.refin:
             out = register >> self.width - 1
             return (register ^ (self.feedback if out else 0)) << 1 | out ^ bit
@@ -171,7 +170,7 @@ class Algorithm:
 
 @dataclass(frozen=True, slots=True)
 class Sum:
-    """A sum of units modulo a power of two; whether a unit is a byte or a word is up to the caller.
+    """A sum of units, bytes or words, modulo a power of two.
 
     Attributes:
         name: name in schema files.
@@ -212,13 +211,13 @@ def catalogue(width: int | None = None) -> tuple[Algorithm, ...]:
 
 
 def find(name: str) -> Checksum:
-    """Return the algorithm of that name or alias.
+    """Return the algorithm with a name or alias.
 
-    Case and punctuation do not matter, and what is before the slash may be left out where the rest is enough:
+    Case and punctuation are ignored, and the part before the slash may be omitted if the rest is unambiguous:
     `crc-16/ibm-3740`, `CRC16_CCITT_FALSE` and `ccitt-false` are one algorithm.
 
     Raises:
-        UnknownAlgorithm: nothing has that name, or only a part of several names.
+        UnknownAlgorithm: the name is unknown or ambiguous.
     """
     key = _key(name)
     if found := _by_name().get(key):
@@ -229,9 +228,9 @@ def find(name: str) -> Checksum:
     raise UnknownAlgorithm(name, tuple(each.name for each in candidates) or _similar(key))
 
 
-#: Names that documents and libraries use for several algorithms, and those that they mean. The catalogue
-#: gives each of them to one, by its history, and that is not always the likeliest. "CRC-CCITT" is KERMIT by
-#: the standard, IBM-3740 ("FALSE") in most code, and XMODEM in many bootloaders.
+#: Names that documents and libraries use for several algorithms, and these algorithms. The catalogue assigns
+#: each name to one of them for historical reasons, not always the likeliest. "CRC-CCITT" is KERMIT by the
+#: standard, IBM-3740 ("FALSE") in most code, and XMODEM in many bootloaders.
 _CCITT = ("crc-16/ibm-3740", "crc-16/kermit", "crc-16/xmodem", "crc-16/ibm-sdlc", "crc-16/spi-fujitsu")
 _IBM = ("crc-16/modbus", "crc-16/arc", "crc-16/usb")
 _AMBIGUOUS = {
@@ -248,7 +247,7 @@ _AMBIGUOUS = {
 
 
 def candidates(name: str) -> tuple[Algorithm, ...]:
-    """Return the algorithms that a name is used for, the likeliest first; none where there is only one."""
+    """Return the algorithms that an ambiguous name may mean, the likeliest first; () for other names."""
     by_name = {each.name: each for each in _catalogue()}
     return tuple(by_name[each] for each in _AMBIGUOUS.get(_key(name), ()))
 
@@ -272,7 +271,7 @@ def _table(algorithm: Algorithm, bits: int) -> tuple[int, ...]:
     order = range(bits) if algorithm.refin else range(bits - 1, -1, -1)
     for index in range(1, len(table)):
         if low := index & (index - 1):
-            # The step is linear: two inputs combined change what they change apart, combined.
+            # The step is linear: the entry of two combined inputs is the XOR of their entries.
             table[index] = table[low] ^ table[index ^ low]
             continue
         for bit in order:

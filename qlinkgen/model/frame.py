@@ -11,13 +11,13 @@ from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Scalar
 
-#: What a part of a frame is for.
+#: The role of a part of a frame.
 Role = Literal["constant", "length", "message", "address", "payload", "checksum"]
 
 
 @dataclass(frozen=True, slots=True)
 class Checksum:
-    """How the check value is computed and sent."""
+    """The algorithm and wire layout of the check value."""
 
     algorithm: Algorithm | Sum
     #: The check value's wire bytes; bits in no chunk are neither sent nor compared.
@@ -38,7 +38,7 @@ class Checksum:
 
     @property
     def regular(self) -> ByteOrder | None:
-        """Byte order of a check value that is sent whole; None where some bits are left out or regrouped."""
+        """Byte order of a check value that is sent whole; None if bits are omitted or regrouped."""
         return Integer(self.algorithm.width, False, self.chunks).byteorder
 
     def pack(self, value: int) -> bytes:
@@ -48,7 +48,7 @@ class Checksum:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """A run of bytes of a frame. ``scalar`` is the integer of a length, message id or address."""
+    """A part of a frame. ``scalar`` is the integer of a length, message id or address."""
 
     name: str
     role: Role
@@ -60,13 +60,13 @@ class Part:
     checksum: Checksum | None = None
     #: Names of the parts that a length counts.
     counts: tuple[str, ...] = ()
-    #: Payload only: fewest and most bytes.
+    #: Payload only: minimum and maximum size.
     min_size: int = 0
     max_size: int = 0
 
     @property
     def size(self) -> int:
-        """Bytes, 0 for the payload."""
+        """Size in bytes, 0 for the payload."""
         if self.scalar is not None:
             return self.scalar.size
         return len(self.checksum.chunks) if self.checksum else len(self.constant)
@@ -74,20 +74,20 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Stuffing:
-    """After each occurrence of ``after`` an ``insert`` byte is added, so that the preamble stays unique."""
+    """Inserts an ``insert`` byte after each occurrence of ``after``, so that the preamble stays unique."""
 
     after: bytes
     insert: int
     exempt: tuple[str, ...]
-    #: True: the payload is stuffed first; length and checksum cover what is sent. False: the finished frame
-    #: is stuffed, all but the exempt parts.
+    #: True: the payload is stuffed first; length and checksum cover the stuffed payload. False: the whole
+    #: frame is stuffed, except the exempt parts.
     before_checksum: bool = False
     section: Text = ""
 
 
 @dataclass(frozen=True)
 class DelimitedFrame:
-    """Parts in wire order; the end follows from the length, or from the message where there is none."""
+    """Parts in wire order; the end follows from the length if there is one, otherwise from the message."""
 
     parts: tuple[Part, ...]
     stuffing: Stuffing | None = None
@@ -97,28 +97,28 @@ class DelimitedFrame:
     kind = "delimited"
 
     def part(self, role: Role) -> Part | None:
-        """The first part of a role."""
+        """The first part with a role."""
         return next((part for part in self.parts if part.role == role), None)
 
     @cached_property
     def preamble(self) -> bytes:
-        """Constant bytes at the front, b"" where there are none."""
+        """Constant bytes at the start, b"" if there are none."""
         return self.parts[0].constant
 
     @cached_property
     def overhead(self) -> int:
-        """Bytes of a frame beside its payload, before stuffing."""
+        """Size of a frame without its payload, before stuffing."""
         return sum(part.size for part in self.parts)
 
     @cached_property
     def header_size(self) -> int:
-        """Bytes in front of the payload."""
+        """Size of the parts before the payload."""
         names = [part.role for part in self.parts]
         return sum(part.size for part in self.parts[: names.index("payload")])
 
     @cached_property
     def length_bias(self) -> int:
-        """Length field = payload size + this."""
+        """Difference between the length field and the payload size."""
         length = self.part("length")
         return sum(part.size for part in self.parts if length and part.name in length.counts)
 
@@ -128,7 +128,7 @@ class DelimitedFrame:
         return next(part for part in self.parts if part.role == "payload")
 
     def offset(self, name: str) -> int:
-        """Unstuffed bytes in front of a part; parts behind the payload are counted as if it were empty."""
+        """Offset of a part before stuffing; the payload counts as empty."""
         position = 0
         for part in self.parts:
             if part.name == name:
@@ -139,11 +139,10 @@ class DelimitedFrame:
 
 @dataclass(frozen=True)
 class MarkedFrame:
-    """Header and end carry a marker bit that no other byte has.
+    """Header and end have a marker bit that all other bytes lack.
 
-    header = marker | address << address_bits.shift | message id << id_bits.shift; the end byte is the same
-    with
-    ``end_id`` in place of the message id.
+    header = marker | address << address_bits.shift | message id << id_bits.shift; the end byte has ``end_id``
+    in place of the message id.
     """
 
     marker: int
@@ -162,16 +161,16 @@ class MarkedFrame:
 
 @dataclass(frozen=True)
 class PacketFrame:
-    """No frame at all: message id and words go out, words and a check value over both come back."""
+    """Packets without a frame: a request is a message id and words, a response words and a check value."""
 
     id_name: str
     payload_max: int
     #: Sum over the message id and every word of request and response.
     checksum_name: str = "checksum"
     checksum: Checksum | None = None
-    #: Bytes that are summed as one big-endian number.
+    #: Size of the big-endian words that are summed.
     word_size: int = 2
-    #: Check value by which the slave says that it does not know the command.
+    #: Check value with which the slave rejects an unknown command.
     rejected: int | None = None
     doc: Text = ""
     section: Text = ""

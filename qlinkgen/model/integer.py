@@ -1,4 +1,4 @@
-"""Integers on the wire: which of their bits each byte carries."""
+"""Integers on the wire: the bits that each byte carries."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ def group_chunks(parts: tuple[tuple[int, int], ...], bits: int, least_first: boo
 
 
 def pack_chunks(value: int, chunks: tuple[Chunk, ...]) -> bytes:
-    """The wire bytes of an integer; bits of no chunk are dropped."""
+    """The wire bytes of an integer; bits outside of the chunks are dropped."""
     return bytes(value >> chunk.shift & chunk.mask for chunk in chunks)
 
 
 def unpack_chunks(data: bytes, chunks: tuple[Chunk, ...]) -> int:
-    """The unsigned integer in its wire bytes; bits of no chunk are ignored."""
+    """The unsigned integer in its wire bytes; unused bits are ignored."""
     return sum((byte & chunk.mask) << chunk.shift for byte, chunk in zip(data, chunks, strict=True))
 
 
 @dataclass(frozen=True)
 class Integer:
-    """How an integer lies in bytes; what it means is said elsewhere."""
+    """The wire layout of an integer, without its meaning."""
 
     bits: int
     signed: bool
@@ -68,12 +68,12 @@ class Integer:
 
     @property
     def minimum(self) -> int:
-        """Least value that the bits hold."""
+        """Minimum value that the bits can hold."""
         return -(1 << (self.bits - 1)) if self.signed else 0
 
     @property
     def maximum(self) -> int:
-        """Greatest value that the bits hold."""
+        """Maximum value that the bits can hold."""
         return (1 << (self.bits - self.signed)) - 1
 
     @property
@@ -83,7 +83,7 @@ class Integer:
 
     @cached_property
     def byteorder(self) -> ByteOrder | None:
-        """Byte order of a plain integer of whole bytes; None where groups of fewer bits are used."""
+        """Byte order of an integer of whole bytes; None if it is sent in smaller groups."""
         orders: tuple[ByteOrder, ...] = ("big", "little")
         for order in orders:
             if self.bits == 8 * self.size and self.chunks == byte_chunks(self.size, order):
@@ -91,19 +91,19 @@ class Integer:
         return None
 
     def pack(self, value: int) -> bytes:
-        """The wire bytes of a value. Raises ValueError where the bits do not hold it."""
+        """The wire bytes of a value. Raises ValueError if it does not fit."""
         if not self.minimum <= value <= self.maximum:
             raise ValueError(f"{value} does not fit {self.bits} bits")
         return pack_chunks(value, self.chunks)
 
     def unpack(self, data: bytes) -> int:
-        """The value in its wire bytes; bits of no chunk are ignored, see `stray`."""
+        """The value in its wire bytes; unused bits are ignored, see `stray`."""
         return self.signed_value(unpack_chunks(data, self.chunks))
 
     def signed_value(self, bits: int) -> int:
-        """The value of a bit pattern: two's complement where the integer is signed."""
+        """The value of a bit pattern: two's complement if the integer is signed."""
         return bits - (1 << self.bits) if self.signed and bits >> (self.bits - 1) else bits
 
     def stray(self, data: bytes) -> bool:
-        """Bits are set that belong to no chunk, so the bytes are not those of a value."""
+        """Whether unused bits are set, so that the bytes are invalid."""
         return any(byte & ~chunk.mask for byte, chunk in zip(data, self.chunks, strict=True))

@@ -1,4 +1,4 @@
-"""A message: its fields in wire order, and what can be known about its payload before any byte is seen."""
+"""A message: its fields in wire order, and the limits of its payload."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Literal, assert_never
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Array, BitField, Bits, Blob, FieldType, Scalar
 
-#: "request": master to slave; "response": slave to master; "message": sent by anybody, answered by nobody.
+#: "request": master to slave; "response": slave to master; "message": from any node, without a response.
 Direction = Literal["request", "response", "message"]
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A run of payload bytes. ``Bits`` hold several named values, every other type one."""
+    """A field of the payload. ``Bits`` hold several named values, all other types one."""
 
     name: str
     type: FieldType
@@ -28,7 +28,7 @@ class Field:
 
     @property
     def min_size(self) -> int:
-        """Fewest bytes on the wire."""
+        """Minimum size on the wire."""
         match self.type:
             case Blob() | Array():
                 return self.type.length.minimum * self.type.item_size
@@ -39,7 +39,7 @@ class Field:
 
     @property
     def max_size(self) -> int:
-        """Most bytes on the wire."""
+        """Maximum size on the wire."""
         match self.type:
             case Blob() | Array():
                 return self.type.length.maximum * self.type.item_size
@@ -50,29 +50,29 @@ class Field:
 
     @property
     def quantity(self) -> str:
-        """What the number of its items is called, "" where it is an integer."""
+        """Suffix for the name of its number of items, "" for an integer."""
         return self.type.quantity if isinstance(self.type, Blob | Array) else ""
 
     @property
     def fixed(self) -> bool:
-        """The size is always the same."""
+        """Whether the size is constant."""
         return not isinstance(self.type, Blob | Array) or self.type.length.fixed
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """Something that a caller sets and reads: an attribute of the message object, a C struct member."""
+    """A value that the user sets and reads: an attribute of a message object, a member of a C struct."""
 
     name: str
     type: Scalar | Blob | Array
     doc: Text
-    #: The field that carries it, and its place inside where that is an integer of several values.
+    #: The field that holds it, and its bits if the field is divided into bits.
     field: Field
     bits: BitField | None = None
 
     @property
     def required(self) -> bool:
-        """The caller has to choose the value; its default is for vectors alone."""
+        """Whether the caller must provide the value; the default is used only in vectors."""
         return self.type.required
 
     @property
@@ -86,8 +86,7 @@ class Value:
 class Message:
     """One message in one direction.
 
-    ``addresses`` are the (first, last) ranges of the address field that this message may carry, () where the
-    frame has no address.
+    ``addresses`` are the (first, last) ranges of legal addresses, () if the frame has no address.
     """
 
     name: str
@@ -98,7 +97,7 @@ class Message:
     doc: Text = ""
     section: Text = ""
     confirmed: bool = True
-    #: A payload of no bytes at all is taken as the message with every field at its default.
+    #: An empty payload means that every field has its default.
     empty_is_default: bool = False
     #: The frame's checksum is sent with this message.
     checksum: bool = True
@@ -107,17 +106,17 @@ class Message:
 
     @cached_property
     def min_size(self) -> int:
-        """Fewest payload bytes (``empty_is_default`` not considered)."""
+        """Minimum size of the payload, without regard to ``empty_is_default``."""
         return sum(field.min_size for field in self.fields)
 
     @cached_property
     def max_size(self) -> int:
-        """Most payload bytes."""
+        """Maximum size of the payload."""
         return sum(field.max_size for field in self.fields)
 
     @property
     def fixed(self) -> bool:
-        """The payload has always the same size."""
+        """Whether the size of the payload is constant."""
         return all(field.fixed for field in self.fields)
 
     @cached_property
@@ -127,7 +126,7 @@ class Message:
 
     @cached_property
     def values(self) -> tuple[Value, ...]:
-        """What a caller sets and reads, in wire order, without constants, reserved bytes and counts."""
+        """Values in wire order; constants, reserved bytes and counts are not values."""
         return tuple(self._values())
 
     def _values(self) -> Iterator[Value]:
@@ -147,7 +146,7 @@ class Message:
 
     @property
     def docs(self) -> dict[str, str]:
-        """What the document says of fields, and of the values inside them."""
+        """Descriptions of fields and of the values inside them, by name."""
         found = {field.name: field.doc for field in self.fields}
         for field in self.fields:
             if isinstance(field.type, Bits):
@@ -155,7 +154,7 @@ class Message:
         return found
 
     def offset(self, name: str) -> int | None:
-        """Bytes of payload before a field, None where a field of variable size stands before it."""
+        """Offset of a field in the payload, None after a field of variable size."""
         position = 0
         for field in self.fields:
             if field.name == name:

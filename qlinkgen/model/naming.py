@@ -1,7 +1,7 @@
-"""Names in the output: how each language spells a name of a schema so that it cannot mean anything else.
+"""Names in the output: converts schema names to identifiers of each language without collisions.
 
-A word that a language, its library or the generated code uses gets an underscore at its end, or says what it
-is (`FaultEnum`, `error_flags`). Lint looks for clashes among the results, so it uses the same functions.
+A name that a language, its library or the generated code uses gets a trailing underscore, or its kind as a
+suffix (`FaultEnum`, `error_flags`). Lint uses the same functions to find clashes among the results.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ import keyword
 
 # Python -----------------------------------------------------------------------------------------------------
 
-#: What every message has, and what its methods call it.
+#: Methods of every message, and their first parameter.
 _METHODS = frozenset({"to_frame", "to_bytes", "from_bytes", "from_checked", "measure_payload", "self", "cls"})
-#: What an address cannot hide: types and decorators in the body of its class.
+#: Types and decorators in the body of a message class, which an address must not hide.
 _IN_CLASS = frozenset({"int", "bytes", "classmethod"})
-#: The same in the functions that take it as an argument.
+#: Names in the functions that take an address as an argument.
 _IN_FUNCTIONS = frozenset(
     """as_bytes bytes cls data frame head illegal len message number payload struct_error
     wrong_size""".split()  # noqa: SIM905 - reads better than quoted words
 )
-#: What a class of calls or handlers has itself, and types of arguments.
+#: Attributes of the classes of calls and handlers, and types of arguments.
 _IN_CALLS = frozenset("ask tell handle number axis bool bytes float int list str type".split())  # noqa: SIM905
-#: Classes and constants of a codec, what it imports, and constants in the body of a message's class.
+#: Classes, constants and imports of a codec, and constants in the body of a message class.
 _IN_MODULE = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
     Codec Bus OpenEnum BaseMessage ArrayRule BytesRule ConstantRule CountRule IntRule MaskRule
@@ -38,12 +38,12 @@ def attribute(name: str) -> str:
 
 
 def address_attribute(name: str) -> str:
-    """The attribute of an address: its type is told in the body of the class."""
+    """The attribute of an address, which is annotated in the body of the class."""
     return f"{name}_" if name in _IN_CLASS else attribute(name)
 
 
 def address_argument(name: str) -> str:
-    """The argument of an address where a payload is decoded alone."""
+    """The address argument of functions that decode a payload."""
     return f"{name}_" if name in _IN_FUNCTIONS else address_attribute(name)
 
 
@@ -59,16 +59,16 @@ def message_class(name: str) -> str:
 
 
 def constant_class(name: str, kind: str, messages: frozenset[str]) -> str:
-    """The class of an enum or of flags; one that a message has is told apart by what it is."""
+    """The class of an enum or of flags; its kind is appended if a message has the same name."""
     found = pascal(name)
     return f"{found}{pascal(kind)}" if found in messages or found in _IN_MODULE else found
 
 
 # C ----------------------------------------------------------------------------------------------------------
 
-#: Keywords of C and C++ up to C23 and C++23, those of compilers without -std, and macros without arguments:
-#: those of the C library, of GNU compilers and of Windows. Macros with arguments are expanded only before a
-#: parenthesis, and none follows a member. In C++ a member cannot be called like the type of another one.
+#: Keywords of C and C++ up to C23 and C++23, those of compilers without -std, and object-like macros of the C
+#: library, of GNU compilers and of Windows. Function-like macros expand only before a parenthesis, which
+#: never follows a member. In C++ a member cannot have the name of the type of another one.
 _C_WORDS = frozenset(
     """alignas alignof and and_eq asm atomic_cancel atomic_commit atomic_noexcept auto bitand bitor bool
     break case catch char char8_t char16_t char32_t class co_await co_return co_yield compl concept
@@ -85,23 +85,23 @@ _C_WORDS = frozenset(
     si_utime si_value st_atime st_ctime st_mtime arm mips i386 vax far huge near interface small
     hyper cdecl pascal interrupt""".split()  # noqa: SIM905
 ) | {f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)}
-#: Variables of the generated functions that have the address as a parameter, and what structs have beside it.
+#: Variables of generated functions with an address parameter, and other members of structs with an address.
 _C_LOCALS = frozenset(
     """size payload wire capacity message value from to end check since index sent status id slave master
     listener frame checked request response body buffer start count raw sum crc payload_size
     payload_capacity total trailer covered head place broadcast context byte at direction
     size_t""".split()  # noqa: SIM905
 )
-#: What a table of handlers has beside its functions.
+#: Members of a table of handlers other than functions.
 _C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id"})
-#: What follows the protocol's name in the header's own names, and what their longer names begin with.
+#: Names that the header itself defines, or their beginnings, without the prefix of the protocol.
 _C_STEMS = frozenset(
     """addressing async_master_calls async_node_calls bits bits_per bus check codec_error command crc
     decode decode_buffer decode_error direction enable encode_error encode error event fault first
     frame last listener master master_calls max max_frame max_payload max_wire message node_calls ok
     receiver repeat repeat_by request response slave slave_handlers status stream_decoder""".split()  # noqa: SIM905
 )
-#: Types of the C library that begin like names of a protocol.
+#: Types of the C library that may equal a name with the prefix of a protocol.
 _C_TYPES = frozenset(
     {
         f"{sign}int_{kind}{bits}_t"
@@ -124,12 +124,12 @@ def address_member(name: str) -> str:
 
 
 def handler(name: str, address: str) -> str:
-    """The member of a table that handles a command or message; ``address`` is the table's own."""
+    """The member of a table of handlers for a command or message; ``address`` is the address member."""
     return f"{name}_" if name in _C_WORDS or name in _C_HANDLERS or name == address else name
 
 
 def stem(protocol: str, name: str, kind: str) -> str:
-    """What the names of an enum, of flags, of a type or of a message begin with, after the protocol's."""
+    """The stem of the names of an enum, flags, type or message, without the prefix of the protocol."""
     taken = name in _C_STEMS or name.startswith("crc_") or f"{protocol}_{name}_t" in _C_TYPES
     return f"{name}_{kind}" if taken else name
 
@@ -147,13 +147,13 @@ _FILES = frozenset(
 
 
 def file_stem(protocol: str) -> str:
-    """What files of a protocol are called: headers, modules, vectors."""
+    """The stem of the files of a protocol: headers, modules, vectors."""
     return f"{protocol}_" if protocol in _FILES or keyword.iskeyword(protocol) else protocol
 
 
 # Records ----------------------------------------------------------------------------------------------------
 
-#: What JSON lines, vectors and containers of construct say of a message beside its address.
+#: Other keys of JSON lines, vectors and construct containers.
 _IN_RECORDS = frozenset(
     """message fields raw kinds request payload wire source decode_only what kind part error at from to
     sent_on repeat delay late stray unanswered asked offset time refused work""".split()  # noqa: SIM905

@@ -1,4 +1,4 @@
-"""The root of the model: everything that a back-end or a runtime may know of a protocol."""
+"""The root of the model."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from qlinkgen.model.types import ByteOrder, Enum, Flags
 
 @dataclass(frozen=True)
 class Protocol:
-    """One protocol as its schema describes it, checked and with every computed number.
+    """A protocol as described by its schema, validated, with all derived numbers.
 
-    ``commands`` are the transactions, ``messages`` every message of every direction in schema order.
+    ``commands`` are the transactions, ``messages`` all messages of all directions in schema order.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Protocol:
     bus: Bus
     commands: tuple[Command, ...]
     messages: tuple[Message, ...]
-    #: SHA-256 of the schema's text (line ends made uniform), 12 hex digits; stands in every generated banner.
+    #: SHA-256 of the schema text with normalised line ends, 12 hex digits; appears in every generated banner.
     schema_hash: str
     #: File name of the schema, without its folder.
     schema_file: Text
@@ -40,9 +40,9 @@ class Protocol:
     texts: bool = True
 
     def without_texts(self) -> Protocol:
-        """The protocol with its numbers and checked names alone: code made of it repeats nothing else.
+        """The protocol without free text, so that generated code contains only names and numbers.
 
-        A back-end spells text on the wire, such as the default of a field, as numbers then.
+        Back-ends then print text on the wire, such as the default of a field, as numbers.
         """
         file = f"{self.name}.yaml"
         return replace(without_texts(self), title=self.name, schema_file=file, texts=False)
@@ -53,11 +53,11 @@ class Protocol:
         return {message.name: message for message in self.messages}
 
     def message(self, name: str) -> Message:
-        """Message of a full name; a command's name alone is its request. Raises KeyError."""
+        """The message with a full name; the name of a command gives its request. Raises KeyError."""
         return self.by_name.get(f"{name}.request") or self.by_name[name]
 
     def received(self, direction: Direction) -> tuple[Message, ...]:
-        """Messages that a decoder for a direction accepts: its own, and those that anybody may send."""
+        """Messages that a decoder for a direction accepts, those that both sides send included."""
         return tuple(m for m in self.messages if m.direction in (direction, "message"))
 
     @property
@@ -68,7 +68,7 @@ class Protocol:
 
     @property
     def address_name(self) -> str | None:
-        """Name of the frame's address ("node", "address"), None where it has none."""
+        """Name of the frame's address ("node", "address"), None if there is none."""
         match self.frame:
             case MarkedFrame():
                 return self.frame.address_name
@@ -87,7 +87,7 @@ class Protocol:
         return {part.name: part.section for part in parts}
 
     def command_of(self, message: Message) -> Command | None:
-        """The transaction that a message belongs to."""
+        """The transaction of a message, None if it has none."""
         return next(
             (command for command in self.commands if message in (command.request, command.response)), None
         )

@@ -1,19 +1,19 @@
-"""Which known word was probably meant by an unknown one."""
+"""Suggests known words for a misspelt one."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-#: A word longer than this is no misspelling, and comparing it takes long.
+#: Longer words are cut, because comparing them takes long.
 _LONGEST = 80
 
 
 def similar(word: str, known: Iterable[str], most: int = 1) -> tuple[str, ...]:
-    """Return the known words that differ from a word as typing errors do, the nearest first.
+    """Return the known words that differ from a word by typing errors, the nearest first.
 
-    An error is a character too many, too few or wrong, or two that are swapped. One is allowed; where the
-    first character is right, one for every three characters begun. In a word of three a wrong character is
-    too much: `f32` is not `u32`, nor `lrc` `arc`.
+    An error is an additional, missing or wrong character, or a swap of two. One error is allowed, or one for
+    every three characters begun if the first character is right. In a word of three a wrong character is not
+    allowed: `f32` does not suggest `u32`, nor `lrc` `arc`.
     """
     asked = word[:_LONGEST].lower()
     found = []

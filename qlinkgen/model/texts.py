@@ -1,6 +1,6 @@
-"""Free text: what a schema says in words, as opposed to names, numbers and wire bytes.
+"""Free text of a schema, as opposed to names, numbers and wire bytes.
 
-Fields of the model that hold free text are declared as `Text` or `Labels`: `without_texts` finds them by it.
+Fields of the model that hold free text are declared as `Text` or `Labels`; `without_texts` clears these.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from typing import Annotated, TypeAlias, TypeVar, cast
 
 _FREE = "free text"
 
-#: What the author wrote for readers, in any characters but `CONTROL`.
+#: Text for human readers, in any characters except `CONTROL`.
 Text: TypeAlias = Annotated[str, _FREE]
-#: Words of a protocol's own, by the name of what they belong to.
+#: Protocol-specific attributes by name.
 Labels: TypeAlias = Annotated[Mapping[str, str | int | bool], _FREE]
 
 _Node = TypeVar("_Node")
 
-#: Characters that no text may hold: control characters but tab and line feed, line separators, marks that
-#: reorder text, surrogates, and code points that are not characters. On a terminal they are commands; in
-#: source they end lines, or show a reader something else than a compiler reads.
+#: Illegal characters: control characters except tab and line feed, line separators, marks that reorder text,
+#: surrogates, and code points that are not characters. Terminals execute them; in source code they end lines,
+#: or display text that differs from what a compiler reads.
 CONTROL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ufffe\uffff\ud800-\udfff]"
 )
@@ -36,23 +36,23 @@ def visible(text: str) -> str:
 
 
 def escaped(character: str) -> str:
-    r"""A character as ``\x1b`` or ``\u2028``, as Python and JSON know it."""
+    r"""A character as an escape, ``\x1b`` or ``\u2028``."""
     number = ord(character)
     return f"\\x{number:02x}" if number < 0x100 else f"\\u{number:04x}"
 
 
 def one_line(text: str) -> str:
-    """The text on one line, safe for a terminal; any run of blanks is one."""
+    """The text on one line, safe for a terminal; runs of blanks are collapsed."""
     return visible(_BLANKS.sub(" ", text).strip(" "))
 
 
 def without_texts(node: _Node) -> _Node:
-    """The same part of a model with every free text empty."""
+    """A copy of a part of the model in which every free text is empty."""
     return cast(_Node, _Stripper().strip(node))
 
 
 class _Stripper:
-    """Strips each object once, so that what was shared stays shared."""
+    """Strips each object once, so that shared objects stay shared."""
 
     def __init__(self) -> None:
         self._done: dict[int, object] = {}
@@ -70,7 +70,7 @@ class _Stripper:
 
 @functools.cache
 def _blanks(kind: type) -> Mapping[str, object]:
-    """Empty values for the fields of a class that hold free text."""
+    """Empty values for the free text fields of a class."""
     hints = typing.get_type_hints(kind, include_extras=True)
     return {
         each.name: "" if hints[each.name] == Text else {}

@@ -1,4 +1,4 @@
-"""Who asks, what answers, how long to wait, what may be repeated."""
+"""Transactions: request, response, timing and repetition."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Literal
 from qlinkgen.model.message import Message
 from qlinkgen.model.texts import Labels, Text
 
-#: "node": one node; "broadcast": all; "either": one or all, an answer comes from one node alone if at all;
-#: "answered_broadcast": one or all, and a broadcast is answered too, so only one node may be there;
+#: "node": one node; "broadcast": all nodes; "either": one or all, and only requests to one node are answered;
+#: "answered_broadcast": one or all, and a broadcast is answered too, so that only one node may be on the bus;
 #: "none": the frame has no address.
 Addressing = Literal["node", "broadcast", "either", "answered_broadcast", "none"]
 BusKind = Literal["master_slave", "ring", "host"]
@@ -19,7 +19,7 @@ BusKind = Literal["master_slave", "ring", "host"]
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
-    """Time that the answering side may take: ``byte_times`` at the bus's speed plus ``seconds``."""
+    """Response time limit: ``byte_times`` at the speed of the bus plus ``seconds``."""
 
     byte_times: Fraction = Fraction(0)
     seconds: Fraction = Fraction(0)
@@ -27,17 +27,17 @@ class Allowance:
 
 @dataclass(frozen=True, slots=True)
 class Repeat:
-    """Whether a request may be sent again when no answer came."""
+    """Whether a request may be repeated after a missing response."""
 
-    #: Repeating the request does no harm.
+    #: Repeating the request is harmless.
     safe: bool
-    #: Field that tells the slave a repeat from a new request, "" where there is none.
+    #: Field by which the slave distinguishes a repeat from a new request, "" if there is none.
     counter: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A transaction: a request and its response, or None where nothing answers."""
+    """A transaction: a request and its response, None if it is not answered."""
 
     name: str
     id: int
@@ -46,29 +46,29 @@ class Command:
     addressing: Addressing
     response_within: Allowance
     repeat: Repeat
-    #: Requests that may be under way at once.
+    #: Maximum number of outstanding requests.
     in_flight: int = 1
     doc: Text = ""
     section: Text = ""
     confirmed: bool = True
-    #: What this protocol alone says of its commands; names and values are declared in the schema.
+    #: Protocol-specific attributes; names and values are declared in the schema.
     attributes: Labels = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def echoes(self) -> tuple[str, ...]:
-        """Values of the response that repeat the value of the same name of the request."""
+        """Values of the response that repeat the value of the same name in the request."""
         values = self.response.values if self.response else ()
         return tuple(value.name for value in values if value.field.echo)
 
 
 @dataclass(frozen=True, slots=True)
 class Bus:
-    """The line and who is on it. ``nodes`` is the (first, last) address, None where frames have none."""
+    """The line and its nodes. ``nodes`` is the (first, last) address, None if frames have no address."""
 
     kind: BusKind
     nodes: tuple[int, int] | None
     broadcast: int | None
-    #: Usual speed of the line, None where the document names none.
+    #: Usual speed of the line in bit/s, None if the document does not state it.
     baud: int | None
     bits_per_byte: int
     response_within: Allowance

@@ -1,8 +1,8 @@
-"""What a field may hold: integers, with or without a meaning, byte strings, text, arrays.
+"""Types of fields: integers with or without a meaning, byte strings, text, arrays.
 
-Every type is immutable and knows its size on the wire and its range. Numbers are raw (the integer on the
-wire) unless a name says physical. A scalar's bytes are described by chunks, one per wire byte, so that both
-byte orders and groups of seven bits are one mechanism.
+Every type is immutable and has a size on the wire and a range. Numbers are raw (the integer on the wire)
+unless a name contains physical. Chunks, one per wire byte, describe the layout of a scalar, so that byte
+orders and groups of seven bits share one mechanism.
 """
 
 from __future__ import annotations
@@ -44,8 +44,7 @@ __all__ = [
 
 Number = int | float | Decimal
 
-#: Bits of a double's significand: a raw value with more of them is carried as a Decimal so that nothing is
-#: lost.
+#: Bits of a double's significand: raw values with more bits become a Decimal, which is exact.
 DOUBLE_BITS = 53
 
 _EXACT = Context(prec=100)
@@ -53,7 +52,7 @@ _EXACT = Context(prec=100)
 
 @dataclass(frozen=True, slots=True)
 class NamedValue:
-    """One name of an enum, or one bit of a set of flags."""
+    """A member of an enum, or a bit of flags."""
 
     name: str
     value: int
@@ -62,7 +61,7 @@ class NamedValue:
 
 @dataclass(frozen=True, slots=True)
 class Enum:
-    """Named numbers. A number without a name is kept as it is."""
+    """Named numbers. A number without a name is legal."""
 
     name: str
     bits: int
@@ -82,7 +81,7 @@ class Flags:
     name: str
     bits: int
     members: tuple[NamedValue, ...]
-    #: True: a reserved bit that is set is a range error. False: reserved bits are kept as they are.
+    #: True: a set reserved bit is a range error. False: reserved bits are preserved.
     reserved_zero: bool = False
     doc: Text = ""
     section: Text = ""
@@ -121,7 +120,7 @@ class Scaling:
         return raw * self.scale + self.offset
 
     def raw(self, physical: Fraction) -> int:
-        """The nearest raw step (a tie goes to the even step); not range-checked."""
+        """The nearest raw step (ties to even); the range is not checked."""
         return round((physical - self.offset) / self.scale)
 
 
@@ -133,39 +132,39 @@ def _gcd(a: int, b: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Settable:
-    """The caller chooses the value."""
+    """The user sets the value."""
 
-    #: No default is written, and 0 is not legal.
+    #: The schema gives no default, and 0 is not legal.
     required: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """Always sent as the default, and must be received as it."""
+    """Sent as the default; receivers reject other values."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reserved:
-    """Sent as the default, and ignored when received."""
+    """Sent as the default and ignored when received."""
 
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """The size of a run that follows: filled and verified by the codec."""
+    """The size of a later run: filled and verified by the codec."""
 
     #: Name of the field of variable size.
     run: str
-    #: What is counted of it.
+    #: The unit of the count.
     unit: Literal["items", "bytes"]
 
 
-#: What a codec does with an integer.
+#: How a codec treats an integer.
 Role = Settable | Constant | Reserved | Count
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scalar:
-    """An integer on the wire, whatever it means: number, bool, enum, flags, scaled or fixed-point value."""
+    """An integer on the wire of any meaning: number, bool, enum, flags, scaled or fixed-point value."""
 
     bits: int
     signed: bool = False
@@ -177,7 +176,7 @@ class Scalar:
     scaling: Scaling | None = None
     unit: Text = ""
     meaning: Enum | Flags | Literal["bool"] | None = None
-    #: The named type that the field has, "" where its type has no name. Equal layouts may differ in it.
+    #: The named type of the field, "" if its type has no name. Not part of the layout.
     type_name: str = field(default="", compare=False)
 
     @property
@@ -187,37 +186,37 @@ class Scalar:
 
     @cached_property
     def integer(self) -> Integer:
-        """How it lies in bytes."""
+        """Its wire layout."""
         return Integer(self.bits, self.signed, self.chunks)
 
     @property
     def byteorder(self) -> ByteOrder | None:
-        """Byte order of a plain integer of whole bytes; None where groups of fewer bits are used."""
+        """Byte order of an integer of whole bytes; None if it is sent in smaller groups."""
         return self.integer.byteorder
 
     @property
     def natural_minimum(self) -> int:
-        """Least value that the bits can hold."""
+        """Minimum value that the bits can hold."""
         return self.integer.minimum
 
     @property
     def natural_maximum(self) -> int:
-        """Greatest value that the bits can hold."""
+        """Maximum value that the bits can hold."""
         return self.integer.maximum
 
     @property
     def full_range(self) -> bool:
-        """Every bit pattern is a legal value."""
+        """Whether every bit pattern is a legal value."""
         return (self.minimum, self.maximum) == (self.natural_minimum, self.natural_maximum)
 
     @property
     def settable(self) -> bool:
-        """The caller chooses the value; the codec fills the others."""
+        """Whether the user sets the value, not the codec."""
         return isinstance(self.role, Settable)
 
     @property
     def required(self) -> bool:
-        """The caller has to choose: no default is written, and 0 is not legal."""
+        """Whether the caller must provide the value: it has no default, and 0 is not legal."""
         return self.role == Settable(required=True)
 
     @property
@@ -228,7 +227,7 @@ class Scalar:
         return "float" if self.bits <= DOUBLE_BITS else "decimal"
 
     def physical(self, raw: int) -> Number:
-        """Raw integer to the value in the field's unit, as :attr:`number` says."""
+        """The value of a raw integer in the field's unit, of the type :attr:`number`."""
         if self.scaling is None:
             return raw
         value = raw * self.scaling.factor + self.scaling.bias
@@ -241,7 +240,7 @@ class Scalar:
 
 @dataclass(frozen=True, slots=True)
 class BitField:
-    """A named run of bits inside an integer: a field of the message in its own right."""
+    """Named consecutive bits of an integer: a value of the message."""
 
     name: str
     shift: int
@@ -256,7 +255,7 @@ class BitField:
 
 @dataclass(frozen=True, slots=True)
 class Bits:
-    """An integer divided into bit fields; bits of no field are reserved: sent as 0, ignored when received."""
+    """An integer divided into bit fields; other bits are reserved: sent as 0, ignored when received."""
 
     container: Scalar
     members: tuple[BitField, ...]
@@ -269,10 +268,10 @@ class Bits:
 
 @dataclass(frozen=True, slots=True)
 class Length:
-    """How many items (array) or bytes (byte string, text) there are.
+    """The number of items (array) or bytes (byte string, text).
 
-    minimum == maximum: fixed. ``counted_by`` names the field in front that carries the number; with neither,
-    the rest of the payload is taken.
+    It is fixed if minimum == maximum. ``counted_by`` names an earlier field that holds the number; otherwise
+    the field takes the rest of the payload.
     """
 
     minimum: int
@@ -281,7 +280,7 @@ class Length:
 
     @property
     def fixed(self) -> bool:
-        """The number is always the same."""
+        """Whether the number is constant."""
         return self.minimum == self.maximum and not self.counted_by
 
 
@@ -292,25 +291,25 @@ class Blob:
     text: bool
     length: Length
     default: bytes = b""
-    #: The caller has to choose: none is written, and empty is not legal.
+    #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
 
     #: Bytes of one item.
     item_size: int = field(default=1, init=False)
-    #: What the number of its items is called.
+    #: Suffix for the name of its number of items.
     quantity: str = field(default="size", init=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """Integers in a row."""
+    """An array of integers."""
 
     item: Scalar
     length: Length
     default: tuple[int, ...] = ()
-    #: The caller has to choose: none is written, and empty is not legal.
+    #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
-    #: What the number of its items is called.
+    #: Suffix for the name of its number of items.
     quantity: str = field(default="count", init=False)
 
     @property

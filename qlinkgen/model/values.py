@@ -1,8 +1,8 @@
-"""The values of a message outside of any language: as native Python objects, as raw integers, and in JSON.
+"""The values of a message as native Python objects, as raw integers, and in JSON.
 
-A native value is what generated Python and construct hold: int, bool, float or Decimal in the field's unit,
-an int for enums and flags, bytes, str, a list of ints. In JSON, bytes are hex strings, enums their name (a
-number when unknown), flags an integer, scaled values numbers in the unit with all their digits.
+Native values are those of generated Python and construct: int, bool, float or Decimal in the field's unit, an
+int for enums and flags, bytes, str, a list of ints. In JSON, bytes are hex strings, enums their name (a
+number if unknown), flags an integer, scaled values numbers in the unit with all their digits.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TypeAlias, assert_never
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
 
-#: A value as JSON has it; numbers with a point are read as Decimal.
+#: A JSON value; numbers with a decimal point are read as Decimal.
 Json: TypeAlias = "str | int | float | Decimal | Sequence[Json] | Mapping[str, Json] | None"
 Native = int | bool | float | Decimal | bytes | str | list[int]
 
@@ -28,11 +28,11 @@ _DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 class BadValue(ValueError):
-    """A value that a field cannot have; the text names the field, what was seen and what would do."""
+    """A value is illegal for its field; the text names the field, the value and the rule."""
 
 
 def default_of(value: Value) -> Native:
-    """The default of a field, native."""
+    """The native default of a field."""
     kind = value.type
     match kind:
         case Scalar():
@@ -46,12 +46,12 @@ def default_of(value: Value) -> Native:
 
 
 def native_from_raw(scalar: Scalar, raw: int) -> Native:
-    """An integer on the wire as the native value."""
+    """The native value of a raw integer."""
     return bool(raw) if scalar.meaning == "bool" else scalar.physical(raw)
 
 
 def raw_from_native(value: Value, native: Native) -> int:
-    """A native number as the integer on the wire: the nearest step, in range. Raises BadValue."""
+    """The raw integer of a native number: the nearest step, in range. Raises BadValue."""
     scalar = value.type
     assert isinstance(scalar, Scalar)
     if isinstance(native, bytes | str | list) or (isinstance(native, float) and not math.isfinite(native)):
@@ -70,7 +70,7 @@ def raw_from_native(value: Value, native: Native) -> int:
 
 
 def to_json(value: Value, native: Native) -> str | int | float | Decimal | list[int]:
-    """A native value for JSON; a Decimal stays one, so that the writer can print all its digits."""
+    """The JSON value of a native value; a Decimal is kept, so that the writer can print all its digits."""
     kind = value.type
     if isinstance(kind, Blob):
         assert isinstance(native, bytes | str)
@@ -83,17 +83,16 @@ def to_json(value: Value, native: Native) -> str | int | float | Decimal | list[
         return kind.meaning.name_of(native) or int(native)
     if isinstance(kind.meaning, Flags):
         assert not isinstance(native, list)
-        return int(native)  # that of construct is a class of its own
+        return int(native)  # construct has a class of its own
     assert not isinstance(native, bytes)
     return native
 
 
 def from_json(value: Value, given: Json) -> Native:
-    """A JSON value (or text of a command line) as the native one.
+    """The native value of a JSON value or a command line argument.
 
-    Accepts what :func:`to_json` gives, and enum numbers, flag names as a list, numbers in text (0x and 0b
-    too). Raises BadValue; ranges are left to the encoder and
-    to :func:`check_items`.
+    Accepts the output of :func:`to_json`, enum numbers, lists of flag names, and numbers as text (also 0x and
+    0b). Raises BadValue; ranges are checked by the encoder and by :func:`check_items`.
     """
     kind = value.type
     if isinstance(kind, Blob):
@@ -115,7 +114,7 @@ def from_json(value: Value, given: Json) -> Native:
 
 
 def check_items(value: Value, native: Native) -> None:
-    """Whether a list has a legal number of items, each in its range. Raises BadValue."""
+    """Check the number of items of a list, and the range of each. Raises BadValue."""
     kind = value.type
     if not isinstance(kind, Array) or not isinstance(native, list):
         return
@@ -130,7 +129,7 @@ def check_items(value: Value, native: Native) -> None:
 
 
 def whole_number(text: str) -> int | None:
-    """A whole number written decimal, 0x or 0b; None if it is none."""
+    """The value of a decimal, 0x or 0b number; None for other text."""
     if not _WHOLE.fullmatch(text):
         return None
     plain = text.lstrip("+-").lower()
@@ -139,7 +138,7 @@ def whole_number(text: str) -> int | None:
 
 
 def _shown(given: Json) -> str:
-    """What was given, as JSON has it."""
+    """A value for an error text, in JSON notation."""
     if isinstance(given, str):
         return f"'{given}'"
     if isinstance(given, Decimal):
@@ -176,7 +175,7 @@ def _split(name: str, given: str) -> list[str]:
     text = given.strip()
     if text.startswith("["):
         if not text.endswith("]"):
-            raise BadValue(f"{name}: '{given}' begins with [ and does not end with ]")
+            raise BadValue(f"{name}: '{given}' begins with [ but does not end with ]")
         text = text[1:-1]
     groups = [group.split() for group in text.split(",")] if text.strip() else []
     if not all(groups):

@@ -377,8 +377,8 @@ def receiver_text(frame: FramePlan) -> tuple[str, str]:
     match way:
         case Hunt():
             return "hunt", (
-                f"{preamble} does not occur inside a frame, so each byte is processed once and only the frame "
-                "itself is buffered"
+                f"{preamble} does not occur inside a frame, so each byte is processed once and only the "
+                "frame itself is buffered"
             )
         case Rescan():
             seen = f"{preamble} may also be data" if preamble else "frames do not begin with a constant"
