@@ -35,7 +35,7 @@ from qlinkgen.errors import BadReply, IllegalCommand, LinkError, NoReply
 from qlinkgen.link.codec import Framed, Message
 from qlinkgen.link.events import EVENTS_KEPT, Answered, Damaged, Event, Failed, Sent, TimedOut
 from qlinkgen.link.host_events import Filled, HostCounters, InStep, OutOfStep
-from qlinkgen.link.host_rules import Asked, HostCodec, HostRules, Plan, State, WayBack
+from qlinkgen.link.host_rules import Asked, CommandRules, HostCodec, HostRules, State, WayBack
 from qlinkgen.link.host_timing import ROUNDS, SILENT_ROUNDS, HostTiming
 from qlinkgen.link.timing import check_attempts
 from qlinkgen.link.transaction import Packet, Question, Reply, settled
@@ -71,14 +71,14 @@ class HostEngine:
         self.count = HostCounters()
         self.in_step = True
         self.context: type[Framed] | None = None
-        self._plans = {
-            command.request: Plan(command, timing, rules, check=checked is None or name in checked)
+        self._commands = {
+            command.request: CommandRules(command, timing, rules, check=checked is None or name in checked)
             for name, command in codec.COMMANDS.items()
         }
         self._byte_time = timing.byte_time
         self._decode = codec.decode_response
         self._misfits = codec.DecodeError
-        self._check_size = self._plans[type(rules.proof)].check_size
+        self._check_size = self._commands[type(rules.proof)].check_size
         longest = max(command.request.MAX_WIRE_SIZE for command in codec.COMMANDS.values())
         self._most_fills = timing.fills(longest)
         self._state = State.IDLE
@@ -141,14 +141,14 @@ class HostEngine:
         if self._state is not State.IDLE:
             raise RuntimeError("a transaction is under way; a host does one at a time")
         packet = request if type(request) is Packet else Packet(request)
-        plan = self._plans.get(type(packet.request))
-        if plan is None:
+        command = self._commands.get(type(packet.request))
+        if command is None:
             name = type(packet.request).__name__
             raise TypeError(f"{name} was given; a request of this protocol is needed")
-        tries = plan.tries
+        tries = command.tries
         if attempts is not None:
-            tries = self.timing.attempts_of(plan.command, check_attempts(attempts))
-        self._wanted = Asked(packet.request, plan, packet.request.to_frame())
+            tries = self.timing.attempts_of(command.definition, check_attempts(attempts))
+        self._wanted = Asked(packet.request, command, packet.request.to_frame())
         self._packet = packet
         self._tries = tries
         self._attempt = 0
@@ -233,12 +233,12 @@ class HostEngine:
     # Sending ------------------------------------------------------------------------------------------------
 
     def _sendable(self, request: Framed) -> Asked:
-        return Asked(request, self._plans[type(request)], request.to_frame())
+        return Asked(request, self._commands[type(request)], request.to_frame())
 
     def _send(self, now: float) -> bytes:
         packet, wanted = self._packet, self._wanted
-        plan = wanted.plan
-        check = plan.check if packet.check is None or plan.response is None else packet.check
+        command = wanted.command
+        check = command.check if packet.check is None or command.response is None else packet.check
         context = packet.context
         first = b""
         if context is not None and type(context) is not self.context:
@@ -249,9 +249,9 @@ class HostEngine:
                 return self._ask(selection, now, check=True)
             first = self._send_off(selection, now)
         self._attempt += 1
-        if not check and not plan.payload:
+        if not check and not command.payload:
             frame = self._send_off(wanted, now)
-            self._succeed(plan.response() if plan.response is not None else None, now)
+            self._succeed(command.response() if command.response is not None else None, now)
             return first + frame
         self._state = State.WAITING
         if self._attempt > 1:
@@ -260,12 +260,12 @@ class HostEngine:
 
     def _ask(self, asked: Asked, now: float, *, check: bool) -> bytes:
         """Send a packet and wait for its answer."""
-        plan = asked.plan
+        command = asked.command
         self.count.requests += 1
         self._asked = asked
         self._asked_check = check
         self._listening = True
-        self._need = plan.payload + plan.check_size if check else plan.payload
+        self._need = command.payload + command.check_size if check else command.payload
         self._buffer = b""
         self._sent_at = now
         self._deadline = self._line_up(asked, now)
@@ -276,13 +276,13 @@ class HostEngine:
 
     def _send_off(self, asked: Asked, now: float) -> bytes:
         """Send a packet whose answer nobody reads."""
-        plan = asked.plan
+        command = asked.command
         self.count.requests += 1
         self._sent_at = now
-        self._owed += plan.payload + plan.check_size
+        self._owed += command.payload + command.check_size
         self._owed_until = self._line_up(asked, now)
-        if plan.moves:
-            self.context = plan.makes
+        if command.moves:
+            self.context = command.makes
         if self.verbose:
             self.events.append(Sent(now, None, asked.request, 1, asked.frame))
         return asked.frame
@@ -291,7 +291,7 @@ class HostEngine:
         """When the answer must be complete: behind all that is still being sent, and owed."""
         begin = max(now, self._free_at)
         self._free_at = begin + len(asked.frame) * self._byte_time
-        return begin + asked.plan.answer_time + self._owed * self._byte_time
+        return begin + asked.command.answer_time + self._owed * self._byte_time
 
     # Receiving ----------------------------------------------------------------------------------------------
 
@@ -316,21 +316,21 @@ class HostEngine:
             self._filled()
             return
         asked, data, size = self._asked, self._buffer, self._need
-        plan = asked.plan
+        command = asked.command
         raw, rest = (data, b"") if len(data) == size else (data[:size], data[size:])
         try:
             if self._asked_check:
                 response = self._decode(raw, asked)
             else:
-                assert plan.response is not None
-                response = plan.response.from_bytes(raw)
+                assert command.response is not None
+                response = command.response.from_bytes(raw)
         except self._misfits as error:
             self._wrong_answer(getattr(error, "kind", "frame"), data, str(error), now)
             return
-        if plan.moves:
-            self.context = plan.makes
+        if command.moves:
+            self.context = command.makes
         if not self._asked_check:
-            self._owed += plan.check_size
+            self._owed += command.check_size
             self._owed_until = self._deadline
             rest = self._without_owed(rest)
         self._listening = False
@@ -492,7 +492,7 @@ class HostEngine:
         sent = f"sent {self._attempt} times" if self._attempt != 1 else "sent once"
         if not self._attempt:
             sent = "it was not sent"
-        elif not self._wanted.plan.command.repeat_safe and error is not IllegalCommand:
+        elif not self._wanted.command.definition.repeat_safe and error is not IllegalCommand:
             sent += "; it may have been carried out, and must not be repeated blindly"
         self._outcome = error(
             f"{request.NAME}: {reason}; {sent}, {elapsed * 1e3:.1f} ms",

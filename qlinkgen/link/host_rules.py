@@ -58,17 +58,17 @@ class HostRules:
     refusal: bytes = b"\0\0"
 
 
-class Plan:
+class CommandRules:
     """What is known of a command before it is asked: looked up once, not in each transaction."""
 
     __slots__ = (
-        "answer_time", "check", "check_size", "command", "head", "makes", "moves", "payload",
+        "answer_time", "check", "check_size", "definition", "head", "makes", "moves", "payload",
         "response", "tries",
     )  # fmt: skip
 
     def __init__(self, command: Command, timing: HostTiming, rules: HostRules, *, check: bool) -> None:
         response = command.response
-        self.command = command
+        self.definition = command
         self.response = response
         self.check = check and response is not None
         self.head = command.request.MAX_WIRE_SIZE - command.request.MAX_SIZE
@@ -84,15 +84,15 @@ class Plan:
 class Asked:
     """A request as it was sent: all that the check of its answer needs, without encoding it again."""
 
-    __slots__ = ("ID", "NAME", "frame", "payload", "plan", "request")
+    __slots__ = ("ID", "NAME", "command", "frame", "payload", "request")
 
-    def __init__(self, request: Framed, plan: Plan, frame: bytes) -> None:
+    def __init__(self, request: Framed, command: CommandRules, frame: bytes) -> None:
         self.ID = request.ID
         self.NAME = request.NAME
         self.request = request
-        self.plan = plan
+        self.command = command
         self.frame = frame
-        self.payload = frame[plan.head :]
+        self.payload = frame[command.head :]
 
     def to_bytes(self) -> bytes:
         """Return the payload, like the request itself."""

@@ -50,7 +50,7 @@ from qlinkgen.link.events import (
 )
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.timing import Timing, check_attempts
-from qlinkgen.link.transaction import Accepts, Packet, Plan, Question, Reply, settled
+from qlinkgen.link.transaction import Accepts, CommandTiming, Packet, Question, Reply, settled
 
 #: On a paced line nothing that is complete before the request has left can be its answer. Clocks of the two
 #: sides may differ by some percent.
@@ -92,8 +92,8 @@ class MasterEngine:
         self.counters: dict[int | None, LinkCounters] = {None: LinkCounters()}
         self._bus = codec.BUS
         self.health = HealthBook(health, nobody=(None, self._bus.broadcast))
-        self._plans = {
-            command.request: Plan(command, timing, hooks.get(name))
+        self._commands = {
+            command.request: CommandTiming(command, timing, hooks.get(name))
             for name, command in codec.COMMANDS.items()
         }
         self._decoder = codec.StreamDecoder("response")
@@ -106,10 +106,10 @@ class MasterEngine:
         self._state = IDLE
         self._outcome: Reply | LinkError | None = None
         self._request: Framed  #: set by `start`
-        self._plan: Plan = next(iter(self._plans.values()))
+        self._command: CommandTiming = next(iter(self._commands.values()))
         self._node: int | None = None
         #: What was asked before, whose answer may still come.
-        self._earlier: tuple[Plan, int | None] | None = None
+        self._earlier: tuple[CommandTiming, int | None] | None = None
         self._frame = b""
         self._count = self.counters[None]
         self._tries = 0
@@ -166,14 +166,14 @@ class MasterEngine:
         """
         if self._state is not IDLE:
             raise RuntimeError("a transaction is under way; a bus does one at a time")
-        if type(request) is Packet or (plan := self._plans.get(type(request))) is None:
+        if type(request) is Packet or (command := self._commands.get(type(request))) is None:
             raise TypeError(f"{type(request).__name__} was given; a request of this protocol is needed")
-        tries = plan.tries if attempts is None else self._tries_of(plan, attempts)
+        tries = command.tries if attempts is None else self._tries_of(command, attempts)
         self._frame = self.codec.encode(request)
         if self._attempt:
-            self._earlier = self._plan, self._node
+            self._earlier = self._command, self._node
         self._request = request
-        self._plan = plan
+        self._command = command
         node = self._node = self._address(request)
         count = self.counters.get(node)
         if count is None:
@@ -183,7 +183,7 @@ class MasterEngine:
         self._tries = tries
         self._attempt = 0
         self._trial = trial
-        if self.health and not trial and plan.response is not None:  # a stop costs no wait, so it is sent
+        if self.health and not trial and command.response is not None:  # a stop costs no wait, so it is sent
             self._look_at_health(now)
         if self._wrong:
             self._wrong = []
@@ -194,9 +194,9 @@ class MasterEngine:
         self._state = PROBING if self._echo.mode == "auto" else GUARD
         self._probe_until = 0.0
 
-    def _tries_of(self, plan: Plan, attempts: int) -> int:
+    def _tries_of(self, command: CommandTiming, attempts: int) -> int:
         check_attempts(attempts)
-        return self.timing.attempts_of(plan.command, attempts)
+        return self.timing.attempts_of(command.definition, attempts)
 
     def bytes_to_send(self, now: float) -> bytes:
         """Return what the driver has to write now."""
@@ -285,17 +285,17 @@ class MasterEngine:
         self._suspect = False
         if self.verbose:
             self.events.append(Sent(now, self._node, self._request, self._attempt, frame))
-        plan = self._plan
+        command = self._command
         on_wire = len(frame) * self._byte_time
         self._sent_at = now
         broadcast = self._node == self._bus.broadcast and self._node is not None
-        if plan.response is None or (broadcast and not plan.answers_broadcast):
+        if command.response is None or (broadcast and not command.answers_broadcast):
             if self._paced:
-                self._free_at = now + on_wire + plan.allowance
+                self._free_at = now + on_wire + command.allowance
             self._succeed(None, now)
             return frame
         self._earliest = now + EARLY * on_wire if self._paced else now
-        self._deadline = now + on_wire + plan.answer_time
+        self._deadline = now + on_wire + command.answer_time
         self._state = WAITING
         return frame
 
@@ -349,14 +349,14 @@ class MasterEngine:
     # Receiving ----------------------------------------------------------------------------------------------
 
     def _take_in(self, event: Framed | Fault, now: float) -> None:
-        plan = self._plan
+        command = self._command
         if self._echo.broken and self._is_own(event):
             return
         if (
             self._state is WAITING
-            and type(event) is plan.response
+            and type(event) is command.response
             and now >= self._earliest
-            and self._answers(plan, event)
+            and self._answers(command, event)
         ):
             self._succeed(event, now)
         elif is_message(event):
@@ -367,22 +367,22 @@ class MasterEngine:
     def _is_own(self, event: Framed | Fault) -> bool:
         return self._echo.is_own(self.codec.encode(event) if is_message(event) else event.raw)
 
-    def _answers(self, plan: Plan, response: Framed) -> bool:
+    def _answers(self, command: CommandTiming, response: Framed) -> bool:
         """Whether a response of the right type answers the request."""
         request = self._request
-        for name in plan.echoes:
+        for name in command.echoes:
             if getattr(response, name) != getattr(request, name):
                 return False
-        if plan.accepts is not None:
-            return plan.accepts(request, response)
+        if command.accepts is not None:
+            return command.accepts(request, response)
         return self._address(response) == self._node or (
-            plan.answers_broadcast and self._node == self._bus.broadcast
+            command.answers_broadcast and self._node == self._bus.broadcast
         )
 
     def _stray(self, message: Framed, now: float) -> None:
         node = self._address(message)
         count = self.counters.get(node) or self.counters[None]
-        asked = self._attempt > 0 and self._may_answer(self._plan, self._node, message)
+        asked = self._attempt > 0 and self._may_answer(self._command, self._node, message)
         late = asked or (self._earlier is not None and self._may_answer(*self._earlier, message))
         if asked and self._state is WAITING:
             self._wrong.append((message.NAME, self.codec.encode(message)))
@@ -390,10 +390,10 @@ class MasterEngine:
         count.late += late
         self.events.append(Stray(now, message, late))
 
-    def _may_answer(self, plan: Plan, asked: int | None, message: Framed) -> bool:
+    def _may_answer(self, command: CommandTiming, asked: int | None, message: Framed) -> bool:
         """Whether a message is what a node that was asked would say, if to another attempt."""
-        anybody = plan.answers_broadcast and asked == self._bus.broadcast
-        return type(message) is plan.response and (anybody or self._address(message) == asked)
+        anybody = command.answers_broadcast and asked == self._bus.broadcast
+        return type(message) is command.response and (anybody or self._address(message) == asked)
 
     def _damaged(self, fault: Fault, now: float) -> None:
         waiting = self._state is WAITING

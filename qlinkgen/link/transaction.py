@@ -44,15 +44,16 @@ class Reply(NamedTuple):
 Accepts = Callable[[Any, Any], bool]  # Any: a request and a response of the classes of one command
 
 
-class Plan:
+class CommandTiming:
     """What is known of a command before it is asked: looked up once, not in each transaction."""
 
     __slots__ = (
-        "accepts", "allowance", "answer_time", "answers_broadcast", "command", "echoes", "response", "tries",
+        "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "response",
+        "tries",
     )  # fmt: skip
 
     def __init__(self, command: Command, timing: Timing, accepts: Accepts | None) -> None:
-        self.command = command
+        self.definition = command
         self.response = command.response
         self.accepts = accepts
         self.echoes = command.echoes
