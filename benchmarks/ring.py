@@ -106,16 +106,16 @@ class MemoryRing:
                 io.step(io.port.read(0))
 
 
-def threads_round(faces: list[MotionCoordinator]) -> None:
+def threads_round(clients: list[MotionCoordinator]) -> None:
     """Messages to the farthest node, one after the other, each node in a thread."""
-    last = faces[NODES - 1]
+    last = clients[NODES - 1]
     for turn in range(SLICE):
-        faces[0].send(10 + NODES - 2, 1, 0, turn)
+        clients[0].send(10 + NODES - 2, 1, 0, turn)
         last.wait_until(partial(_holds, last, turn), 10.0)
 
 
-def _holds(face: MotionCoordinator, value: int) -> bool:
-    return face.vr[0] == value
+def _holds(client: MotionCoordinator, value: int) -> bool:
+    return client.vr[0] == value
 
 
 @contextlib.contextmanager
@@ -179,7 +179,7 @@ def section(rounds: int) -> Section:
     cut, store = hop_latency(cut_through=True), hop_latency(cut_through=False)
     whole, bytewise, turns, threads = Slices(), Slices(), Slices(), Slices()
     node, ring = RingNode(trio), MemoryRing()
-    faces = [MotionCoordinator(port) for port in memory_ring(NODES)]
+    clients = [MotionCoordinator(port) for port in memory_ring(NODES)]
     try:
         for _ in range(rounds):
             with whole.once(SLICE):
@@ -190,10 +190,10 @@ def section(rounds: int) -> Section:
                 ring.once()
         for _ in range(max(1, rounds // 10)):
             with threads.once(SLICE):
-                threads_round(faces)
+                threads_round(clients)
     finally:
-        for face in faces:
-            face.close()
+        for client in clients:
+            client.close()
     raw, ours = host_latency(rounds)
     own = (ours - raw) * 1e6
     result.rows = [

@@ -8,7 +8,7 @@ from typing import Self
 from qlinkgen.link.codec import Message
 from qlinkgen.link.ring import RingCodec, RingNode
 from qlinkgen.link.ring_events import NetStat, RingEvent
-from qlinkgen.protocols.trio.face import paced_baud
+from qlinkgen.protocols.trio.client import paced_baud
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import drive
 

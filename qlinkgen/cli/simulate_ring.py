@@ -8,8 +8,8 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.simulating import run_bus, say
 from qlinkgen.cli.wire_options import counted, with_crc
 from qlinkgen.link.ring import RingCodec, RingNode
+from qlinkgen.protocols.trio.client import Node, engine_of
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
-from qlinkgen.protocols.trio.face import Node, engine_of
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.sim import FaultPlan, SimulationError
 

@@ -10,8 +10,8 @@ from typing import TypeVar, Unpack
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
 from qlinkgen.protocols.trio.aio import AsyncMembraneKeypad, AsyncMotionCoordinator
+from qlinkgen.protocols.trio.client import Node, engine_of
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
-from qlinkgen.protocols.trio.face import Node, engine_of
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.nodes import MembraneKeypad, MotionCoordinator
 from qlinkgen.protocols.trio.options import NodeOptions, RingOptions
@@ -99,7 +99,7 @@ class VirtualRing:
         """Seconds on the virtual clock."""
         return self.wire.now
 
-    # faces
+    # clients
 
     def coordinator(self, place: int) -> MotionCoordinator:
         """Return the Motion Coordinator at a place of the ring, for a blocking program."""

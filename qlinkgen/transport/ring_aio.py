@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class AsyncRingDriver(ABC):
-    """What a face for asyncio needs of whatever keeps its node at work; see `RingDriver`."""
+    """What a client for asyncio needs of whatever keeps its node at work; see `RingDriver`."""
 
     node: RingNode
 

@@ -1,4 +1,4 @@
-"""What keeps a node of a ring at work: the interface that faces use, and what every driver does."""
+"""What keeps a node of a ring at work: the interface that clients use, and what every driver does."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class NodeIo:
 
 
 class RingDriver(ABC):
-    """What a face needs of whatever keeps its node at work."""
+    """What a client needs of whatever keeps its node at work."""
 
     node: RingNode
 

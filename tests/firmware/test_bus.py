@@ -19,7 +19,7 @@ from qlinkgen.transport import Port
 from tests.firmware.firmware import TARGETS
 from tests.firmware.fixtures import FirmwareLines
 from tests.firmware.node import FirmwareNode
-from tests.qlink.behaviour_drivers import AsyncFace
+from tests.qlink.behaviour_drivers import AsBlocking
 
 ROUNDS = 12
 #: Seconds of host slack on the real port: nothing is late there, however busy this machine is.
@@ -77,24 +77,24 @@ def simulated(seed: int) -> list[object]:
 
 
 @contextlib.contextmanager
-def on(port: Port, face: str) -> Iterator[Bus]:
+def on(port: Port, client: str) -> Iterator[Bus]:
     """Make a bus that leaves its port open."""
-    if face == "blocking":
+    if client == "blocking":
         yield Bus(port, echo="none", slack=SLACK)
         return
     with asyncio.Runner() as runner:
         loop = runner.get_loop()
-        yield cast(Bus, AsyncFace(AsyncBus(port, echo="none", slack=SLACK), loop))
+        yield cast(Bus, AsBlocking(AsyncBus(port, echo="none", slack=SLACK), loop))
 
 
-@pytest.mark.parametrize("face", ["blocking", "asyncio"])
+@pytest.mark.parametrize("client", ["blocking", "asyncio"])
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_session_is_the_same_as_with_a_virtual_node(
-    target: str, face: str, firmware_line: FirmwareLines
+    target: str, client: str, firmware_line: FirmwareLines
 ) -> None:
     line = firmware_line(target)
     node = FirmwareNode(line, **SETTINGS)
-    with on(line.port, face) as bus:
+    with on(line.port, client) as bus:
         assert list(session(bus, 1)) == simulated(1)
         total = bus.engine.total
         assert (total.timeouts, total.strays, total.damaged) == (0, 0, {})

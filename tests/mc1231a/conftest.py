@@ -18,7 +18,7 @@ MakeRig = Callable[..., Rig]
 
 @pytest.fixture(params=SETTINGS, ids=lambda setting: setting.name)
 def make(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
-    """Return a function that makes a rig: every face, every transport."""
+    """Return a function that makes a rig: every client, every transport."""
     with contextlib.ExitStack() as stack:
 
         def make(**options: Any) -> Rig:
@@ -29,7 +29,7 @@ def make(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
 
 @pytest.fixture
 def rig(make: MakeRig) -> Rig:
-    """Return a rig: every face, every transport."""
+    """Return a rig: every client, every transport."""
     return make()
 
 

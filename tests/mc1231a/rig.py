@@ -35,12 +35,12 @@ PATIENCE = 20.0
 class Setting:
     """Where a behaviour is tried."""
 
-    face: Literal["blocking", "asyncio"] = "blocking"
+    client: Literal["blocking", "asyncio"] = "blocking"
     transport: Literal["virtual", "memory", "pty"] = "virtual"
 
     @property
     def name(self) -> str:
-        return f"{self.face}-{self.transport}"
+        return f"{self.client}-{self.transport}"
 
     @property
     def needs(self) -> frozenset[str]:
@@ -49,7 +49,9 @@ class Setting:
 
 
 SETTINGS = [
-    Setting(face, transport) for face in ("blocking", "asyncio") for transport in ("virtual", "memory", "pty")
+    Setting(client, transport)
+    for client in ("blocking", "asyncio")
+    for transport in ("virtual", "memory", "pty")
 ]
 
 
@@ -94,7 +96,7 @@ class Breaking(Port):
         self._port.close()
 
 
-class AsyncFace:
+class AsBlocking:
     """Makes an AsyncHost look like a Host."""
 
     def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
@@ -110,7 +112,7 @@ class AsyncFace:
             result = method(*args, **kwargs)
             if inspect.iscoroutine(result):
                 return self._loop.run_until_complete(result)
-            return AsyncFace(result, self._loop) if isinstance(result, AsyncAxis) else result
+            return AsBlocking(result, self._loop) if isinstance(result, AsyncAxis) else result
 
         return call
 
@@ -203,14 +205,14 @@ def make_rig(
     with contextlib.ExitStack() as stack:
         inner, do = stack.enter_context(_line(setting, wire))
         port = Breaking(inner)
-        if setting.face == "blocking":
+        if setting.client == "blocking":
             host = stack.enter_context(Host(port, **options))
         else:
             loop = asyncio.new_event_loop()
             stack.callback(loop.close)
-            face = AsyncHost(port, **options)
-            stack.callback(face.close)
-            host = cast(Host, AsyncFace(face, loop))
+            client = AsyncHost(port, **options)
+            stack.callback(client.close)
+            host = cast(Host, AsBlocking(client, loop))
         yield Rig(host, port, engine, do)
 
 

@@ -1,4 +1,4 @@
-"""What a user sees of a chip set: the same on every face and over every transport."""
+"""What a user sees of a chip set: the same on every client and over every transport."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The faces of a host beside single calls: threads, tasks, cancelling, raw packets, opening, events."""
+"""The clients of a host beside single calls: threads, tasks, cancelling, raw packets, opening, events."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from typing import Any
 from qlinkgen.protocols.qlink import AsyncNode
 
 
-class AsyncFace:
+class AsBlocking:
     """Makes an AsyncBus look like a Bus."""
 
     def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
@@ -28,7 +28,7 @@ class AsyncFace:
                 return self._loop.run_until_complete(result)
             if inspect.isasyncgen(result):
                 return self._iterate(result)
-            return AsyncFace(result, self._loop) if isinstance(result, AsyncNode) else result
+            return AsBlocking(result, self._loop) if isinstance(result, AsyncNode) else result
 
         return call
 

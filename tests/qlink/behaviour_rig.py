@@ -24,7 +24,7 @@ from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import Port, open_port
 from tests.firmware.firmware import TARGETS
 from tests.firmware.node import FirmwareNode, RealPauses
-from tests.qlink.behaviour_drivers import AsyncFace
+from tests.qlink.behaviour_drivers import AsBlocking
 from tests.support.memory_line import MemoryLine
 from tests.support.needs import decided_by_parameter
 
@@ -44,7 +44,7 @@ class Setting:
     """Where a behaviour is tried; `firmware` names the port that the first node is."""
 
     name: str
-    face: Literal["blocking", "asyncio"] = "blocking"
+    client: Literal["blocking", "asyncio"] = "blocking"
     transport: Literal["virtual", "memory", "pty"] = "virtual"
     rates: Mapping[str, RateLike] = field(default_factory=dict)
     echo: EchoMode = "none"
@@ -65,8 +65,8 @@ class Setting:
 
 
 CLEAN = [
-    Setting(f"{face}-{transport}", face, transport)
-    for face in ("blocking", "asyncio")
+    Setting(f"{client}-{transport}", client, transport)
+    for client in ("blocking", "asyncio")
     for transport in ("virtual", "memory", "pty")
 ]
 FAULTS = [
@@ -270,14 +270,14 @@ def make_rig(setting: Setting, *nodes: Node, turnaround: float = 0.0, **options:
     with contextlib.ExitStack() as stack:
         port = stack.enter_context(_port(setting, wire))
         bus: Bus
-        if setting.face == "blocking":
+        if setting.client == "blocking":
             bus = stack.enter_context(Bus(port, **given))
         else:
             runner = stack.enter_context(asyncio.Runner())
             loop = runner.get_loop()
-            face = AsyncBus(port, **given)
-            stack.callback(face.close)
-            bus = cast(Bus, AsyncFace(face, loop))
+            client = AsyncBus(port, **given)
+            stack.callback(client.close)
+            bus = cast(Bus, AsBlocking(client, loop))
         # A firmware tells under the same names what the behaviours ask of a node.
         yield Rig(setting, cast(tuple[Probe, ...], nodes), bus, wire)
 

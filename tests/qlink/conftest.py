@@ -35,13 +35,13 @@ MakeRig = Callable[..., Rig]
     params=[*CLEAN, *FAULTS, *ECHOES, *FIRMWARES, *FIRMWARE_FAULTS], ids=lambda setting: setting.name
 )
 def make(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
-    """Return a function that makes a rig: every face, every transport, every fault, every firmware."""
+    """Return a function that makes a rig: every client, every transport, every fault, every firmware."""
     yield from _maker(request)
 
 
 @pytest.fixture(params=[*CLEAN, *FIRMWARES], ids=lambda setting: setting.name)
 def make_clean(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
-    """Return a function that makes a rig without faults: every face, every transport, every firmware."""
+    """Return a function that makes a rig without faults: every client, every transport, every firmware."""
     yield from _maker(request)
 
 

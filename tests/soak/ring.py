@@ -23,7 +23,7 @@ from qlinkgen.codecs import trio
 from qlinkgen.link.codec import Message
 from qlinkgen.link.ring_events import Broken, NetStat, Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
-from qlinkgen.protocols.trio.face import Node, engine_of
+from qlinkgen.protocols.trio.client import Node, engine_of
 from qlinkgen.sim import FaultPlan
 from qlinkgen.sim.ring import RingWire
 

@@ -91,7 +91,7 @@ def line(pair: Pair, *nodes: int) -> Iterator[tuple[Port, list[Node]]]:
         assert not thread.is_alive()
 
 
-class Face:
+class Client:
     """A driver, called from a test that is not asynchronous."""
 
     def __init__(self, kind: str, port: Port, engine: MasterEngine, on_event: Any = None) -> None:
@@ -140,10 +140,10 @@ async def _reports_async(master: AsyncMaster, procedure: Procedure[Any], count: 
     return reports
 
 
-faces = pytest.mark.parametrize("kind", ["blocking", "asyncio"])
+clients = pytest.mark.parametrize("kind", ["blocking", "asyncio"])
 
 
-@faces
+@clients
 @over_both
 def test_the_same_outcomes(kind: str, pair: Pair) -> None:
     requests = [
@@ -157,8 +157,8 @@ def test_the_same_outcomes(kind: str, pair: Pair) -> None:
     ]
     with line(pair, 3, 5) as (port, nodes):
         events: list[Event] = []
-        face = Face(kind, port, engine_for(port), events.append)
-        replies = [face.transact(request) for request in requests]
+        client = Client(kind, port, engine_for(port), events.append)
+        replies = [client.transact(request) for request in requests]
         assert [reply.response for reply in replies] == [
             ANSWER,
             qlink.LoopBackResponse(node=5, offset=2, data=b"\xa5" * 25),
@@ -172,57 +172,57 @@ def test_the_same_outcomes(kind: str, pair: Pair) -> None:
         assert [event.request for event in events if isinstance(event, Sent)] == requests
         assert sum(isinstance(event, Answered) for event in events) == 5
         with pytest.raises(qlink.EncodeError):
-            face.transact(qlink.MotorPositionRequest(node=40))
+            client.transact(qlink.MotorPositionRequest(node=40))
         with pytest.raises(TypeError):
-            face.transact(ANSWER)
+            client.transact(ANSWER)
         with pytest.raises(ValueError, match="attempts"):
-            face.transact(ASK, attempts=0)
-        assert face.transact(ASK).response == ANSWER
+            client.transact(ASK, attempts=0)
+        assert client.transact(ASK).response == ANSWER
     assert [type(request) for request in nodes[0].heard] == [
         qlink.MotorPositionRequest, qlink.NodeSyncRequest, qlink.ReadRequest,
         qlink.NodeStartRequest, qlink.MotorPositionRequest,
     ]  # fmt: skip
 
 
-@faces
+@clients
 @over_both
 def test_no_answer(kind: str, pair: Pair) -> None:
     with line(pair) as (port, _):
         events: list[Event] = []
-        face = Face(kind, port, engine_for(port, SCANT), events.append)
+        client = Client(kind, port, engine_for(port, SCANT), events.append)
         begun = port.now()
         with pytest.raises(NoReply) as seen:
-            face.transact(SILENT, attempts=2)
+            client.transact(SILENT, attempts=2)
         assert seen.value.attempts == 2
         assert port.now() - begun >= 2 * SCANT
         assert [event.attempt for event in events if isinstance(event, TimedOut)] == [1, 2]
 
 
-@faces
+@clients
 def test_on_the_virtual_clock_they_do_the_same_to_the_bit(kind: str) -> None:
     outcomes = []
     for each in ("blocking", kind):
         _, port, _ = bus(3, 5)
         events: list[Event] = []
-        face = Face(each, port, engine_for(port, 0.002), events.append)
+        client = Client(each, port, engine_for(port, 0.002), events.append)
         for request in (ASK, SILENT, qlink.NodeSyncRequest(node=0), qlink.NodeResetRequest(node=5)):
             try:
-                face.transact(request)
+                client.transact(request)
             except LinkError as error:
                 outcomes.append(str(error))
         outcomes.append(str([(type(event).__name__, event.at) for event in events]))
     assert outcomes[: len(outcomes) // 2] == outcomes[len(outcomes) // 2 :]
 
 
-@faces
+@clients
 def test_what_came_before_is_no_answer(kind: str) -> None:
     with line(memory_pair, 3) as (port, _):
         there = _other_end(port)
         old = qlink.MotorPositionResponse(node=3, position=1)
         there.write(old.to_frame() * 3)
         events: list[Event] = []
-        face = Face(kind, port, engine_for(port), events.append)
-        assert face.transact(ASK).response == ANSWER
+        client = Client(kind, port, engine_for(port), events.append)
+        assert client.transact(ASK).response == ANSWER
         assert sum(isinstance(event, Stray) for event in events) == 3
 
 
@@ -414,11 +414,11 @@ class TestGivingUp:
 
 
 class TestPortLost:
-    @faces
+    @clients
     @over_both
     def test_while_an_answer_is_waited_for(self, kind: str, pair: Pair) -> None:
         here, there = pair()
-        face = Face(kind, here, engine_for(here))
+        client = Client(kind, here, engine_for(here))
 
         def close() -> None:
             there.read(PATIENCE)
@@ -427,17 +427,17 @@ class TestPortLost:
         closer = threading.Thread(target=close)
         closer.start()
         with pytest.raises(PortLost):
-            face.transact(ASK)
+            client.transact(ASK)
         closer.join(PATIENCE)
-        assert not face.engine.busy
+        assert not client.engine.busy
         with pytest.raises(PortLost):
-            face.transact(ASK)
+            client.transact(ASK)
         here.close()
 
-    @faces
+    @clients
     def test_while_a_request_is_sent(self, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
         _, port, _ = bus(3)
-        face = Face(kind, port, engine_for(port, 0.002))
+        client = Client(kind, port, engine_for(port, 0.002))
         for request in (ASK, qlink.NodeSyncRequest(node=0)):
             with monkeypatch.context() as patch:
 
@@ -446,9 +446,9 @@ class TestPortLost:
 
                 patch.setattr(port, "write", lost)
                 with pytest.raises(PortLost, match="unplugged"):
-                    face.transact(request)
-            assert not face.engine.busy
-        assert face.transact(ASK).response == ANSWER  # reopened, say
+                    client.transact(request)
+            assert not client.engine.busy
+        assert client.transact(ASK).response == ANSWER  # reopened, say
 
 
 class Cleaner:
@@ -468,35 +468,35 @@ class Cleaner:
             self.closed += 1
 
 
-@faces
+@clients
 class TestProcedures:
-    def virtual(self, kind: str) -> tuple[Face, Port]:
+    def virtual(self, kind: str) -> tuple[Client, Port]:
         _, port, _ = bus(3)
-        return Face(kind, port, engine_for(port, 0.002)), port
+        return Client(kind, port, engine_for(port, 0.002)), port
 
     def test_run(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
         cleaner, told = Cleaner(), list[int]()
-        assert face.run(cleaner.counting(3), told.append) == 3
-        assert face.run(cleaner.counting(2)) == 2
+        assert client.run(cleaner.counting(3), told.append) == 3
+        assert client.run(cleaner.counting(2)) == 2
         assert (told, cleaner.closed) == ([0, 1, 2], 2)
 
     def test_iterate(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
         cleaner = Cleaner()
-        assert face.reports(cleaner.counting(3)) == [0, 1, 2]
+        assert client.reports(cleaner.counting(3)) == [0, 1, 2]
         assert cleaner.closed == 1
 
     def test_closed_in_the_middle(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
         cleaner = Cleaner()
-        assert face.reports(cleaner.counting(100), 2) == [0, 1]
+        assert client.reports(cleaner.counting(100), 2) == [0, 1]
         assert cleaner.closed == 1
-        assert face.engine.total.requests == 2
-        assert face.transact(ASK).response == ANSWER
+        assert client.engine.total.requests == 2
+        assert client.transact(ASK).response == ANSWER
 
     def test_progress_that_fails_ends_the_procedure_at_once(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
         cleaner = Cleaner()
         seen: list[int] = []
 
@@ -504,7 +504,7 @@ class TestProcedures:
             raise ZeroDivisionError
 
         def run(master: Any) -> Any:
-            if not face.asynchronous:
+            if not client.asynchronous:
                 try:
                     return master.run(cleaner.counting(9), fail)
                 finally:
@@ -512,11 +512,11 @@ class TestProcedures:
             return _run_and_look(master, cleaner, fail, seen)
 
         with pytest.raises(ZeroDivisionError):
-            face.call(run)
+            client.call(run)
         assert seen == [1]
 
     def test_failures_are_thrown_where_it_was_asked(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
 
         def brave() -> Procedure[list[str]]:
             seen = []
@@ -527,20 +527,20 @@ class TestProcedures:
                     seen.append(type(error).__name__)
             return seen
 
-        assert face.run(brave()) == ["NoReply", "EncodeError", "TypeError"]
+        assert client.run(brave()) == ["NoReply", "EncodeError", "TypeError"]
 
     def test_failures_that_it_does_not_expect_reach_the_caller(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
 
         def plain() -> Procedure[None]:
             yield Ask(SILENT, attempts=1)
 
         with pytest.raises(NoReply):
-            face.run(plain())
-        assert face.transact(ASK).response == ANSWER
+            client.run(plain())
+        assert client.transact(ASK).response == ANSWER
 
     def test_arguments_of_ask(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
 
         def once() -> Procedure[int]:
             try:
@@ -549,10 +549,10 @@ class TestProcedures:
                 return error.attempts
             return 0
 
-        assert face.run(once()) == 2
+        assert client.run(once()) == 2
 
     def test_pause(self, kind: str) -> None:
-        face, port = self.virtual(kind)
+        client, port = self.virtual(kind)
 
         def sleeper() -> Procedure[float]:
             begun: float = yield Pause(0)
@@ -560,17 +560,17 @@ class TestProcedures:
             assert ended == port.now()
             return ended - begun
 
-        assert face.run(sleeper()) == pytest.approx(1.5)
+        assert client.run(sleeper()) == pytest.approx(1.5)
 
     def test_a_procedure_that_does_nothing(self, kind: str) -> None:
-        face, _ = self.virtual(kind)
+        client, _ = self.virtual(kind)
 
         def nothing() -> Procedure[str]:
             return "done"
             yield  # type: ignore[unreachable]
 
-        assert face.run(nothing()) == "done"
-        assert face.reports(nothing()) == []
+        assert client.run(nothing()) == "done"
+        assert client.reports(nothing()) == []
 
 
 async def _run_and_look(master: AsyncMaster, cleaner: Cleaner, fail: Any, seen: list[int]) -> None:
@@ -591,28 +591,28 @@ def test_the_result_of_an_iterator() -> None:
 
 
 class TestEvents:
-    @faces
+    @clients
     def test_none_are_kept_that_nobody_wants(self, kind: str) -> None:
         _, port, _ = bus(3)
-        face = Face(kind, port, engine_for(port, 0.002))
+        client = Client(kind, port, engine_for(port, 0.002))
         with pytest.raises(NoReply):
-            face.transact(SILENT)
-        assert len(face.engine.events) == 0
+            client.transact(SILENT)
+        assert len(client.engine.events) == 0
 
-    @faces
+    @clients
     def test_a_listener_that_comes_later(self, kind: str) -> None:
         _, port, _ = bus(3)
-        face = Face(kind, port, engine_for(port, 0.002))
-        face.transact(ASK)
+        client = Client(kind, port, engine_for(port, 0.002))
+        client.transact(ASK)
         events: list[Event] = []
-        face.master.on_event = events.append
-        face.transact(ASK)
+        client.master.on_event = events.append
+        client.transact(ASK)
         assert [type(event) for event in events] == [Sent, Answered]
-        face.master.on_event = None
-        face.transact(ASK)
+        client.master.on_event = None
+        client.transact(ASK)
         assert len(events) == 2
 
-    @faces
+    @clients
     def test_one_that_fails_leaves_a_usable_bus(self, kind: str) -> None:
         _, port, _ = bus(3)
         calls = 0
@@ -623,10 +623,10 @@ class TestEvents:
             if calls == 1:
                 raise ZeroDivisionError
 
-        face = Face(kind, port, engine_for(port, 0.002), fail)
+        client = Client(kind, port, engine_for(port, 0.002), fail)
         with pytest.raises(ZeroDivisionError):
-            face.transact(ASK)
-        assert face.transact(ASK).response == ANSWER
+            client.transact(ASK)
+        assert client.transact(ASK).response == ANSWER
         assert calls == 4  # each event is told once
 
     def test_one_may_ask_in_its_turn(self) -> None:
@@ -643,17 +643,17 @@ class TestEvents:
         assert responses == [ANSWER]
 
 
-@faces
+@clients
 def test_leaving_it_closes_the_port(kind: str) -> None:
     _, port, _ = bus(3)
-    face = Face(kind, port, engine_for(port, 0.002))
+    client = Client(kind, port, engine_for(port, 0.002))
     if kind == "blocking":
-        with face.master as master:
+        with client.master as master:
             assert master.transact(ASK).response == ANSWER
     else:
 
         async def use() -> None:
-            async with face.master as master:
+            async with client.master as master:
                 assert (await master.transact(ASK)).response == ANSWER
 
         asyncio.run(use())

@@ -1,6 +1,6 @@
 """A ring to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over ptys.
 
-A behaviour is written once, as a program that uses the faces of several nodes in turn.
+A behaviour is written once, as a program that uses the clients of several nodes in turn.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tests.support.needs import decided_by_parameter
 
 #: Seconds that a wait may take where it must not fail; a busy machine needs some.
 PATIENCE = 20.0
-FACES: dict[str, dict[str, Any]] = {
+CLIENTS: dict[str, dict[str, Any]] = {
     "blocking": {"coordinator": MotionCoordinator, "keypad": MembraneKeypad},
     "asyncio": {"coordinator": AsyncMotionCoordinator, "keypad": AsyncMembraneKeypad},
 }
@@ -35,12 +35,12 @@ FACES: dict[str, dict[str, Any]] = {
 class Setting:
     """Where a behaviour is tried."""
 
-    face: Literal["blocking", "asyncio"]
+    client: Literal["blocking", "asyncio"]
     transport: Literal["virtual", "memory", "pty"]
 
     @property
     def name(self) -> str:
-        return f"{self.face}-{self.transport}"
+        return f"{self.client}-{self.transport}"
 
     @property
     def needs(self) -> frozenset[str]:
@@ -49,14 +49,14 @@ class Setting:
 
 
 SETTINGS = [
-    Setting(face, transport)
-    for face in ("blocking", "asyncio")
+    Setting(client, transport)
+    for client in ("blocking", "asyncio")
     for transport in ("virtual", "memory", "pty")
 ]  # fmt: skip
 
 
-class AsyncFace:
-    """Makes a face for asyncio look like a blocking one."""
+class AsBlocking:
+    """Makes a client for asyncio look like a blocking one."""
 
     def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
         object.__setattr__(self, "_target", target)
@@ -81,50 +81,50 @@ class AsyncFace:
 
 
 class Rig:
-    """The nodes of a ring, each with its face."""
+    """The nodes of a ring, each with its client."""
 
-    def __init__(self, setting: Setting, faces: list[Any]) -> None:
+    def __init__(self, setting: Setting, clients: list[Any]) -> None:
         self.setting = setting
-        self.faces = faces
+        self.clients = clients
 
     def coordinator(self, place: int = 0) -> MotionCoordinator:
-        return cast(MotionCoordinator, self.faces[place])
+        return cast(MotionCoordinator, self.clients[place])
 
     def keypad(self, place: int) -> MembraneKeypad:
-        return cast(MembraneKeypad, self.faces[place])
+        return cast(MembraneKeypad, self.clients[place])
 
     def until(self, condition: Callable[[], object]) -> None:
         """Let time pass until something is so on whatever node."""
         for _ in range(int(PATIENCE / 0.002)):
             if condition():
                 return
-            self.faces[0].sleep(0.002)
+            self.clients[0].sleep(0.002)
         raise AssertionError("it never got so")
 
     def rest(self) -> None:
         """Let everything arrive that is under way, when nothing can be waited for."""
-        self.faces[0].sleep(0.05)
+        self.clients[0].sleep(0.05)
 
 
 @decided_by_parameter
 @contextlib.contextmanager
 def make_rig(setting: Setting, ring: str, **options: Any) -> Iterator[Rig]:
-    """Make a ring of these nodes and a face for each."""
+    """Make a ring of these nodes and a client for each."""
     kinds = ring.split(",")
     with contextlib.ExitStack() as stack:
-        loop = stack.enter_context(asyncio.Runner()).get_loop() if setting.face == "asyncio" else None
+        loop = stack.enter_context(asyncio.Runner()).get_loop() if setting.client == "asyncio" else None
         if setting.transport == "virtual":
             simulated = VirtualRing(ring, **options)
             prefix = "async_" if loop else ""
-            faces = [getattr(simulated, prefix + kind)(at) for at, kind in enumerate(kinds)]
+            clients = [getattr(simulated, prefix + kind)(at) for at, kind in enumerate(kinds)]
         else:
             ports = _ports(stack, setting, len(kinds))
-            faces = [
-                _face(setting, kind, port, loop, options) for kind, port in zip(kinds, ports, strict=True)
+            clients = [
+                _client(setting, kind, port, loop, options) for kind, port in zip(kinds, ports, strict=True)
             ]
-        shown = [AsyncFace(face, loop) if loop else face for face in faces]
-        for face in shown:
-            stack.callback(face.close)
+        shown = [AsBlocking(client, loop) if loop else client for client in clients]
+        for client in shown:
+            stack.callback(client.close)
         yield Rig(setting, shown)
 
 
@@ -135,10 +135,10 @@ def _ports(stack: contextlib.ExitStack, setting: Setting, count: int) -> list[Po
     return [open_port(path) for path in ring.paths]
 
 
-def _face(
+def _client(
     setting: Setting, kind: str, port: Port, loop: asyncio.AbstractEventLoop | None, options: dict[str, Any]
 ) -> Any:
-    make = FACES[setting.face][kind]
+    make = CLIENTS[setting.client][kind]
     if loop is None:
         return make(port, **options)
 

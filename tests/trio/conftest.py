@@ -16,7 +16,7 @@ MakeRig = Callable[..., Rig]
 
 @pytest.fixture(params=SETTINGS, ids=lambda setting: setting.name)
 def make(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
-    """Return a function that makes a rig: every face, every transport."""
+    """Return a function that makes a rig: every client, every transport."""
     with contextlib.ExitStack() as stack:
 
         def make(ring: str, **options: Any) -> Rig:

@@ -1,4 +1,4 @@
-"""What nodes do for programs, over every face and every transport."""
+"""What nodes do for programs, over every client and every transport."""
 
 from __future__ import annotations
 

@@ -378,8 +378,8 @@ def test_it_needs_a_running_loop() -> None:
 
 
 def test_the_faces_have_the_same_words() -> None:
-    def words(face: Callable[..., Any]) -> set[str]:
-        return {name for name in dir(face) if not name.startswith("_")}
+    def words(client: Callable[..., Any]) -> set[str]:
+        return {name for name in dir(client) if not name.startswith("_")}
 
     assert words(MotionCoordinator) - words(AsyncMotionCoordinator) == {"open"}
     assert words(AsyncMotionCoordinator) <= words(MotionCoordinator)

@@ -10,7 +10,7 @@ import pytest
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring_events import Dropped
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode, MotionCoordinator
-from qlinkgen.protocols.trio.face import engine_of
+from qlinkgen.protocols.trio.client import engine_of
 from qlinkgen.transport import open_pty
 
 

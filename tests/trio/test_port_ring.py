@@ -63,16 +63,16 @@ def test_programs_join_at_ports_between_simulated_nodes() -> None:
 
 def test_a_ring_of_fifteen_programs() -> None:
     with PortRing(["port"] * 15) as ring:
-        faces = [MotionCoordinator.open(path, patience=PATIENCE) for path in ring.paths]
-        for place, face in enumerate(faces):
-            face.print_(10 + place % 15, f"{place:02}", end="")
-        for place, _ in enumerate(faces):
-            target = faces[(2 * place + 1) % 15]
+        clients = [MotionCoordinator.open(path, patience=PATIENCE) for path in ring.paths]
+        for place, client in enumerate(clients):
+            client.print_(10 + place % 15, f"{place:02}", end="")
+        for place, _ in enumerate(clients):
+            target = clients[(2 * place + 1) % 15]
             assert bytes(target.get(4, PATIENCE) for _ in range(2)) == f"{place:02}".encode()
-        assert sum(face.counters.taken for face in faces) == 15
-        assert all(face.netstat == 0 for face in faces)
-        for face in faces:
-            face.close()
+        assert sum(client.counters.taken for client in clients) == 15
+        assert all(client.netstat == 0 for client in clients)
+        for client in clients:
+            client.close()
 
 
 def test_baud_and_faults_on_a_hop() -> None:

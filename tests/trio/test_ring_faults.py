@@ -7,7 +7,7 @@ import pytest
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring_events import Broken, NetStat
 from qlinkgen.protocols.trio import CoordinatorNode, MotionCoordinator
-from qlinkgen.protocols.trio.face import engine_of
+from qlinkgen.protocols.trio.client import engine_of
 from qlinkgen.sim import FaultPlan, SimulationError
 from qlinkgen.sim.ring import RingWire
 from qlinkgen.sim.virtual_ring import VirtualRing
@@ -19,48 +19,48 @@ def ring_of(size: int, **options: object) -> tuple[VirtualRing, list[MotionCoord
     return ring, [ring.coordinator(place) for place in range(size)]
 
 
-def send_all_round(ring: VirtualRing, faces: list[MotionCoordinator], count: int) -> None:
+def send_all_round(ring: VirtualRing, clients: list[MotionCoordinator], count: int) -> None:
     """From the first node to the last, over every hop but one, one at a time."""
     for number in range(count):
-        faces[0].send(10 + len(faces) - 2, 1, number % 251, number + 1)
+        clients[0].send(10 + len(clients) - 2, 1, number % 251, number + 1)
         ring.settle()
 
 
 @pytest.mark.parametrize("baud", [None, 38400])
 def test_a_message_that_is_dropped_leaves_no_trace_at_the_nodes(baud: int | None) -> None:
     plan = FaultPlan(drop=1.0)
-    ring, faces = ring_of(4, baud=baud, faults={1: plan})
-    send_all_round(ring, faces, 5)
+    ring, clients = ring_of(4, baud=baud, faults={1: plan})
+    send_all_round(ring, clients, 5)
     assert plan.counts["drop"] == 5
-    assert faces[1].counters.passed == 5
-    assert faces[3].counters.taken == 0
-    assert all(face.netstat == 0 for face in faces)
+    assert clients[1].counters.passed == 5
+    assert clients[3].counters.taken == 0
+    assert all(client.netstat == 0 for client in clients)
 
 
 @pytest.mark.parametrize("baud", [None, 38400])
 def test_a_changed_bit_of_a_value_is_a_crc_error_at_the_receiver_alone(baud: int | None) -> None:
     plan = FaultPlan(flip=(1.0, 1, 1), seed=4)
-    ring, faces = ring_of(4, baud=baud, faults={1: plan})
-    send_all_round(ring, faces, 200)
-    seen = [face.counters.faults for face in faces]
-    assert not any(faces[3].vr[number] for number in range(251))
+    ring, clients = ring_of(4, baud=baud, faults={1: plan})
+    send_all_round(ring, clients, 200)
+    seen = [client.counters.faults for client in clients]
+    assert not any(clients[3].vr[number] for number in range(251))
     assert seen[3]["crc"] > 100
     assert "crc" not in {**seen[0], **seen[1], **seen[2]}
-    assert faces[3].netstat & NetStat.RX_CRC
-    assert not faces[2].netstat & NetStat.RX_CRC
+    assert clients[3].netstat & NetStat.RX_CRC
+    assert not clients[2].netstat & NetStat.RX_CRC
 
 
 @pytest.mark.parametrize("baud", [None, 38400])
 def test_a_truncated_message_is_seen_by_each_node_behind(baud: int | None) -> None:
     plan = FaultPlan(truncate=1.0, seed=2)
-    ring, faces = ring_of(4, baud=baud, faults={0: plan})
-    send_all_round(ring, faces, 50)
-    assert faces[3].counters.taken == 0
-    assert faces[1].netstat == faces[2].netstat == faces[3].netstat == NetStat.RX_FRAME
+    ring, clients = ring_of(4, baud=baud, faults={0: plan})
+    send_all_round(ring, clients, 50)
+    assert clients[3].counters.taken == 0
+    assert clients[1].netstat == clients[2].netstat == clients[3].netstat == NetStat.RX_FRAME
     # A missing head is noticed where it is missing. A missing tail is, and then the head has gone on.
-    cut = faces[1].counters.cut_short
+    cut = clients[1].counters.cut_short
     assert 30 <= cut <= 45
-    assert faces[2].counters.total_faults == faces[3].counters.total_faults == cut
+    assert clients[2].counters.total_faults == clients[3].counters.total_faults == cut
     told = [event for event in engine_of(ring.nodes[2]).events if isinstance(event, Broken)]
     # The end of a broken message comes when this node would have given it up by itself; either may be first.
     assert {event.kind for event in told} <= {"frame", "truncated"}
@@ -68,29 +68,29 @@ def test_a_truncated_message_is_seen_by_each_node_behind(baud: int | None) -> No
 
 
 def test_store_and_forward_keeps_a_broken_message_from_the_nodes_behind() -> None:
-    ring, faces = ring_of(4, faults={0: FaultPlan(truncate=1.0, seed=2)}, cut_through=False)
-    send_all_round(ring, faces, 50)
-    assert faces[1].netstat == NetStat.RX_FRAME
-    assert faces[2].netstat == faces[3].netstat == 0
+    ring, clients = ring_of(4, faults={0: FaultPlan(truncate=1.0, seed=2)}, cut_through=False)
+    send_all_round(ring, clients, 50)
+    assert clients[1].netstat == NetStat.RX_FRAME
+    assert clients[2].netstat == clients[3].netstat == 0
 
 
 def test_noise_does_no_more_than_break_what_it_meets() -> None:
     # Noise is rare: what it makes nodes send on gets its own share of it, so much of it would never end.
     plan = FaultPlan(noise=0.05, seed=3)
-    ring, faces = ring_of(4, baud=38400, faults={0: plan})
-    send_all_round(ring, faces, 250)
-    wrong = [number for number in range(250) if faces[3].vr[number] not in {0, number + 1}]
+    ring, clients = ring_of(4, baud=38400, faults={0: plan})
+    send_all_round(ring, clients, 250)
+    wrong = [number for number in range(250) if clients[3].vr[number] not in {0, number + 1}]
     assert wrong == []
-    assert faces[3].counters.taken >= 250 - plan.counts["noise"] > 200
-    assert faces[1].netstat == NetStat.RX_FRAME
+    assert clients[3].counters.taken >= 250 - plan.counts["noise"] > 200
+    assert clients[1].netstat == NetStat.RX_FRAME
 
 
 @pytest.mark.parametrize("kind", ["delay", "late", "silent", "duplicate", "stray"])
 def test_the_other_kinds_of_faults(kind: str) -> None:
     plan = FaultPlan(**{kind: 0.5}, seed=1)  # type: ignore[arg-type]
-    ring, faces = ring_of(3, baud=38400, faults={1: plan})
-    send_all_round(ring, faces, 40)
-    taken = faces[2].counters.taken
+    ring, clients = ring_of(3, baud=38400, faults={1: plan})
+    send_all_round(ring, clients, 40)
+    taken = clients[2].counters.taken
     assert plan.counts[kind] > 0
     expected = {
         "delay": 40,
@@ -104,9 +104,9 @@ def test_the_other_kinds_of_faults(kind: str) -> None:
 
 def test_one_plan_serves_all_hops() -> None:
     plan = FaultPlan(drop=0.1, seed=1)
-    ring, faces = ring_of(5, faults=plan)
-    send_all_round(ring, faces, 100)
-    assert faces[4].counters.taken == 100 - plan.counts["drop"]
+    ring, clients = ring_of(5, faults=plan)
+    send_all_round(ring, clients, 100)
+    assert clients[4].counters.taken == 100 - plan.counts["drop"]
     assert 20 < plan.counts["drop"] < 50
 
 
@@ -124,37 +124,37 @@ def test_a_hop_disturbs_whole_messages_and_what_stands_before_them() -> None:
 
 
 def test_a_node_that_is_switched_off_opens_the_ring() -> None:
-    ring, faces = ring_of(4)
+    ring, clients = ring_of(4)
     ring.switch_off(1)
-    faces[0].send(12, 1, 1, 1)
-    faces[2].send(10, 1, 2, 2)
+    clients[0].send(12, 1, 1, 1)
+    clients[2].send(10, 1, 2, 2)
     ring.settle()
-    assert faces[3].vr[1] == 0
-    assert faces[3].vr[2] == 2
+    assert clients[3].vr[1] == 0
+    assert clients[3].vr[2] == 2
     assert ring.wire.lost == 16
-    faces[1].send(10, 1, 3, 3)
+    clients[1].send(10, 1, 3, 3)
     ring.settle()
-    assert faces[2].vr[3] == 0, "it does not send either"
+    assert clients[2].vr[3] == 0, "it does not send either"
     ring.switch_on(1)
     ring.settle()
-    faces[0].send(12, 1, 1, 1)
+    clients[0].send(12, 1, 1, 1)
     ring.settle()
-    assert faces[3].vr[1] == 1
-    assert faces[2].vr[3] == 0, "what it was to send is forgotten"
+    assert clients[3].vr[1] == 1
+    assert clients[2].vr[3] == 0, "what it was to send is forgotten"
 
 
 def test_a_node_switched_off_in_the_middle_of_a_message_breaks_it() -> None:
-    ring, faces = ring_of(4, baud=1000)
-    faces[0].send(12, 1, 1, 1)
+    ring, clients = ring_of(4, baud=1000)
+    clients[0].send(12, 1, 1, 1)
     ring.sleep(0.08)
     ring.switch_off(1)
-    faces[2].send(10, 1, 2, 2)  # waits behind the broken message until that is given up
+    clients[2].send(10, 1, 2, 2)  # waits behind the broken message until that is given up
     ring.settle()
-    assert faces[3].vr[1] == 0
-    assert faces[3].vr[2] == 2
-    assert faces[2].counters.faults == {"truncated": 1}
-    assert faces[3].counters.faults == {"frame": 1}
-    assert faces[2].counters.cut_short == 1
+    assert clients[3].vr[1] == 0
+    assert clients[3].vr[2] == 2
+    assert clients[2].counters.faults == {"truncated": 1}
+    assert clients[3].counters.faults == {"frame": 1}
+    assert clients[2].counters.cut_short == 1
 
 
 def test_a_keypad_that_was_switched_off_needs_its_offset_again() -> None:

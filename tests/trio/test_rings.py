@@ -14,7 +14,7 @@ from qlinkgen.link.codec import Message
 from qlinkgen.link.ring import RingNode
 from qlinkgen.link.ring_events import Taken
 from qlinkgen.protocols.trio import CoordinatorNode, KeypadNode
-from qlinkgen.protocols.trio.face import Node, engine_of
+from qlinkgen.protocols.trio.client import Node, engine_of
 from qlinkgen.sim import SimulationError
 from qlinkgen.sim.virtual_ring import VirtualRing
 from qlinkgen.transport import memory_ring

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from qlinkgen.protocols.faces import asyncio_face
+from qlinkgen.protocols.clients import asyncio_clients
 from qlinkgen.protocols.mc1231a.chip import ChipSet
 from qlinkgen.protocols.mc1231a.chip_engine import ChipCounters, ChipEngine
 from qlinkgen.protocols.mc1231a.host import Axis, Host
@@ -29,4 +29,4 @@ __all__ = [
     "UnconfirmedCommand",
 ]
 
-__getattr__ = asyncio_face(__name__, ("AsyncAxis", "AsyncHost"))
+__getattr__ = asyncio_clients(__name__, ("AsyncAxis", "AsyncHost"))

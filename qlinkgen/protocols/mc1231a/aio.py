@@ -1,4 +1,4 @@
-"""The asyncio face of a host: the same methods, awaited."""
+"""The asyncio client of a host: the same methods, awaited."""
 
 from __future__ import annotations
 

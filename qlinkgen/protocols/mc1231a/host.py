@@ -1,4 +1,4 @@
-"""The blocking face of a host."""
+"""The blocking client of a host."""
 
 from __future__ import annotations
 

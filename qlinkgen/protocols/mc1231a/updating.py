@@ -1,4 +1,4 @@
-"""Updates whose command error is looked for: procedures, so that both faces run the same."""
+"""Updates whose command error is looked for: procedures, so that both clients run the same."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from qlinkgen.protocols.faces import asyncio_face
+from qlinkgen.protocols.clients import asyncio_clients
 from qlinkgen.protocols.qlink.bus import Bus, Node
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
 from qlinkgen.protocols.qlink.motion import MotionProgress
@@ -33,4 +33,4 @@ __all__ = [
     "VirtualNode",
 ]
 
-__getattr__ = asyncio_face(__name__, ("AsyncBus", "AsyncNode"))
+__getattr__ = asyncio_clients(__name__, ("AsyncBus", "AsyncNode"))

@@ -1,4 +1,4 @@
-"""The blocking face of a Q.link bus."""
+"""The blocking client of a Q.link bus."""
 
 from __future__ import annotations
 

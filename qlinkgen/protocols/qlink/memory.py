@@ -1,6 +1,6 @@
 """What a master remembers of its bus from call to call, and the procedures that use it.
 
-Both faces of the bus, blocking and asyncio, stand on this one.
+Both clients of the bus, blocking and asyncio, stand on this one.
 """
 
 from __future__ import annotations

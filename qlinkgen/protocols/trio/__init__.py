@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from qlinkgen.link.ring_events import NetStat
-from qlinkgen.protocols.faces import asyncio_face
+from qlinkgen.protocols.clients import asyncio_clients
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.display import Display
 from qlinkgen.protocols.trio.errors import NoRoom, NothingCame
@@ -38,4 +38,4 @@ __all__ = [
     "PassiveNode",
 ]
 
-__getattr__ = asyncio_face(__name__, ("AsyncMembraneKeypad", "AsyncMotionCoordinator"))
+__getattr__ = asyncio_clients(__name__, ("AsyncMembraneKeypad", "AsyncMotionCoordinator"))

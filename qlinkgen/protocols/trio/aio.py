@@ -7,9 +7,9 @@ from types import TracebackType
 from typing import Self, Unpack
 
 from qlinkgen.codecs import trio
+from qlinkgen.protocols.trio.client import TX_TIMEOUT, Client, CoordinatorClient, Item, N, paced_baud
 from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
 from qlinkgen.protocols.trio.errors import NothingCame
-from qlinkgen.protocols.trio.face import TX_TIMEOUT, CoordinatorFace, Face, Item, N, paced_baud
 from qlinkgen.protocols.trio.facts import LINE_END, check_channel
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.options import KeypadOptions, NodeOptions
@@ -19,8 +19,8 @@ from qlinkgen.transport.ring import OnEvent
 from qlinkgen.transport.ring_aio import AsyncRingDriver, drive_async
 
 
-class AsyncFace(Face[N]):
-    """What the faces for asyncio share; they are made, and used, inside a running event loop."""
+class AsyncClient(Client[N]):
+    """What the clients for asyncio share; they are made, and used, inside a running event loop."""
 
     driver: AsyncRingDriver
 
@@ -30,12 +30,12 @@ class AsyncFace(Face[N]):
         self.driver = driver
 
     async def transmit(self, message: trio.Message) -> None:
-        """Send any message; see `BlockingFace.transmit`."""
+        """Send any message; see `BlockingClient.transmit`."""
         if await self.driver.until(self._put(message), self.tx_timeout) is None:
             raise self._no_room()
 
     async def wait_until(self, condition: Callable[[], object], timeout: float | None = None) -> None:
-        """Wait until something is so; see `BlockingFace.wait_until`."""
+        """Wait until something is so; see `BlockingClient.wait_until`."""
         if await self.driver.until(lambda _now: bool(condition()) or None, timeout) is None:
             raise NothingCame(f"what was waited for did not come about in {timeout} s", elapsed=timeout or 0)
 
@@ -60,7 +60,7 @@ class AsyncFace(Face[N]):
         await self.close()
 
 
-class AsyncMotionCoordinator(CoordinatorFace, AsyncFace[CoordinatorNode]):
+class AsyncMotionCoordinator(CoordinatorClient, AsyncClient[CoordinatorNode]):
     """A Motion Coordinator for asyncio. The event loop keeps the node at work; see `MotionCoordinator`."""
 
     def __init__(
@@ -79,9 +79,9 @@ class AsyncMotionCoordinator(CoordinatorFace, AsyncFace[CoordinatorNode]):
     @classmethod
     def driven(cls, node: CoordinatorNode, driver: AsyncRingDriver) -> Self:
         """Use a node that something else keeps at work, such as a simulated ring."""
-        face = cls.__new__(cls)
-        AsyncFace.__init__(face, node, driver)
-        return face
+        client = cls.__new__(cls)
+        AsyncClient.__init__(client, node, driver)
+        return client
 
     async def print_(self, n: int, *items: Item, sep: str = "", end: str = LINE_END) -> None:
         """PRINT #n, item; item; ...; see `MotionCoordinator.print_`."""
@@ -111,7 +111,7 @@ class AsyncMotionCoordinator(CoordinatorFace, AsyncFace[CoordinatorNode]):
         await self.transmit(mode_message(n, mode))
 
 
-class AsyncMembraneKeypad(AsyncFace[KeypadNode]):
+class AsyncMembraneKeypad(AsyncClient[KeypadNode]):
     """A membrane keypad for asyncio; see `MembraneKeypad`. Pressing a key waits for nothing."""
 
     def __init__(
@@ -125,9 +125,9 @@ class AsyncMembraneKeypad(AsyncFace[KeypadNode]):
     @classmethod
     def driven(cls, node: KeypadNode, driver: AsyncRingDriver) -> Self:
         """Use a node that something else keeps at work, such as a simulated ring."""
-        face = cls.__new__(cls)
-        AsyncFace.__init__(face, node, driver)
-        return face
+        client = cls.__new__(cls)
+        AsyncClient.__init__(client, node, driver)
+        return client
 
     def press(self, *keys: int | str) -> None:
         """Press keys, one after the other, and let each one go before the next."""

@@ -6,16 +6,16 @@ from typing import Self, Unpack
 
 from qlinkgen.codecs import trio
 from qlinkgen.link.ring import RingNode
-from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
-from qlinkgen.protocols.trio.errors import NothingCame
-from qlinkgen.protocols.trio.face import (
+from qlinkgen.protocols.trio.client import (
     TX_TIMEOUT,
-    BlockingFace,
-    CoordinatorFace,
+    BlockingClient,
+    CoordinatorClient,
     Item,
     closing_on_error,
     paced_baud,
 )
+from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode, mode_message, send_message
+from qlinkgen.protocols.trio.errors import NothingCame
 from qlinkgen.protocols.trio.facts import LINE_END, check_channel
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.options import (
@@ -31,7 +31,7 @@ from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import OnEvent, RingDriver, drive
 
 
-class MotionCoordinator(CoordinatorFace, BlockingFace[CoordinatorNode]):
+class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
     """A Motion Coordinator: the network's words of BASIC as methods.
 
     A thread of its own receives and sends on, so the node does its part on the ring whatever the program
@@ -72,9 +72,9 @@ class MotionCoordinator(CoordinatorFace, BlockingFace[CoordinatorNode]):
     @classmethod
     def driven(cls, node: CoordinatorNode, driver: RingDriver) -> Self:
         """Use a node that something else keeps at work, such as a simulated ring."""
-        face = cls.__new__(cls)
-        BlockingFace.__init__(face, node, driver)
-        return face
+        client = cls.__new__(cls)
+        BlockingClient.__init__(client, node, driver)
+        return client
 
     def print_(self, n: int, *items: Item, sep: str = "", end: str = LINE_END) -> None:
         """PRINT #n, item; item; ...
@@ -142,7 +142,7 @@ class MotionCoordinator(CoordinatorFace, BlockingFace[CoordinatorNode]):
         self.transmit(mode_message(n, mode))
 
 
-class MembraneKeypad(BlockingFace[KeypadNode]):
+class MembraneKeypad(BlockingClient[KeypadNode]):
     """A membrane keypad. It sends nothing, and passes nothing on, before it is told its offset.
 
     Attributes:
@@ -167,9 +167,9 @@ class MembraneKeypad(BlockingFace[KeypadNode]):
     @classmethod
     def driven(cls, node: KeypadNode, driver: RingDriver) -> Self:
         """Use a node that something else keeps at work, such as a simulated ring."""
-        face = cls.__new__(cls)
-        BlockingFace.__init__(face, node, driver)
-        return face
+        client = cls.__new__(cls)
+        BlockingClient.__init__(client, node, driver)
+        return client
 
     def press(self, *keys: int | str) -> None:
         """Press keys, one after the other, and let each one go before the next."""
@@ -194,7 +194,7 @@ class MembraneKeypad(BlockingFace[KeypadNode]):
         return self.node.display.text
 
 
-class PassiveNode(BlockingFace[RingNode]):
+class PassiveNode(BlockingClient[RingNode]):
     """A node that sends everything on and tells what it sees; it may send messages too.
 
     Attributes:

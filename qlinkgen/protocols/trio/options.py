@@ -1,4 +1,4 @@
-"""What the nodes of a ring may be given, by name: all of it is handed on to `RingNode` and to the faces."""
+"""What the nodes of a ring may be given, by name: all of it is handed on to `RingNode` and to the clients."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ class KeypadOptions(NodeOptions, total=False):
 
 
 class FaceOptions(RingOptions, total=False):
-    """What the face of a passive node is opened with."""
+    """What the client of a passive node is opened with."""
 
     on_event: OnEvent | None
 
 
 class CoordinatorFaceOptions(FaceOptions, total=False):
-    """What the face of a Motion Coordinator is opened with."""
+    """What the client of a Motion Coordinator is opened with."""
 
     tx_timeout: float
 
 
 class KeypadFaceOptions(FaceOptions, total=False):
-    """What the face of a keypad is opened with."""
+    """What the client of a keypad is opened with."""
 
     rows: int
     columns: int

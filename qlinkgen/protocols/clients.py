@@ -1,4 +1,4 @@
-"""Faces that are imported when they are asked for."""
+"""Clients that are imported when they are asked for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Callable, Collection
 
 
-def asyncio_face(package: str, names: Collection[str]) -> Callable[[str], object]:
+def asyncio_clients(package: str, names: Collection[str]) -> Callable[[str], object]:
     """Return a package's `__getattr__` for names of its module `aio`: asyncio costs other programs 50 ms."""
 
     def find(name: str) -> object:

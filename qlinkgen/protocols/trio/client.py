@@ -1,6 +1,6 @@
-"""What the faces of all nodes share: the common part, and the part of blocking programs.
+"""What the clients of all nodes share: the common part, and the part of blocking programs.
 
-A face lets a program use a node; a driver keeps the node at work meanwhile (`qlinkgen.transport.ring`).
+A client lets a program use a node; a driver keeps the node at work meanwhile (`qlinkgen.transport.ring`).
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def closing_on_error(port: Port) -> Iterator[Port]:
 
 
 class Driver(Protocol):
-    """What keeps a node at work, as far as all faces use it."""
+    """What keeps a node at work, as far as all clients use it."""
 
     def act(self, action: Callable[[float], T]) -> T:
         """Do something to the node, at the time that the action is given."""
@@ -63,8 +63,8 @@ class Driver(Protocol):
         ...
 
 
-class Face(Generic[N]):
-    """What the faces share whatever drives their node.
+class Client(Generic[N]):
+    """What the clients share whatever drives their node.
 
     Attributes:
         node: the behaviour without input or output.
@@ -123,7 +123,7 @@ class Face(Generic[N]):
         )
 
 
-class CoordinatorFace(Face[CoordinatorNode]):
+class CoordinatorClient(Client[CoordinatorNode]):
     """What a program on a Motion Coordinator has without waiting for anything."""
 
     @property
@@ -153,8 +153,8 @@ class CoordinatorFace(Face[CoordinatorNode]):
         return (text_message(n, piece) for piece in pieces(printed(items, sep, end)))
 
 
-class BlockingFace(Face[N]):
-    """What the faces of blocking programs share."""
+class BlockingClient(Client[N]):
+    """What the clients of blocking programs share."""
 
     driver: RingDriver
 
