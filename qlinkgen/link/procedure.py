@@ -55,7 +55,7 @@ Procedure = Generator[Step, Any, Outcome]  # Any: which of them depends on the s
 FAILURES = (LinkError, OSError, ValueError, TypeError)
 
 
-class Steps(Generic[Outcome]):
+class Runner(Generic[Outcome]):
     """A procedure being run: a driver advances it, does what it wants, and leaves here what came of it.
 
     Attributes:

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Self, TypeVar, assert_never
 
 from qlinkgen.link.events import Event
-from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Steps, Tell
+from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Runner, Tell
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
 from qlinkgen.transport.port import Port
@@ -64,37 +64,37 @@ class AsyncMaster(MasterDriver):
         self, procedure: Procedure[Outcome], progress: Callable[[Report], None] | None = None
     ) -> Outcome:
         """Run a procedure to its end; `progress` is called with what it tells on the way."""
-        steps = Steps(procedure)
-        async with aclosing(self._each(steps)) as reports:  # else it would clean up at some later time
+        runner = Runner(procedure)
+        async with aclosing(self._each(runner)) as reports:  # else it would clean up at some later time
             async for report in reports:
                 if progress is not None:
                     progress(report)
-        return steps.result
+        return runner.result
 
     def iterate(self, procedure: Procedure[Outcome]) -> AsyncGenerator[Report, None]:
         """Run a procedure as an iterator over what it tells; it goes on as the iterator is asked for more."""
-        return self._each(Steps(procedure))
+        return self._each(Runner(procedure))
 
-    async def _each(self, steps: Steps[Outcome]) -> AsyncGenerator[Report, None]:
+    async def _each(self, runner: Runner[Outcome]) -> AsyncGenerator[Report, None]:
         try:
-            while steps.advance():
-                step = steps.wanted
+            while runner.advance():
+                step = runner.wanted
                 if isinstance(step, Ask):
                     try:
-                        steps.outcome = await self.transact(
+                        runner.outcome = await self.transact(
                             step.request, attempts=step.attempts, trial=step.trial
                         )
                     except FAILURES as error:
-                        steps.failure = error
+                        runner.failure = error
                 elif isinstance(step, Pause):
                     await sleep(self.port, step.seconds)
-                    steps.outcome = self.port.now()
+                    runner.outcome = self.port.now()
                 elif isinstance(step, Tell):
                     yield step.report
                 else:
                     assert_never(step)
         finally:
-            steps.close()
+            runner.close()
 
     async def __aenter__(self) -> Self:
         return self

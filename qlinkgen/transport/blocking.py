@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self, assert_never
 
 from qlinkgen.link.events import Event
-from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Steps, Tell
+from qlinkgen.link.procedure import FAILURES, Ask, Outcome, Pause, Procedure, Report, Runner, Tell
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.conversation import Asker, MasterDriver, conversation
 from qlinkgen.transport.forking import tell_of_forks
@@ -69,39 +69,39 @@ class BlockingMaster(MasterDriver):
 
     def run(self, procedure: Procedure[Outcome], progress: Callable[[Report], None] | None = None) -> Outcome:
         """Run a procedure to its end; `progress` is called with what it tells on the way."""
-        steps = Steps(procedure)
+        runner = Runner(procedure)
         try:
-            while steps.advance():
-                told = self._do(steps)
+            while runner.advance():
+                told = self._do(runner)
                 if told is not None and progress is not None:
                     progress(told.report)
-            return steps.result
+            return runner.result
         finally:
-            steps.close()
+            runner.close()
 
     def iterate(self, procedure: Procedure[Outcome]) -> Generator[Report, None, Outcome]:
         """Run a procedure as an iterator over what it tells; it goes on as the iterator is asked for more."""
-        steps = Steps(procedure)
+        runner = Runner(procedure)
         try:
-            while steps.advance():
-                told = self._do(steps)
+            while runner.advance():
+                told = self._do(runner)
                 if told is not None:
                     yield told.report
-            return steps.result
+            return runner.result
         finally:
-            steps.close()
+            runner.close()
 
-    def _do(self, steps: Steps[Outcome]) -> Tell | None:
+    def _do(self, runner: Runner[Outcome]) -> Tell | None:
         """Do what a procedure wants; return what it wants to tell."""
-        step = steps.wanted
+        step = runner.wanted
         if isinstance(step, Ask):
             try:
-                steps.outcome = self.transact(step.request, attempts=step.attempts, trial=step.trial)
+                runner.outcome = self.transact(step.request, attempts=step.attempts, trial=step.trial)
             except FAILURES as error:
-                steps.failure = error
+                runner.failure = error
         elif isinstance(step, Pause):
             self.port.sleep(step.seconds)
-            steps.outcome = self.port.now()
+            runner.outcome = self.port.now()
         elif isinstance(step, Tell):
             return step
         else:
