@@ -238,7 +238,7 @@ class Rig:
             except LinkError:
                 if not self.faulty:
                     raise
-                pending = self.bus.memory.motions[number].pending
+                pending = self.bus.state.motions[number].pending
                 if pending is not None and pending.segments == words:
                     return self.sure(lambda: self.bus.motion(number, outputs=outputs))
         raise AssertionError("the words were never sent")

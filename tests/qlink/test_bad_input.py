@@ -234,7 +234,7 @@ class TestCtrlC:
             fail_at(rig.bus.port, monkeypatch, at, KeyboardInterrupt())
             with pytest.raises(KeyboardInterrupt):
                 list(rig.bus.stream_motion({1: range(200)}))
-            pending = rig.bus.memory.motions[1].pending
+            pending = rig.bus.state.motions[1].pending
             queued = rig.node.words
             assert queued == list(range(len(queued)))
             assert pending is not None

@@ -57,7 +57,7 @@ def test_a_motion_that_fails_stays_pending_and_is_taken_once(make_clean: MakeRig
         rig.node.mute, rig.node.deaf = (3, 0) if heard else (0, 3)
         with pytest.raises(NoReply):
             rig.bus.motion(1, segments=[2])
-        pending = rig.bus.memory.motions[1].pending
+        pending = rig.bus.state.motions[1].pending
         assert pending is not None
         assert pending.segments == [2]
         rig.bus.motion(1, segments=[3])
@@ -120,10 +120,10 @@ def test_a_clear_that_is_not_answered_does_not_bring_back_what_was_pending(
 def test_a_new_master_is_not_mistaken_for_a_repeat(make_clean: MakeRig) -> None:
     rig = make_clean(Slave())
     for outputs in (1, 2, 3):
-        rig.bus.memory.motions.clear()  # as if the program had been started again
+        rig.bus.state.motions.clear()  # as if the program had been started again
         rig.bus.motion(1, outputs=outputs)
         assert rig.node.outputs == outputs
-    rig.bus.memory.motions.clear()
+    rig.bus.state.motions.clear()
     rig.bus.motion(1, segments=[4])
     assert rig.node.words == [4]
 
@@ -203,7 +203,7 @@ def test_a_preset_is_refused_while_the_motor_runs(make: MakeRig) -> None:
     assert (told.value.node, told.value.attempts) == (1, 0)
     assert told.value.status & MotorStatus.RUNNING
     assert rig.node.statistics.refused_presets == 0
-    rig.bus.memory.statuses.clear()  # as in a master that was just started
+    rig.bus.state.statuses.clear()  # as in a master that was just started
     with pytest.raises(LinkError if rig.faulty else NoReply):
         rig.bus.preset_motor_position(1, position=5)
     assert rig.node.position == -(2**31)

@@ -38,4 +38,4 @@ def test_what_was_never_sent_is_not_pending() -> None:
     with pytest.raises(NoReply, match="not sent") as refused:
         bus.node(3).motion(segments=[1])
     assert not hasattr(refused.value, "__notes__")
-    assert bus.memory.motions[3].pending is None
+    assert bus.state.motions[3].pending is None

@@ -158,7 +158,7 @@ class Soak:
     def run(self, name: str, port: Port, slack: float, transactions: int) -> Result:
         """Use the bus until so many transactions are done, then let it get quiet, and add up."""
         bus = SoakBus(port, self.account, slack)
-        self._counters = lambda number: bus.memory.motions[number].counter
+        self._counters = lambda number: bus.state.motions[number].counter
         held = {number: Held(station.node) for number, station in self.stations.items()}
         traffic = Traffic(bus, held, self.stations, self.seed, steady=self._steady)
         complaints: list[str] = []

@@ -111,13 +111,13 @@ class Traffic:
     def _motion(self, number: int, held: Held) -> None:
         words = [self._number(16) for _ in range(self._random.randint(0, min(12, held.space)))]
         outputs = self._number(8)
-        memory = self.bus.memory.motions[number]
-        before = memory.pending
+        state = self.bus.state.motions[number]
+        before = state.pending
         try:
             answer = self.bus.motion(number, outputs=outputs, segments=words)
         except LinkError:
             self.failed += 1
-            after = memory.pending
+            after = state.pending
             if after is before:
                 held.words([], before.segments if before else [])
             else:
@@ -135,7 +135,7 @@ class Traffic:
         others = self._random.sample(sorted(self.nodes), self._random.randint(0, 2))
         numbers = dict.fromkeys([number, *others])
         words = {each: [self._number(16) for _ in range(self._random.randrange(80))] for each in numbers}
-        before = {each: self.bus.memory.motions[each].pending for each in numbers}
+        before = {each: self.bus.state.motions[each].pending for each in numbers}
         outputs = self._number(8)
         queued = dict.fromkeys(numbers, 0)
         stream = self.bus.stream_motion(words, outputs=outputs, patience=0.1)
@@ -147,7 +147,7 @@ class Traffic:
         except LinkError:
             self.failed += 1
         for each in numbers:
-            after = self.bus.memory.motions[each].pending
+            after = self.bus.state.motions[each].pending
             earlier = before[each]
             settled = earlier.segments if earlier is not None and earlier is not after else []
             node = self.nodes[each]
@@ -162,7 +162,7 @@ class Traffic:
         doubtful = self._doubtful(number)
         with self._may_fail():
             self.bus.clear_fifo(number)
-        if self.bus.memory.motions[number].pending is None:
+        if self.bus.state.motions[number].pending is None:
             held.words_dropped(doubtful)
 
     def _reset(self, number: int, held: Held) -> None:
@@ -172,11 +172,11 @@ class Traffic:
             self.bus.node_reset(number)
             surely = True
         held.was_reset(surely=surely)
-        if self.bus.memory.motions[number].pending is None:
+        if self.bus.state.motions[number].pending is None:
             held.words_dropped(doubtful)
 
     def _doubtful(self, number: int) -> list[int]:
-        pending = self.bus.memory.motions[number].pending
+        pending = self.bus.state.motions[number].pending
         return pending.segments if pending else []
 
     def _preset(self, number: int, held: Held) -> None:
@@ -291,7 +291,7 @@ class Traffic:
 
     def _move(self, number: int, held: Held) -> None:
         """Give a node another number. When no answer comes it may have either: look for it."""
-        if self.bus.memory.motions[number].pending is not None:
+        if self.bus.state.motions[number].pending is not None:
             return
         new = self._random.choice([each for each in NUMBERS if each not in self.nodes])
         moved = self._set_up(number, new, held)

@@ -16,9 +16,9 @@ from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.protocols.qlink import survey
+from qlinkgen.protocols.qlink.bus_state import BusState, make_engine
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
-from qlinkgen.protocols.qlink.memory import Memory, make_engine
 from qlinkgen.protocols.qlink.motion import MotionProgress, move
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.aio import AsyncMaster
@@ -52,7 +52,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         """Take over a port, with the arguments of `Bus`."""
         engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
-        self.memory = Memory()
+        self.state = BusState()
         self._moving: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
 
     @classmethod
@@ -74,14 +74,14 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
 
     async def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
         """As `Bus.transact`."""
-        self.memory.check(request)
+        self.state.check(request)
         response = None
         try:
             reply = await super().transact(request, attempts=attempts, trial=trial)
             response = reply.response
             return reply
         finally:
-            self.memory.note(request, response)
+            self.state.note(request, response)
 
     def node(self, number: int) -> AsyncNode:
         """Return one node, 1..16."""
@@ -104,29 +104,29 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
             return await super().motion(node, counter=counter, outputs=outputs, segments=segments)
         async with self._moving[node]:
             request = qlink.MotionRequest(node=node, outputs=outputs, segments=segments)
-            reply = await self.run(move(self.memory.motions[node], request))
+            reply = await self.run(move(self.state.motions[node], request))
             answer: qlink.MotionResponse = reply.response
             return answer
 
     async def clear_fifo(self, node: int) -> qlink.ClearFifoResponse:
         """As `Bus.clear_fifo`."""
         async with self._moving[node]:
-            self.memory.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
             response = await super().clear_fifo(node)
-            self.memory.motions[node].forget()
+            self.state.motions[node].forget()
             return response
 
     async def node_reset(self, node: int) -> qlink.NodeResetResponse:
         """As `Bus.node_reset`."""
         async with self._moving[node]:
-            self.memory.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
             response = await super().node_reset(node)
-            self.memory.motions[node].forget()
+            self.state.motions[node].forget()
             return response
 
     async def node_sync(self, *, counter: int | None = None) -> None:
         """As `Bus.node_sync`."""
-        await self.tell(qlink.NodeSyncRequest(node=BROADCAST, counter=self.memory.next_sync(counter)))
+        await self.tell(qlink.NodeSyncRequest(node=BROADCAST, counter=self.state.next_sync(counter)))
 
     def stream_motion(
         self,
@@ -137,13 +137,13 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         full_pause: float = 0.002,
     ) -> AsyncGenerator[MotionProgress, None]:
         """As `Bus.stream_motion`, for `async for`."""
-        return self.iterate(self.memory.stream(words, outputs, patience, full_pause))
+        return self.iterate(self.state.stream(words, outputs, patience, full_pause))
 
     async def complete_motor_request(
         self, node: int, motor_data: bytes, *, poll_interval: float = 0.01, timeout: float = 5.0
     ) -> qlink.MotorResponsePollResponse:
         """As `Bus.complete_motor_request`."""
-        return await self.run(self.memory.complete(node, motor_data, poll_interval, timeout))
+        return await self.run(self.state.complete(node, motor_data, poll_interval, timeout))
 
     async def sync(
         self,
@@ -154,7 +154,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         on_tick: Callable[[SyncTick], None] | None = None,
     ) -> SyncReport:
         """As `Bus.sync`."""
-        return await self.run(self.memory.sync(interval, count, stop), on_tick)
+        return await self.run(self.state.sync(interval, count, stop), on_tick)
 
     async def load(
         self,
@@ -166,7 +166,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         progress: Callable[[LoadProgress], None] | None = None,
     ) -> LoadReport:
         """As `Bus.load`."""
-        return await self.run(self.memory.load(node, program, piece, patience), progress)
+        return await self.run(self.state.load(node, program, piece, patience), progress)
 
     async def scan(
         self, nodes: Iterable[int] = NODES, *, progress: Callable[[survey.Found], None] | None = None

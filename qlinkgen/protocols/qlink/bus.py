@@ -17,9 +17,9 @@ from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.procedure import FAILURES
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.protocols.qlink import survey
+from qlinkgen.protocols.qlink.bus_state import BusState, make_engine
 from qlinkgen.protocols.qlink.facts import BAUD, BROADCAST, NODES, PIECE
 from qlinkgen.protocols.qlink.loading import LoadProgress, LoadReport
-from qlinkgen.protocols.qlink.memory import Memory, make_engine
 from qlinkgen.protocols.qlink.motion import MotionProgress, MotionState, move
 from qlinkgen.protocols.qlink.pacing import SyncReport, SyncTick
 from qlinkgen.transport.blocking import BlockingMaster
@@ -69,7 +69,7 @@ class Bus(BlockingMaster, MasterCalls):
         """
         engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
-        self.memory = Memory()
+        self.state = BusState()
         self._moving: defaultdict[int, threading.Lock] = defaultdict(threading.Lock)
 
     def after_fork(self) -> None:
@@ -105,14 +105,14 @@ class Bus(BlockingMaster, MasterCalls):
         Raises:
             CommandError: the position of a motor is to be preset that runs, as its node has told last.
         """
-        self.memory.check(request)
+        self.state.check(request)
         response = None
         try:
             reply = super().transact(request, attempts=attempts, trial=trial)
             response = reply.response
             return reply
         finally:
-            self.memory.note(request, response)
+            self.state.note(request, response)
 
     def node(self, number: int) -> Node:
         """Return one node, 1..16."""
@@ -146,7 +146,7 @@ class Bus(BlockingMaster, MasterCalls):
             return super().motion(node, counter=counter, outputs=outputs, segments=segments)
         with self._moving[node]:
             request = qlink.MotionRequest(node=node, outputs=outputs, segments=segments)
-            state = self.memory.motions[node]
+            state = self.state.motions[node]
             reply = self._quick(state, request) if state.ready else self.run(move(state, request))
             answer: qlink.MotionResponse = reply.response
             return answer
@@ -166,22 +166,22 @@ class Bus(BlockingMaster, MasterCalls):
     def clear_fifo(self, node: int) -> qlink.ClearFifoResponse:
         """Drop all words that wait in a node, and the motion that is pending here (section 7.12)."""
         with self._moving[node]:
-            self.memory.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
             response = super().clear_fifo(node)
-            self.memory.motions[node].forget()
+            self.state.motions[node].forget()
             return response
 
     def node_reset(self, node: int) -> qlink.NodeResetResponse:
         """Reset a node; it answers first (section 7.7). A motion that is pending here is dropped."""
         with self._moving[node]:
-            self.memory.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
             response = super().node_reset(node)
-            self.memory.motions[node].forget()
+            self.state.motions[node].forget()
             return response
 
     def node_sync(self, *, counter: int | None = None) -> None:
         """Synchronise all nodes (section 7.5); left out, the counter is one up from the last sync."""
-        self.tell(qlink.NodeSyncRequest(node=BROADCAST, counter=self.memory.next_sync(counter)))
+        self.tell(qlink.NodeSyncRequest(node=BROADCAST, counter=self.state.next_sync(counter)))
 
     def stream_motion(
         self,
@@ -205,7 +205,7 @@ class Bus(BlockingMaster, MasterCalls):
         Raises:
             LinkError: a node was silent for longer. What it had taken is queued, the rest is pending.
         """
-        return self.iterate(self.memory.stream(words, outputs, patience, full_pause))
+        return self.iterate(self.state.stream(words, outputs, patience, full_pause))
 
     def complete_motor_request(
         self, node: int, motor_data: bytes, *, poll_interval: float = 0.01, timeout: float = 5.0
@@ -216,7 +216,7 @@ class Bus(BlockingMaster, MasterCalls):
             NoReply: not completed within `timeout` seconds, or the node does not answer. The request itself
                 is sent once: repeated, it could be done twice.
         """
-        return self.run(self.memory.complete(node, motor_data, poll_interval, timeout))
+        return self.run(self.state.complete(node, motor_data, poll_interval, timeout))
 
     def sync(
         self,
@@ -227,7 +227,7 @@ class Bus(BlockingMaster, MasterCalls):
         on_tick: Callable[[SyncTick], None] | None = None,
     ) -> SyncReport:
         """Send node_sync every `interval` seconds, `count` times or until `stop()`; says how steadily."""
-        return self.run(self.memory.sync(interval, count, stop), on_tick)
+        return self.run(self.state.sync(interval, count, stop), on_tick)
 
     def load(
         self,
@@ -251,7 +251,7 @@ class Bus(BlockingMaster, MasterCalls):
             HexFileError: the file is not what it should be.
             LoadError: a piece was not acknowledged.
         """
-        return self.run(self.memory.load(node, program, piece, patience), progress)
+        return self.run(self.state.load(node, program, piece, patience), progress)
 
     def scan(
         self, nodes: Iterable[int] = NODES, *, progress: Callable[[survey.Found], None] | None = None

@@ -46,7 +46,7 @@ def make_engine(
     return MasterEngine(codec, timing, echo=echo, health=health, accepts=ACCEPTS)
 
 
-class Memory:
+class BusState:
     """Counters of motions and syncs.
 
     Attributes:
