@@ -10,7 +10,7 @@ from qlinkgen.cli.kinds import is_shipped
 from qlinkgen.cli.simulating import run_bus, say
 from qlinkgen.cli.wire_options import counted, parse_nodes, with_crc
 from qlinkgen.link.codec import Codec
-from qlinkgen.link.slave import SlaveEngine, Station
+from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.sim import FaultPlan, Wire
 
@@ -31,21 +31,21 @@ def simulate_bus(
     """Put the nodes on a pty, until a signal comes."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
 
-    codec, stations = _stations(protocol, nodes, crc)
+    codec, numbered = _nodes(protocol, nodes, crc)
     bits = codec.BUS.bits_per_byte
     # Byte by byte is how a line delivers; without a speed there is nothing to deliver in between.
     wire = Wire(
         baud=baud, bits_per_byte=bits, faults=plan, echo=echo, chunks="byte" if baud is not None else "frame"
     )
     turnaround = TURNAROUND * bits / baud if baud else 0.0
-    engines = [SlaveEngine(codec, station, turnaround=turnaround) for station in stations]
+    engines = [SlaveEngine(codec, node, turnaround=turnaround) for node in numbered]
     for engine in engines:
-        wire.attach(engine, f"node {engine.station.number}")
+        wire.attach(engine, f"node {engine.node.number}")
     run_bus(PtyBus(wire, link=link), link, f"{counted(len(engines), 'node')} of {protocol}")
     say(_summary(engines), plan)
 
 
-def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[Station]]:
+def _nodes(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[Node]]:
     if is_shipped(name, "qlink"):
         from qlinkgen.codecs import qlink  # noqa: PLC0415  # other protocols do without
 
@@ -64,7 +64,7 @@ def _stations(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, lis
     return codec, [GenericNode(codec, number) for number in numbers]
 
 
-def _qlink_nodes(numbers: Iterable[int]) -> list[Station]:
+def _qlink_nodes(numbers: Iterable[int]) -> list[Node]:
     from qlinkgen.codecs.qlink import PositionType  # noqa: PLC0415
     from qlinkgen.protocols.qlink import VirtualNode  # noqa: PLC0415  # other protocols do without
 

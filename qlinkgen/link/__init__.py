@@ -13,7 +13,7 @@ from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.monitor import Monitor
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
-from qlinkgen.link.slave import SlaveEngine, Station
+from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Reply
 
@@ -25,11 +25,11 @@ __all__ = [
     "LinkCounters",
     "MasterEngine",
     "Monitor",
+    "Node",
     "Pause",
     "Procedure",
     "Reply",
     "SlaveEngine",
-    "Station",
     "Tell",
     "Timing",
 ]

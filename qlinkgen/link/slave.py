@@ -8,13 +8,13 @@ from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message
 from qlinkgen.link.echo import EchoCanceller
 
 
-class Station(Protocol):
+class Node(Protocol):
     """What a node does; `SlaveHandlers` of a generated bus module has a method for each command."""
 
     #: Address that the node answers to. A request may change it.
     number: int
 
-    # Any: a station handles messages of its own protocol alone.
+    # Any: a node handles messages of its own protocol alone.
     def handle(self, request: Any, now: float) -> Message | None:
         """Do what a request says; return the response, None where there is none."""
         ...
@@ -51,14 +51,14 @@ class SlaveEngine:
     """Finds the requests to a node in what is on the line, and hands out its answers.
 
     Attributes:
-        station: what the node does.
+        node: what the node does.
         counters: what it has seen.
     """
 
     def __init__(
         self,
         codec: Codec,
-        station: Station,
+        node: Node,
         *,
         turnaround: float = 0.0,
         baud: int | None = None,
@@ -71,7 +71,7 @@ class SlaveEngine:
 
         Args:
             codec: the generated module of the protocol.
-            station: what the node does.
+            node: what the node does.
             turnaround: seconds from the request to its answer, so that the asker can stop sending.
             baud: speed of the line, that of the schema unless given.
             echo: whether the adapter hands back what is sent. An answer can be the same bytes as its request:
@@ -85,7 +85,7 @@ class SlaveEngine:
             raise ValueError(
                 f"turnaround: {turnaround} s was given; an answer cannot come before its request"
             )
-        self.station = station
+        self.node = node
         self.counters = SlaveCounters()
         self._encode = codec.encode
         self._broadcast = codec.BUS.broadcast
@@ -122,12 +122,12 @@ class SlaveEngine:
         address = address_of(request)
         if address is not None and address == self._broadcast:
             self.counters.broadcasts += 1
-            response = self.station.handle(request, now)
+            response = self.node.handle(request, now)
             if not self._answering[type(request)]:
                 return
-        elif address is None or address == self.station.number:
+        elif address is None or address == self.node.number:
             self.counters.requests += 1
-            response = self.station.handle(request, now)
+            response = self.node.handle(request, now)
         else:
             self.counters.foreign += 1
             return

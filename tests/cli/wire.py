@@ -15,7 +15,7 @@ from typing import IO
 
 from qlinkgen.codecs import qlink
 from qlinkgen.link.codec import Codec
-from qlinkgen.link.slave import SlaveEngine, Station
+from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.protocols.qlink import VirtualNode
 from qlinkgen.sim import FaultPlan, Wire
 from qlinkgen.sim.pty_bus import PtyBus
@@ -127,24 +127,24 @@ def simulated(*arguments: str | Path) -> Iterator[tuple[str, subprocess.Popen[by
 
 
 def line(
-    *stations: Station, codec: Codec = qlink, baud: int | None = None, faults: FaultPlan | None = None
+    *nodes: Node, codec: Codec = qlink, baud: int | None = None, faults: FaultPlan | None = None
 ) -> Wire:
     """A simulated line; nodes 1 and 3 of Q.link unless others are given."""
     wire = Wire(baud=baud, faults=faults)
-    for station in stations or (VirtualNode(1), VirtualNode(3, position_type=1, serial_number=77)):
-        wire.attach(SlaveEngine(codec, station))
+    for node in nodes or (VirtualNode(1), VirtualNode(3, position_type=1, serial_number=77)):
+        wire.attach(SlaveEngine(codec, node))
     return wire
 
 
 @contextlib.contextmanager
 def bus(
-    *stations: Station,
+    *nodes: Node,
     codec: Codec = qlink,
     baud: int | None = None,
     faults: FaultPlan | None = None,
 ) -> Iterator[PtyBus]:
     """The same line behind a pty, run by a thread."""
-    with PtyBus(line(*stations, codec=codec, baud=baud, faults=faults)) as running:
+    with PtyBus(line(*nodes, codec=codec, baud=baud, faults=faults)) as running:
         yield running
 
 

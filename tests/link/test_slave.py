@@ -85,7 +85,7 @@ class TestBroadcasts:
             qlink.NodeStartRequest(node=0),
             qlink.NodeStopRequest(node=0),
         ):
-            sent, engine, node = heard(request, answer=lambda request: ANSWER)  # whatever the station says
+            sent, engine, node = heard(request, answer=lambda request: ANSWER)  # whatever the node returns
             assert (sent, node.heard, engine.counters.broadcasts) == (b"", [request], 1)
 
     def test_unless_it_is_one_of_those_that_are(self) -> None:
@@ -190,12 +190,12 @@ class TestFaults:
         frame = bytes.fromhex("a5a50406") + b"\x00"  # a number of a command, and a node that it cannot have
         assert heard(frame, ASK)[0] == ANSWER.to_frame()
 
-    def test_what_the_station_does_not_support_is_not_answered(self) -> None:
+    def test_what_the_node_does_not_support_is_not_answered(self) -> None:
         sent, engine, _ = heard(ASK, answer=lambda request: None)
         assert (sent, engine.counters.requests, engine.counters.answers) == (b"", 1, 0)
         assert engine.next_timer() is None
 
-    def test_an_answer_that_cannot_be_sent_is_the_fault_of_the_station(self) -> None:
+    def test_an_answer_that_cannot_be_sent_is_the_fault_of_the_node(self) -> None:
         engine, _ = slave(lambda request: qlink.MotorPositionResponse(node=3, position=1 << 40))
         with pytest.raises(qlink.EncodeError):
             engine.receive(ASK.to_frame(), 0.0)
@@ -212,8 +212,8 @@ def test_a_protocol_with_another_broadcast_address() -> None:
     codec = module("dynamixel")
     command = next(each for each in codec.COMMANDS.values() if each.name == "ping")
     name = command.request.ADDRESS
-    station = Node(5, lambda request: command.response(**{name: 5}))
-    engine = SlaveEngine(codec, station)
+    node = Node(5, lambda request: command.response(**{name: 5}))
+    engine = SlaveEngine(codec, node)
     engine.receive(command.request(**{name: 4}).to_frame(), 0.0)
     assert engine.counters.foreign == 1
     engine.receive(command.request(**{name: 5}).to_frame(), 0.0)

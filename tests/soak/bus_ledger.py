@@ -95,13 +95,13 @@ class Station(SlaveEngine):
         muted: answers that nobody has heard for that reason.
     """
 
+    node: WitnessNode
     cut = False
     mute = False
     muted = 0
 
     def __init__(self, codec: Codec, node: WitnessNode) -> None:
         super().__init__(codec, node)
-        self.node = node
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that are on the line."""

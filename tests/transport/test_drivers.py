@@ -76,13 +76,13 @@ over_both = pytest.mark.parametrize("pair", PAIRS, ids=["memory", "descriptor"])
 def line(pair: Pair, *nodes: int) -> Iterator[tuple[Port, list[Node]]]:
     """The master's end of a line on which some nodes answer."""
     here, there = pair()
-    stations = [Node(number) for number in nodes]
+    served = [Node(number) for number in nodes]
     done = threading.Event()
-    slaves = [SlaveEngine(qlink, station) for station in stations]
+    slaves = [SlaveEngine(qlink, node) for node in served]
     thread = threading.Thread(target=serve, args=(there, *slaves), kwargs={"stop": done.is_set})
     thread.start()
     try:
-        yield here, stations
+        yield here, served
     finally:
         done.set()
         thread.join(PATIENCE)
