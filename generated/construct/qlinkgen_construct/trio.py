@@ -18,7 +18,8 @@ KEYPAD_MODE = Enum(Groups((0, 7)), on_only=0, on_off=127)
 CHARACTER_TRANSFER = Message(
     "character_transfer",
     0x01,
-    "characters" / Default(TextField(1, 256), " "),  # Seven-bit characters, control characters included
+    # Seven-bit characters, control characters included
+    "characters" / Default(TextField(1, 256), " "),
     addresses=[(1, 15)],
     checksum=False,
 )
@@ -29,7 +30,8 @@ DIRECT_VARIABLE_TRANSFER = Message(
     0x02,
     "number" / Default(Groups((0, 7), (7, 7)), 0),  # Number of the variable
     # Value of the variable, integer part first
-    "value" / Default(
+    "value"
+    / Default(
         Scaled(
             Groups(
                 (32, 7),
@@ -47,12 +49,13 @@ DIRECT_VARIABLE_TRANSFER = Message(
             divisor=2**32,
             exact=True,
         ),
-        Decimal("0"),
+        Decimal(0),
     ),
     addresses=[(1, 15)],
 )
 
-# Put a keypad into network mode and tell it where to send its key presses. (Message types)
+# Put a keypad into network mode and tell it where to send its key presses. (Message
+# types)
 KEYPAD_OFFSET = Message(
     "keypad_offset",
     0x03,
@@ -72,7 +75,14 @@ KEYPAD_MODE_MESSAGE = Message(
 )
 
 # crc-16/ibm-3740
-ALGORITHM = CRC(width=16, poly=0x1021, init=0xFFFF, refin=False, refout=False, xorout=0x0000)
+ALGORITHM = CRC(
+    width=16,
+    poly=0x1021,
+    init=0xFFFF,
+    refin=False,
+    refout=False,
+    xorout=0x0000,
+)
 
 # (Message format)
 LAYOUT = [

@@ -6,8 +6,6 @@ count. Construct's Enum and FlagsEnum name numbers and bits; its Default, Const 
 when nothing is given. All errors are ConstructErrors.
 """
 
-# ruff: noqa: ARG002, SLF001  # construct gives every method the same arguments, and calls its parts by _name
-
 from __future__ import annotations
 
 import copy
@@ -63,10 +61,14 @@ class Groups(Construct):
         data = stream_read(stream, len(self.chunks), path)
         for byte, (_, bits) in zip(data, self.chunks, strict=True):
             if byte >> bits:
-                raise ValidationError(f"byte {byte:#04x} has more than {bits} bits set", path=path)
+                raise ValidationError(
+                    f"byte {byte:#04x} has more than {bits} bits set", path=path
+                )
         return self.number(data)
 
-    def _build(self, obj: object, stream: BinaryIO, context: Container, path: str) -> object:
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
         value = _unsigned(obj, self.bits, self.signed, path)
         data = bytes(value >> shift & (1 << bits) - 1 for shift, bits in self.chunks)
         stream_write(stream, data, len(data), path)
@@ -89,7 +91,9 @@ class Bits(Construct):
         value = context.bits >> self.first & (1 << self.bits) - 1
         return int(_signed(value, self.bits) if self.signed else value)
 
-    def _build(self, obj: object, stream: BinaryIO, context: Container, path: str) -> object:
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
         context.bits |= _unsigned(obj, self.bits, self.signed, path) << self.first
         return obj
 
@@ -104,10 +108,20 @@ class BitFields(Construct):
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         inner = Container(bits=self.integer._parsereport(stream, context, path))
-        found = [(field, field._parsereport(stream, inner, path)) for field in self.fields]
-        return Container({field.name: value for field, value in found if isinstance(field.subcon, Default)})
+        found = [
+            (field, field._parsereport(stream, inner, path)) for field in self.fields
+        ]
+        return Container(
+            {
+                field.name: value
+                for field, value in found
+                if isinstance(field.subcon, Default)
+            }
+        )
 
-    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
+    def _build(
+        self, obj: Values, stream: BinaryIO, context: Container, path: str
+    ) -> Values:
         inner = Container(bits=0)
         for field in self.fields:
             field._build(obj.get(field.name), stream, inner, path)
@@ -139,7 +153,9 @@ class Ranged(Adapter):
 
     def _decode(self, obj: object, context: Container, path: str) -> int:
         if not isinstance(obj, int) or not self.minimum <= obj <= self.maximum:
-            raise ValidationError(f"{obj!r} is not in {self.minimum}..{self.maximum}", path=path)
+            raise ValidationError(
+                f"{obj!r} is not in {self.minimum}..{self.maximum}", path=path
+            )
         return obj
 
     _encode = _decode
@@ -217,7 +233,13 @@ class Scaled(Adapter):
     """
 
     def __init__(
-        self, subcon: Construct, *, factor: int = 1, bias: int = 0, divisor: int = 1, exact: bool = False
+        self,
+        subcon: Construct,
+        *,
+        factor: int = 1,
+        bias: int = 0,
+        divisor: int = 1,
+        exact: bool = False,
     ) -> None:
         super().__init__(subcon)
         self.factor = factor
@@ -252,10 +274,18 @@ class Count(Subconstruct):
 
     def number(self, data: bytes) -> int:
         """The integer in these bytes; whether each byte is one of it shows later."""
-        return int(self.subcon.number(data) if isinstance(self.subcon, Groups) else self.subcon.parse(data))
+        return int(
+            self.subcon.number(data)
+            if isinstance(self.subcon, Groups)
+            else self.subcon.parse(data)
+        )
 
-    def _build(self, obj: object, stream: BinaryIO, context: Container, path: str) -> object:
-        return self.subcon._build(len(context[self.of]) * self.step, stream, context, path)
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
+        return self.subcon._build(
+            len(context[self.of]) * self.step, stream, context, path
+        )
 
 
 class ArrayField(Construct):
@@ -271,12 +301,17 @@ class ArrayField(Construct):
     def checked(self, number: int, path: str) -> int:
         """The number of items, if it is one that is allowed."""
         if not self.minimum <= number <= self.maximum:
-            raise RangeError(f"{number} items are not {self.minimum}..{self.maximum}", path=path)
+            raise RangeError(
+                f"{number} items are not {self.minimum}..{self.maximum}", path=path
+            )
         return number
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Row:
         data = stream_read_entire(stream, path)
-        return [self.item.parse(data[at : at + self.size]) for at in range(0, len(data), self.size)]
+        return [
+            self.item.parse(data[at : at + self.size])
+            for at in range(0, len(data), self.size)
+        ]
 
     def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
         self.checked(len(obj), path)
@@ -351,14 +386,17 @@ class Message(Construct):
         self.known = {
             name: run.minimum
             for name, run in self.runs.items()
-            if run.minimum == run.maximum and name not in {each.subcon.of for each in self._counts()}
+            if run.minimum == run.maximum
+            and name not in {each.subcon.of for each in self._counts()}
         }
         self.least = self.size({name: run.minimum for name, run in self.runs.items()})
         self.most = self.size({name: run.maximum for name, run in self.runs.items()})
 
     def _settable(self) -> Iterator[Renamed]:
         for field in self.fields:
-            inside = field.subcon.fields if isinstance(field.subcon, BitFields) else (field,)
+            inside = (
+                field.subcon.fields if isinstance(field.subcon, BitFields) else (field,)
+            )
             yield from (each for each in inside if isinstance(each.subcon, Default))
 
     def _counts(self) -> Iterator[Renamed]:
@@ -400,24 +438,34 @@ class Message(Construct):
     def _cells(self, data: bytes, path: str) -> list[tuple[Renamed, bytes]]:
         """The fields with their bytes. All sizes are right, or RangeError is raised."""
         if not self.least <= len(data) <= self.most:
-            raise RangeError(f"{len(data)} bytes, {self.name} has {self.least}..{self.most}", path=path)
+            raise RangeError(
+                f"{len(data)} bytes, {self.name} has {self.least}..{self.most}",
+                path=path,
+            )
         cells, at, counts = [], 0, dict(self.known)
         for field in self.fields:
             run = self.runs.get(field.name)
             if isinstance(field.subcon, Count):
                 number = self._learned(field, data[at:], path)
                 if counts.setdefault(field.subcon.of, number) != number:
-                    raise RangeError(f"{field.name} does not agree with {field.subcon.of}", path=path)
+                    raise RangeError(
+                        f"{field.name} does not agree with {field.subcon.of}", path=path
+                    )
             elif run and field.name not in counts:
                 number, rest = divmod(len(data) - self.size(counts), run.size)
                 if rest:
-                    raise RangeError(f"{len(data)} bytes are no whole number of {field.name}", path=path)
+                    raise RangeError(
+                        f"{len(data)} bytes are no whole number of {field.name}",
+                        path=path,
+                    )
                 counts[field.name] = run.checked(number, path)
             size = self._size(field, counts)
             cells.append((field, data[at : at + size]))
             at += size
         if at != len(data):
-            raise RangeError(f"{len(data)} bytes, the counts of {self.name} tell {at}", path=path)
+            raise RangeError(
+                f"{len(data)} bytes, the counts of {self.name} tell {at}", path=path
+            )
         return cells
 
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
@@ -433,15 +481,25 @@ class Message(Construct):
                 values[field.name] = found
         return values
 
-    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
+    def _build(
+        self, obj: Values, stream: BinaryIO, context: Container, path: str
+    ) -> Values:
         if unknown := sorted(set(obj) - set(self.defaults)):
-            raise ValidationError(f"{self.name} has no field {', '.join(map(str, unknown))}", path=path)
+            raise ValidationError(
+                f"{self.name} has no field {', '.join(map(str, unknown))}", path=path
+            )
         values = Container(self.defaults)
         values.update({name: value for name, value in obj.items() if value is not None})
         try:
             for field in self.fields:
-                whole = values if isinstance(field.subcon, BitFields) else values.get(field.name)
+                whole = (
+                    values
+                    if isinstance(field.subcon, BitFields)
+                    else values.get(field.name)
+                )
                 field._build(whole, stream, values, path)
         except TypeError as error:
-            raise ValidationError(f"{self.name} has a value of a wrong type: {error}", path=path) from None
+            raise ValidationError(
+                f"{self.name} has a value of a wrong type: {error}", path=path
+            ) from None
         return obj

@@ -5,8 +5,6 @@ length or its message, a MarkedFrame by a byte with a marker bit, and a Packet h
 fills in and checks lengths, inserted bytes and check values.
 """
 
-# ruff: noqa: ARG002, SLF001  # construct gives every method the same arguments, and calls its parts by _name
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -126,7 +124,9 @@ class Mark(NamedTuple):
 
     def split(self, byte: int) -> tuple[int, int]:
         """The message id and the address in the byte."""
-        number, address = (byte >> first & (1 << bits) - 1 for first, bits in (self.id, self.address))
+        number, address = (
+            byte >> first & (1 << bits) - 1 for first, bits in (self.id, self.address)
+        )
         return number, address
 
 
@@ -162,12 +162,19 @@ class Check(NamedTuple):
         if not self.word:
             return self.packed(self.algorithm.compute(b"".join(runs)))
         if not request:
-            raise FrameError("unknown", "an answer needs its request: pass request=packet to build and parse")
+            raise FrameError(
+                "unknown",
+                "an answer needs its request: pass request=packet to build and parse",
+            )
         words = [
-            run[at : at + self.word] for run in (request[1:], *runs) for at in range(0, len(run), self.word)
+            run[at : at + self.word]
+            for run in (request[1:], *runs)
+            for at in range(0, len(run), self.word)
         ]
         return self.packed(
-            self.algorithm.compute([request[0], *(int.from_bytes(word, "big") for word in words)])
+            self.algorithm.compute(
+                [request[0], *(int.from_bytes(word, "big") for word in words)]
+            )
         )
 
 
@@ -205,7 +212,10 @@ class Stuffing(NamedTuple):
         """Without them."""
         plain = data.replace(self.after + self.insert, self.after)
         if self.add(plain) != data:
-            raise FrameError("stuffing", f"{self.insert.hex()} does not follow each {self.after.hex()}")
+            raise FrameError(
+                "stuffing",
+                f"{self.insert.hex()} does not follow each {self.after.hex()}",
+            )
         return plain
 
 
@@ -238,7 +248,11 @@ class Frame(Construct):
 
     def overhead(self, message: Message) -> int:
         """Bytes beside the payload of a message."""
-        return sum(_size(part) for part in self.parts if message.checksum or part is not self.check)
+        return sum(
+            _size(part)
+            for part in self.parts
+            if message.checksum or part is not self.check
+        )
 
     def wrap(
         self,
@@ -251,10 +265,14 @@ class Frame(Construct):
         """The frame of a payload, whatever it is; ``number`` replaces the id of the message."""
         stuffing, shown = self.stuffing, message.id if number is None else number
         sent = stuffing.add(payload) if stuffing and not stuffing.over else payload
-        cells = {part.name: self._cell(part, shown, sent, address) for part in self.parts}
+        cells = {
+            part.name: self._cell(part, shown, sent, address) for part in self.parts
+        }
         if self.check and message.checksum:
             cells[self.check.name] = self.check.value(cells, request)
-        inner = [part.name for part in self.parts if stuffing and part.name in stuffing.over]
+        inner = [
+            part.name for part in self.parts if stuffing and part.name in stuffing.over
+        ]
         if stuffing and inner:
             data = b"".join(cells[name] for name in inner)
             cells |= dict.fromkeys(inner, b"") | {inner[0]: stuffing.add(data)}
@@ -277,13 +295,20 @@ class Frame(Construct):
             case Check():
                 return b""
 
-    def _build(self, obj: Values, stream: BinaryIO, context: Container, path: str) -> Values:
+    def _build(
+        self, obj: Values, stream: BinaryIO, context: Container, path: str
+    ) -> Values:
         message = self.by_name.get(obj["message"])
         if message is None:
-            raise ValidationError(f"there is no message {obj['message']!r} in this direction", path=path)
+            raise ValidationError(
+                f"there is no message {obj['message']!r} in this direction", path=path
+            )
         address = obj[self.address] if self.address else 0
         if not _allowed(message, address):
-            raise ValidationError(f"{message.name} cannot be sent to {self.address} {address!r}", path=path)
+            raise ValidationError(
+                f"{message.name} cannot be sent to {self.address} {address!r}",
+                path=path,
+            )
         payload = message.build(obj.get("fields") or {})
         wire = self.wrap(message, payload, address, context._params.get("request", b""))
         stream_write(stream, wire, len(wire), path)
@@ -304,7 +329,12 @@ class Frame(Construct):
         return self.by_id[number]
 
     def _judged(
-        self, cells: Mapping[str, bytes], number: int, payload: bytes, address: int = 0, request: bytes = b""
+        self,
+        cells: Mapping[str, bytes],
+        number: int,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
     ) -> Container:
         """The message of a frame in cells: check value, message, sizes, values, address."""
         found = self.by_id.get(number)
@@ -314,29 +344,39 @@ class Frame(Construct):
                 rejected = self.check.rejected
                 refused = rejected is not None and sent == self.check.packed(rejected)
                 kind = "illegal" if refused else "crc"
-                raise FrameError(kind, f"{sent.hex()} was sent, {expected.hex()} expected")
+                raise FrameError(
+                    kind, f"{sent.hex()} was sent, {expected.hex()} expected"
+                )
         message = self._known(number)
         try:
             fields = message.parse(payload)
         except RangeError as error:
-            raise FrameError("length", f"{len(payload)} bytes are not a payload; {error}") from None
+            raise FrameError(
+                "length", f"{len(payload)} bytes are not a payload; {error}"
+            ) from None
         except ConstructError as error:
             raise FrameError("range", f"{message.name}; {error}") from None
         if not _allowed(message, address):
-            raise FrameError("range", f"{message.name} is never sent to {self.address} {address}")
+            raise FrameError(
+                "range", f"{message.name} is never sent to {self.address} {address}"
+            )
         place = {self.address: address} if self.address else {}
         return Container(message=message.name, **place, fields=fields)
 
 
 def messages_of(*frames: Frame) -> dict[str, Message]:
     """The messages of all frames by their full names."""
-    return {name: message for frame in frames for name, message in frame.by_name.items()}
+    return {
+        name: message for frame in frames for name, message in frame.by_name.items()
+    }
 
 
 def _allowed(message: Message, address: object) -> bool:
     if not message.addresses:
         return True
-    return isinstance(address, int) and any(first <= address <= last for first, last in message.addresses)
+    return isinstance(address, int) and any(
+        first <= address <= last for first, last in message.addresses
+    )
 
 
 class _Wire:
@@ -375,7 +415,8 @@ class _Wire:
         if byte != stuffing.insert:
             kind = "truncated" if self.hunt and byte == stuffing.after else "stuffing"
             raise FrameError(
-                kind, f"{byte.hex()} follows {stuffing.after.hex()}, not {stuffing.insert.hex()}"
+                kind,
+                f"{byte.hex()} follows {stuffing.after.hex()}, not {stuffing.insert.hex()}",
             )
         self.due, self.recent = False, b""
 
@@ -383,7 +424,9 @@ class _Wire:
         """Only an inserted byte may follow."""
         due = self.stuffing.insert if self.stuffing and self.due else b""
         if self.data[self.at :] not in (b"", due):
-            raise FrameError("length", f"{len(self.data) - self.at} bytes follow the frame")
+            raise FrameError(
+                "length", f"{len(self.data) - self.at} bytes follow the frame"
+            )
 
 
 class DelimitedFrame(Frame):
@@ -421,31 +464,43 @@ class DelimitedFrame(Frame):
         number = numbers[type(part)] = part.integer.parse(cell)
         if isinstance(part, Length):
             if not part.least <= number <= part.most:
-                raise FrameError("length", f"{part.name} is {number}, not {part.least}..{part.most}")
+                raise FrameError(
+                    "length", f"{part.name} is {number}, not {part.least}..{part.most}"
+                )
             numbers[Length] -= part.bias
         elif self.bare and Id in numbers:
             message = self._known(numbers[Id])
             if Address in numbers and not _allowed(message, numbers[Address]):
-                raise FrameError("range", f"{message.name} is never sent to {numbers[Address]}")
+                raise FrameError(
+                    "range", f"{message.name} is never sent to {numbers[Address]}"
+                )
 
     def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
         numbers[Payload] = 0
         if Length in numbers:
             return source.take(part, numbers[Length])
         try:
-            return self._known(numbers[Id]).measured(lambda size: source.take(part, size))
+            return self._known(numbers[Id]).measured(
+                lambda size: source.take(part, size)
+            )
         except RangeError as error:
             raise FrameError("length", str(error)) from None
 
     def _plain(self, cells: Mapping[str, bytes]) -> bytes:
         for part in self.parts:
             if isinstance(part, Constant) and cells[part.name] != part.data:
-                raise FrameError("frame", f"{part.name} is {cells[part.name].hex()}, not {part.data.hex()}")
+                raise FrameError(
+                    "frame",
+                    f"{part.name} is {cells[part.name].hex()}, not {part.data.hex()}",
+                )
         payload = cells[self.payload.name]
         if self.stuffing and not self.stuffing.over:
             payload = self.stuffing.remove(payload)
         if len(payload) > self.payload.most:
-            raise FrameError("length", f"{len(payload)} bytes of payload, at most {self.payload.most} are")
+            raise FrameError(
+                "length",
+                f"{len(payload)} bytes of payload, at most {self.payload.most} are",
+            )
         return payload
 
 
@@ -460,12 +515,24 @@ class MarkedFrame(Frame):
         marks = [at for at, byte in enumerate(wire) if byte & header.marker]
         if marks == [0] and number != end.end:
             raise FrameError("truncated", f"{wire[-1]:#04x} is not an end")
-        if marks != [0, len(wire) - 1] or end.end == number or wire[-1:] != end.byte(0, address):
-            raise FrameError("frame", f"{wire[0]:#04x} to {wire[-1]:#04x} are not header, payload and end")
-        message = self.by_id.get(number)
-        if message is None or address == 0 or not message.fits(len(wire) - self.overhead(message)):
+        if (
+            marks != [0, len(wire) - 1]
+            or end.end == number
+            or wire[-1:] != end.byte(0, address)
+        ):
             raise FrameError(
-                "frame", f"no message has the id {number}, {self.address} {address}, {len(wire)} bytes"
+                "frame",
+                f"{wire[0]:#04x} to {wire[-1]:#04x} are not header, payload and end",
+            )
+        message = self.by_id.get(number)
+        if (
+            message is None
+            or address == 0
+            or not message.fits(len(wire) - self.overhead(message))
+        ):
+            raise FrameError(
+                "frame",
+                f"no message has the id {number}, {self.address} {address}, {len(wire)} bytes",
             )
         size = len(wire) - self.overhead(message)
         cells = {self.payload.name: wire[1 : 1 + size]}
@@ -483,16 +550,23 @@ class Packet(Frame):
     def _frame(self, wire: bytes, request: bytes) -> Container:
         has_id = isinstance(self.parts[0], Id)
         if not has_id and not request:
-            raise FrameError("unknown", "an answer needs its request: pass request=packet to build and parse")
+            raise FrameError(
+                "unknown",
+                "an answer needs its request: pass request=packet to build and parse",
+            )
         first = (wire if has_id else request)[0]
         message = self._known(first)
         beside = self.overhead(message)
         least = 0 if message.empty_is_default else message.least
         if len(wire) < least + beside:
-            raise FrameError("truncated", f"{len(wire)} bytes, {message.name} has {least + beside} at least")
+            raise FrameError(
+                "truncated",
+                f"{len(wire)} bytes, {message.name} has {least + beside} at least",
+            )
         if len(wire) > message.most + beside:
             raise FrameError(
-                "length", f"{len(wire)} bytes, {message.name} has {message.most + beside} at most"
+                "length",
+                f"{len(wire)} bytes, {message.name} has {message.most + beside} at most",
             )
         cells, at = {}, 0
         for part in self.parts:

@@ -202,8 +202,13 @@ class _Field:
     def _value(self, number: Scalar, raw: Node) -> Node:
         default = native_from_raw(number, number.default)
         assert isinstance(default, int | float | Decimal)
-        shown: Node = Call("Decimal", (str(default),)) if isinstance(default, Decimal) else default
+        shown = _decimal(default) if isinstance(default, Decimal) else default
         return Call("Default", (self._types.of(number, raw), shown))
+
+
+def _decimal(number: Decimal) -> Call:
+    text = str(number)
+    return Call("Decimal", (int(text) if text.lstrip("-").isdecimal() else text,))
 
 
 def _name(number: Scalar) -> str:
@@ -242,7 +247,7 @@ def _limited(node: Node, limit: Limit) -> Node:
         case Within():
             return Call("Ranged", (node, limit.low, limit.high))
         case Clear():
-            return Call("Clear", (node, Number(limit.mask, hex(limit.mask))))
+            return Call("Clear", (node, hexadecimal(limit.mask)))
         case _:
             assert_never(limit)
 

@@ -13,7 +13,7 @@ from qlinkgen.backends import python_text
 from qlinkgen.model.texts import one_line
 
 #: Characters of a line of source.
-WIDTH = 110
+WIDTH = 88
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +145,7 @@ def _text(node: Node, column: int, indent: int) -> str:
     inner = indent + 4
     match node:
         case Named():
-            return f'"{node.name}" / {_text(node.node, column + len(node.name) + 5, indent)}'
+            return f'"{node.name}"\n{" " * indent}/ {_text(node.node, indent + 2, indent)}'
         case Call():
             parts = [_part("", each, inner) for each in node.args]
             parts += [_part(f"{key}=", each, inner) for key, each in node.kwargs]
