@@ -15,17 +15,20 @@ from qlinkgen.model.texts import escaped, one_line, visible
 _QUOTES = re.compile('"{3,}|"$')
 #: Strings of generated code and its comments; f-strings are kept, for the names in them.
 _SAID = re.compile(
-    r'(?P<kept>\bf"(?:[^"\\\n]|\\.)*")|"""(?:[^"\\]|\\.|"(?!""))*"""|b?"(?:[^"\\\n]|\\.)*"|#[^\n]*', re.DOTALL
+    r'(?P<kept>\bf"(?:[^"\\\n]|\\.)*")|"""(?:[^"\\]|\\.|"(?!""))*"""|b?"(?:[^"\\\n]|\\.)*"'
+    r"|b?'(?:[^'\\\n]|\\.)*'|#[^\n]*",
+    re.DOTALL,
 )
 
 
 def literal(text: str) -> str:
-    """A string literal in double quotes."""
-    return '"' + "".join(map(_in_literal, text)) + '"'
+    """A string literal, in the quotes that need fewer escapes; double ones otherwise."""
+    quote = "'" if text.count('"') > text.count("'") else '"'
+    return quote + "".join(_in_literal(each, quote) for each in text) + quote
 
 
-def _in_literal(character: str) -> str:
-    if character in '"\\':
+def _in_literal(character: str, quote: str) -> str:
+    if character in (quote, "\\"):
         return f"\\{character}"
     return character if character.isprintable() else repr(character)[1:-1]
 

@@ -177,7 +177,9 @@ class Message(BaseMessage):
 # Messages -------------------------------------------------------------------------------
 
 _new = object.__new__
-_SCALE_VALUE = DecimalScale(-9223372036854775808, 9223372036854775807, divisor=4294967296)
+_SCALE_VALUE = DecimalScale(
+    -9223372036854775808, 9223372036854775807, divisor=4294967296
+)
 
 
 class CharacterTransfer(Message):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from qlinkgen.backends import python_text
 from qlinkgen.backends.base import Options, Outputs, banner
 from qlinkgen.backends.python import docstrings, package, values
+from qlinkgen.backends.python.fitted import fitted
 from qlinkgen.backends.python.layout import WIDTH, wrapped
 from qlinkgen.backends.python.module import templates
 from qlinkgen.backends.python.names import attribute, class_name, imported
@@ -139,16 +140,16 @@ class BusModule:
         title = " and ".join(title for title, part in parts.items() if part)
         first, *others = banner(self._protocol)
         head = one_line(f"{first}: {title}, a method for each command.")
+        source = f"from .{file_stem(self._protocol.name)} import "
+        classes = sorted(self._classes, key=imported)
+        fits = len(source) + len(", ".join(classes)) <= WIDTH
         lines = [line for other in others for line in textwrap.wrap(one_line(other), WIDTH)]
         view = BusView(
             doc=python_text.docstring([*textwrap.wrap(head, WIDTH - 4), "", *lines]),
             table=[f'{self._class(t.request)}: "{t.name}"' for t in self._transactions],
-            imports=wrapped(
-                f"from .{file_stem(self._protocol.name)} import (",
-                sorted(self._classes, key=imported),
-                ")",
-                0,
-            ),
+            imports=[source + ", ".join(classes)]
+            if fits
+            else [f"{source}(", *(f"    {each}," for each in classes), ")"],
             decimals="Decimal" in self._place.used,
             public=sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),
             callers=callers,
@@ -156,7 +157,7 @@ class BusModule:
             nodes=f", {self._nodes()}" if self._nodes() else "",
         )
         template = templates().get_template("templates/bus.j2")
-        return template.render(vars(view)).rstrip("\n") + "\n"
+        return fitted(template.render(vars(view)).rstrip("\n") + "\n")
 
     def _class(self, message: MessagePlan) -> str:
         """The class of a message, which the module has to import."""

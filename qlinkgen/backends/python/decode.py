@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, values
-from qlinkgen.backends.python.layout import WIDTH, comprehension, indented, joined, slice_of, wrapped
+from qlinkgen.backends.python.layout import WIDTH, indented, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
@@ -116,8 +116,7 @@ class Decoder:
 
     def _start(self, size: Size) -> list[str]:
         """The statement that binds a place, where it is not always the same."""
-        terms = integers.size_terms(size + self.place.header)
-        return joined("start = ", terms, "+", _INDENT) if size.terms else []
+        return [f"start = {self._at(size)}"] if size.terms else []
 
     def _from(self, size: Size) -> str:
         """A place that has been bound, as an index."""
@@ -200,7 +199,7 @@ class Decoder:
         if not taken.terms:
             return
         self._refuse_stray(taken, name, offset)
-        self._values += joined(f"{local} = ", taken.terms, "|", _INDENT)
+        self._values.append(f"{local} = {' | '.join(taken.terms)}")
         if integer.byteorder is None and integer.signed:
             self._values.append(f"{local} = {integers.sign_extended(local, integer.bits)}")
 
@@ -212,7 +211,7 @@ class Decoder:
             terms = taken.terms
             if integer.byteorder is None:
                 terms = integers.group_terms(integer, integers.own_bits(integer, taken.targets))
-            self._sizes += joined(f"{local} = ", terms, "|", _INDENT)
+            self._sizes.append(f"{local} = {' | '.join(terms)}")
         self._refuse_stray(taken, name, offset)
         return number
 
@@ -220,7 +219,7 @@ class Decoder:
         for sources, mask in taken.stray:
             seen = sources[0]
             if len(sources) > 1:
-                self._values += joined("stray = ", sources, "|", _INDENT)
+                self._values.append(f"stray = {' | '.join(sources)}")
                 seen = "stray"
             self._refuse(f"{seen} > 0x{mask:02X}", name, seen, offset)
 
@@ -458,7 +457,7 @@ class Decoder:
             number = " | ".join(integers.group_terms(item, sources))
             if item.signed:
                 number = integers.sign_extended(f"({number})", item.bits)
-        self._values += comprehension(f"{target} = [", number, places, "]", _INDENT)
+        self._values.append(f"{target} = [{number} {places}]")
 
 
 def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) -> list[str]:
@@ -482,9 +481,7 @@ def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) ->
     total = f"{product} {'+' if scaling.bias > 0 else '-'} {abs(scaling.bias)}" if scaling.bias else product
     if scaling.divisor == 1:
         return [f"{target} = {total}"]
-    return joined(
-        f"{target} = ", [f"({total})" if scaling.bias else total, str(scaling.divisor)], "/", _INDENT
-    )
+    return [f"{target} = {f'({total})' if scaling.bias else total} / {scaling.divisor}"]
 
 
 def _is_plain(number: Scalar) -> bool:
@@ -517,8 +514,7 @@ def _offset(step: Step) -> str:
 
 def _assigned(targets: Sequence[str], call: str) -> list[str]:
     if len(targets) == 1:
-        starred = targets[0].startswith("*")
-        return [f"({targets[0]},) = {call}" if not starred else f"{targets[0]}, = {call}"]
+        return [f"({targets[0]},) = {call}"]
     line = f"{', '.join(targets)} = {call}"
     if _INDENT + len(line) <= WIDTH:
         return [line]

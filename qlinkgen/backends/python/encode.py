@@ -7,11 +7,6 @@ from typing import assert_never
 
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.layout import (
-    WIDTH,
-    comprehension,
-    condition,
-    indented,
-    joined,
     literal,
     wrapped,
 )
@@ -92,12 +87,14 @@ class Encoder:
             self._step(step)
         for part in self.place.back:
             self._part(part)
-        guard = (
-            [*condition(self._terms, _INDENT), f"    raise {self.place.use('OutOfRange')}"]
-            if self._terms
-            else []
-        )
-        return [*self._lines, *guard, *self._late, *self._expression(name)]
+        return [*self._lines, *self._guard(), *self._late, *self._expression(name)]
+
+    def _guard(self) -> list[str]:
+        """The statement that raises where a condition does not hold."""
+        if not self._terms:
+            return []
+        holds = self._terms[0] if len(self._terms) == 1 else f"({' and '.join(self._terms)})"
+        return [f"if not {holds}:", f"    raise {self.place.use('OutOfRange')}"]
 
     def _require(self, number: str, *rules: Condition) -> None:
         self._terms += [integers.holds(rule, number) for rule in rules]
@@ -216,9 +213,9 @@ class Encoder:
         self._require(f"{name}_raw", *limits(number))
 
     def _bits(self, step: BitsStep) -> None:
-        terms = [term for member in step.members if (term := self._member(member))]
+        terms = list(map(self._member, step.members)) or ["0"]
         raw = f"{step.name}_whole"
-        self._lines += joined(f"{raw} = ", terms or ["0"], "|", _INDENT)
+        self._lines.append(f"{raw} = {' | '.join(terms)}")
         if step.integer.signed:  # bits have no sign; only the way out of the struct has
             self._lines.append(f"{raw} = {integers.sign_extended(raw, step.integer.bits)}")
         self._integer(step.integer, raw)
@@ -231,7 +228,8 @@ class Encoder:
         else:
             self._indexed(member.name, member.number)
         if member.number.signed:
-            number = f"({number} & 0x{(1 << member.bits) - 1:X})"
+            number = f"{number} & 0x{(1 << member.bits) - 1:X}"
+            number = f"({number})" if member.shift else number
         return f"{number} << {member.shift}" if member.shift else number
 
     def _bytes(self, step: BytesStep) -> None:
@@ -263,25 +261,17 @@ class Encoder:
     def _odd_items(self, step: ItemsStep, source: str) -> None:
         """Items that struct does not know, not in this byte order, or not all of their values."""
         local = f"{step.name}_raw"
-        self._lines += comprehension(
-            f"{local} = [", f"{self.place.use('index')}(item)", f"for item in {source}", "]", _INDENT
-        )
+        self._lines.append(f"{local} = [{self.place.use('index')}(item) for item in {source}]")
         rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
         for rule in rules:
             self._terms.append(f"all({integers.holds(rule, 'item')} for item in {local})")
         octets = f"{step.name}_octets"
         if step.item.byteorder is None:
             groups = [integers.group_out("item", chunk) for chunk in step.item.chunks]
-            flat = f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
-            lines = comprehension(f"{octets} = [", flat, f"for item in {local}", "]", _INDENT)
-            if _INDENT + 4 + len(flat) > WIDTH:
-                element = ["bytes(", "    (", *(f"        {each}," for each in groups), "    )", ")"]
-                lines = [lines[0], *indented(element), *lines[-2:]]
-            self._late += lines
+            data = f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
         else:
-            self._late += comprehension(
-                f"{octets} = [", integers.to_bytes(step.item, "item"), f"for item in {local}", "]", _INDENT
-            )
+            data = integers.to_bytes(step.item, "item")
+        self._late.append(f"{octets} = [{data} for item in {local}]")
         self._pieces.append(f'b"".join({octets})')
 
     # The expression

@@ -36,14 +36,6 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 @dataclass(frozen=True)
-class Row:
-    """A message in a table: its number and its class."""
-
-    id: str
-    name: str
-
-
-@dataclass(frozen=True)
 class Heard:
     """A direction that is decoded: its function, its word in texts, and the names of its tables."""
 
@@ -52,7 +44,8 @@ class Heard:
     words: str
     classes: str
     readers: str
-    rows: Sequence[Row]
+    by_id: str
+    readers_by_id: str
 
 
 @dataclass(frozen=True)
@@ -230,8 +223,8 @@ class PacketView:
     """Packets: nothing marks where one begins."""
 
     title: str
-    requests: Sequence[Row]
-    responses: Sequence[Row]
+    requests: str
+    responses: str
     check_size: int = 0
     check_bytes: str = ""
     check_mask: str = ""
@@ -270,16 +263,24 @@ def heard(plan: Plan) -> list[Heard]:
 
 
 def _heard(plan: Plan, direction: Direction) -> Heard:
-    rows = rows_of(plan.received(direction))
-    if direction == "message":
-        return Heard(direction, "decode", "", "_MESSAGES", "_READERS", rows)
-    upper = direction.upper()
-    return Heard(direction, f"decode_{direction}", f"{direction} ", f"_{upper}S", f"_{upper}_READERS", rows)
+    messages = plan.received(direction)
+    whole = direction == "message"
+    upper = "" if whole else f"_{direction.upper()}"
+    return Heard(
+        direction=direction,
+        function="decode" if whole else f"decode_{direction}",
+        words="" if whole else f"{direction} ",
+        classes="_MESSAGES" if whole else f"{upper}S",
+        readers=f"{upper}_READERS",
+        by_id=_by_id(messages),
+        readers_by_id=_by_id(messages, ".from_checked"),
+    )
 
 
-def rows_of(messages: Sequence[MessagePlan]) -> list[Row]:
-    """Messages as rows of a table."""
-    return [Row(in_hex(message.id), class_name(message)) for message in messages]
+def _by_id(messages: Sequence[MessagePlan], attribute: str = "") -> str:
+    """A dict of the classes of messages, or of an attribute of each, by message id."""
+    rows = (f"{in_hex(each.id)}: {class_name(each)}{attribute}" for each in messages)
+    return f"{{{', '.join(rows)}}}"
 
 
 # Parts of views
@@ -569,8 +570,8 @@ def _marked(plan: Plan, title: str) -> MarkedView:
 
 def _packet(plan: Plan, title: str) -> PacketView:
     check = plan.frame.check
-    requests = rows_of([message for message in plan.messages if message.direction != "response"])
-    responses = rows_of([message for message in plan.messages if message.direction == "response"])
+    requests = _by_id([message for message in plan.messages if message.direction != "response"])
+    responses = _by_id([message for message in plan.messages if message.direction == "response"])
     if check is None:
         return PacketView(title, requests, responses)
     assert isinstance(check.algorithm, Sum)

@@ -82,7 +82,7 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
     if integer.byteorder is not None:
         return from_bytes(integer, slice_of(data, at(0), at(integer.size)))
     sources = tuple(f"{data}[{at(index)}]" for index in range(integer.size))
-    return f"({' | '.join(group_terms(integer, own_bits(integer, sources)))})"
+    return " | ".join(group_terms(integer, own_bits(integer, sources)))
 
 
 def own_bits(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:

@@ -55,41 +55,6 @@ def listing(head: str, items: Iterable[str], tail: str, indent: int) -> list[str
     return [f"{head}{listed[0]},{tail}"] if len(listed) == 1 else wrapped(head, listed, tail, indent)
 
 
-def joined(head: str, terms: Sequence[str], operator: str, indent: int, tail: str = "") -> list[str]:
-    """``head term operator term tail``, in parentheses where it takes several lines."""
-    flat = f" {operator} ".join(terms)
-    line = f"{head}{flat}{tail}"
-    if indent + len(line) <= WIDTH:
-        return [line]
-    if indent + 4 + len(flat) <= WIDTH:
-        return [f"{head}(", f"    {flat}", f"){tail}"]
-    first, *others = terms
-    return [f"{head}(", f"    {first}", *(f"    {operator} {term}" for term in others), f"){tail}"]
-
-
-def condition(terms: Sequence[str], indent: int) -> list[str]:
-    """``if not all of the terms:``."""
-    if len(terms) == 1:
-        return joined("if not ", terms, "and", indent, ":")
-    flat = " and ".join(terms)
-    if indent + len(flat) + 10 <= WIDTH:
-        return [f"if not ({flat}):"]
-    if indent + 4 + len(flat) <= WIDTH:
-        return ["if not (", f"    {flat}", "):"]
-    first, *others = terms
-    return ["if not (", f"    {first}", *(f"    and {term}" for term in others), "):"]
-
-
-def comprehension(head: str, element: str, clause: str, tail: str, indent: int) -> list[str]:
-    """``head element clause tail``, the clause on a line of its own where it must be."""
-    line = f"{head}{element} {clause}{tail}"
-    if indent + len(line) <= WIDTH:
-        return [line]
-    if indent + 4 + len(element) + 1 + len(clause) <= WIDTH:
-        return [head, f"    {element} {clause}", tail]
-    return [head, f"    {element}", f"    {clause}", tail]
-
-
 def slice_of(data: str, start: str, end: str) -> str:
     """``data[start:end]``, with blanks around the colon where an index is an expression."""
     simple = all(each.lstrip("-").isdecimal() or each.isidentifier() for each in (start, end) if each)

@@ -26,13 +26,18 @@ def _learned(payload: PayloadPlan, count: CountStep) -> list[str]:
     run = payload.run(count.run)
     name = f"{count.run}_count"
 
+    front, lines = count.place.front, []
+    if front.terms:
+        lines.append(f"start = at + {integers.size_text(front)}")
+
     def at(more: int) -> str:
-        start = integers.size_text(count.place.front + more)
-        return "at" if start == "0" else f"at + {start}"
+        start = "start" if front.terms else "at"
+        fixed = more if front.terms else front.fixed + more
+        return f"{start} + {fixed}" if fixed else start
 
     number = integers.read(count.integer, "data", at)
     least, item = run.length.minimum, run.item_size
-    lines = [f"if len(data) < {at(count.integer.size)}:", "    return size"]
+    lines += [f"if len(data) < {at(count.integer.size)}:", "    return size"]
     odd = ""
     if count.scale > 1:
         odd = f"{count.run}_odd or "

@@ -14,6 +14,7 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.base import banner, environment
 from qlinkgen.backends.python import frames, tables
 from qlinkgen.backends.python.classes import ClassBuilder, ClassModel
+from qlinkgen.backends.python.fitted import fitted
 from qlinkgen.backends.python.frames import FrameView, MarkedView, PacketView, PartsView, UniqueView
 from qlinkgen.backends.python.layout import WIDTH
 from qlinkgen.backends.python.names import by_kind, class_name, imported
@@ -224,7 +225,7 @@ def _stream_decoder(directions: Sequence[str]) -> list[str]:
 def _tidy(text: str) -> str:
     """Without blanks at line ends, and never more than two empty lines in a row."""
     text = re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
-    return re.sub(r"\n{4,}", "\n\n\n", text).rstrip("\n") + "\n"
+    return fitted(re.sub(r"\n{4,}", "\n\n\n", text).rstrip("\n") + "\n")
 
 
 def _placed(template: str, module: ModuleView, **parts: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from qlinkgen.backends.python.integers import letter
-from qlinkgen.backends.python.layout import comprehension
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.types import Length
 from qlinkgen.plan.payload import ItemsStep, PayloadPlan
@@ -46,10 +45,4 @@ def counts_of(length: Length) -> str:
 
 def table(name: str, text: str, method: str, run: ItemsStep, key: str) -> list[str]:
     """The definition of a struct for each count; ``key`` is an expression on ``n``."""
-    return comprehension(
-        f"{name} = {{",
-        f'{key}: Struct(f"{text}").{method}',
-        f"for n in {counts_of(run.length)}",
-        "}",
-        0,
-    )
+    return [f'{name} = {{{key}: Struct(f"{text}").{method} for n in {counts_of(run.length)}}}']

@@ -1,0 +1,125 @@
+"""Generated Python passes ruff with its own settings, whatever the schema: nothing to fix or to format."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from qlinkgen import schema
+from qlinkgen.backends import construct, python
+from qlinkgen.backends.base import Outputs
+from qlinkgen.backends.python import bus
+from qlinkgen.backends.python.fitted import fitted
+from qlinkgen.backends.python.layout import WIDTH
+from qlinkgen.errors import SchemaError
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.plan import Options
+from tests.support.whole import schemas, words
+
+ROOT = Path(__file__).parents[2]
+SEEDS = range(1, 41)
+#: Added to names; how much of it decides where lines end.
+_LONGER = "_of_the_second_cooling_circuit"
+
+
+def ruff(*arguments: str, folder: Path) -> str:
+    """What ruff with its own settings says about a folder; empty where it is content."""
+    command = [sys.executable, "-m", "ruff", *arguments, "--isolated", "--no-cache", "--quiet", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.stdout + done.stderr
+
+
+def written(protocol: Protocol) -> Outputs:
+    """All Python that is generated for a protocol."""
+    options = Options()
+    outputs = {**construct.generate(protocol, options), **python.generate(protocol, options)}
+    if protocol.bus is not None:
+        outputs |= bus.generate(protocol, options)
+    return outputs
+
+
+def random_protocols(folder: Path) -> Iterator[Protocol]:
+    for seed in SEEDS:
+        path = folder / f"{seed}.yaml"
+        path.write_text(schemas.generate(seed, hostile=seed % 2 == 0), "utf-8")
+        try:
+            yield schema.load(path)
+        except SchemaError:
+            continue
+
+
+def place(folder: Path, outputs: Outputs) -> int:
+    for name, text in outputs.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, "utf-8")
+    return len(outputs)
+
+
+@pytest.mark.parametrize("more", [0, 9, 13, 17, 22, len(_LONGER)])
+def test_random_schemas_leave_nothing_to_do(
+    more: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(words, "NAMES", tuple(name + _LONGER[:more] for name in words.NAMES))
+    files = sum(
+        place(tmp_path / f"s{index}", written(protocol))
+        for index, protocol in enumerate(random_protocols(tmp_path))
+    )
+    assert files > 100
+    assert ruff("check", folder=tmp_path) == ""
+    assert ruff("format", "--check", folder=tmp_path) == ""
+
+
+def test_shipped_and_committed_files_leave_nothing_to_do() -> None:
+    assert ruff("check", folder=ROOT / "generated") == ""
+    assert ruff("format", "--check", folder=ROOT / "generated") == ""
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "tests/schemas").glob("*.yaml")), ids=lambda path: path.stem)
+def test_other_protocols_leave_nothing_to_do(path: Path, tmp_path: Path) -> None:
+    assert place(tmp_path, written(schema.load(path)))
+    assert ruff("check", folder=tmp_path) == ""
+    assert ruff("format", "--check", folder=tmp_path) == ""
+
+
+def test_ruff_would_say_so(tmp_path: Path) -> None:
+    (tmp_path / "long.py").write_text("import os\n\n\nx = [\n  1]\n", "utf-8")
+    assert "F401" in ruff("check", folder=tmp_path)
+    assert "reformatted" in ruff("format", "--check", folder=tmp_path)
+
+
+LONG = "a_rather_long_name"
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        f"{LONG} = {' + '.join([LONG] * 6)}",
+        f"if {' or '.join([LONG] * 6)}:\n    pass",
+        f"if not ({' and '.join(f'{LONG} == {index}' for index in range(6))}):\n    pass",
+        f"if len({LONG}) != {' + '.join([LONG] * 6)}:\n    pass",
+        f"{LONG} = {LONG}.method({', '.join([LONG] * 6)})",
+        f"{LONG} = {{{', '.join(f'{index}: {LONG}' for index in range(6))}}}",
+        f"{LONG} = [{LONG} << 1 | {LONG} for {LONG} in range(0, len({LONG}), 10) if {LONG}]",
+        f"({LONG * 4},) = {LONG}({LONG})",
+        f"{LONG}_1, {LONG}_2 = divmod({LONG} - ({LONG} + {LONG} + {LONG}), 2)",
+        f"{LONG} = (({LONG} >> 11 & 0x1FFFFFFFFF) ^ 0x1000000000) - 0x1000000000 + {LONG}",
+        f'def {LONG}(one: int, two: int, three: int, four: int = 0) -> tuple[int, str]:\n    """"""',
+        f"return {LONG}[{LONG}]({', '.join([LONG] * 5)})",
+    ],
+)
+def test_statements_are_split_as_ruff_splits_them(statement: str, tmp_path: Path) -> None:
+    source = fitted(f"def long():\n    {statement.replace(chr(10), chr(10) + '    ')}\n")
+    assert all(len(line) <= WIDTH for line in source.splitlines())
+    (tmp_path / "long.py").write_text(source, "utf-8")
+    assert ruff("format", "--check", folder=tmp_path) == ""
+
+
+def test_text_is_left_alone() -> None:
+    word = "x" * 100
+    source = f'"""{word}"""\n\nA = 1  # {word}\nB = (1, "{word}")\n'
+    assert fitted(source) == source.replace(f'(1, "{word}")', f'(\n    1,\n    "{word}",\n)')
