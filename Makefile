@@ -11,7 +11,7 @@ TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py)))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast lint generate bench soak soak-schemas clean
+.PHONY: help setup demo test test-fast lint generate bench soak soak-schemas soak-frames clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -73,6 +73,9 @@ soak: .venv/.user  ## A million transactions on a bad line, 50 000 over a pty, 2
 
 soak-schemas: .venv/.dev  ## 1 000 random whole schemas through every target, gcc and clang; writes docs/soak-schemas.md (40 minutes)
 	@$(BIN)/python -m tests.whole --seeds 1..1000 --every --report build/soak-schemas.txt --output docs/soak-schemas.md
+
+soak-frames: .venv/.dev  ## A million mutated frames of each protocol through Python, C and interpreter; writes docs/soak-frames.md (20 minutes)
+	@$(BIN)/python -m tests.soak.frames --output docs/soak-frames.md
 
 clean:  ## Remove everything that make and the tools made
 	rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
