@@ -1,4 +1,4 @@
-"""Schema files: YAML text to the checked model, every fault with its line and column."""
+"""Schema files: converts YAML text to a validated model and reports faults with line and column."""
 
 from qlinkgen.schema.loader import find, lint, load, loads, shipped
 

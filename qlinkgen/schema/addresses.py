@@ -1,4 +1,4 @@
-"""Second pass, addresses: what the bus says of its nodes, against the frame's place for their number."""
+"""Second pass, addresses: checks the nodes of the bus against the address of the frame."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ def check_addresses(frame: Frame | None, bus: Bus, report: Reporter) -> None:
         _check_unused(bus, report)
         return
     if bus.nodes is None:
-        what = "the frame has an address, and the bus no nodes"
+        what = "the frame has an address, but the bus has no nodes"
         report.error("bad-addressing", ("bus",), what, "add nodes: 1..16", of_key=True, needs=_NEEDS)
         return
     if bus.nodes[1] > highest:
         what = f"node {bus.nodes[1]} does not fit the frame's address"
         report.error("address-does-not-fit", ("bus", "nodes"), what, f"use 0..{highest}", needs=_NEEDS)
     if isinstance(frame, MarkedFrame) and bus.nodes[0] == 0:
-        what = "address 0 is nobody's where a header carries it"
-        report.error("bad-addressing", ("bus", "nodes"), what, "let the nodes begin at 1", needs=_NEEDS)
+        what = "node address 0 is not allowed in a marked frame"
+        report.error("bad-addressing", ("bus", "nodes"), what, "begin the nodes at 1", needs=_NEEDS)
     _check_broadcast(bus, bus.nodes, highest, report)
 
 
 def _highest(frame: Frame) -> int | None:
-    """Greatest address, None where the frame has none."""
+    """Highest address, None if the frame has no address."""
     match frame:
         case MarkedFrame():
             return frame.address_bits.mask
@@ -61,6 +61,6 @@ def _check_broadcast(bus: Bus, nodes: tuple[int, int], highest: int, report: Rep
         what = f"broadcast address {bus.broadcast} does not fit the frame's address"
         report.error("address-does-not-fit", ("bus", "broadcast"), what, f"use 0..{highest}", needs=_NEEDS)
     if nodes[0] <= bus.broadcast <= nodes[1]:
-        what = f"broadcast address {bus.broadcast} is a node's too"
+        what = f"broadcast address {bus.broadcast} is also the address of a node"
         hint = f"use one outside {nodes[0]}..{nodes[1]}"
         report.error("bad-addressing", ("bus", "broadcast"), what, hint, needs=_NEEDS)

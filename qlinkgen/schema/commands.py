@@ -1,4 +1,4 @@
-"""Second pass, commands: the transactions that join requests and responses."""
+"""Second pass, commands: builds transactions of requests and responses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from qlinkgen.schema.source import Path
 
 
 def build_bus(file: SchemaFile) -> Bus:
-    """The bus as the file describes it."""
+    """The bus described by the file."""
     spec = file.bus
     return Bus(
         kind=spec.kind,
@@ -42,7 +42,7 @@ class CommandBuilder:
     def __init__(
         self, file: SchemaFile, report: Reporter, messages: MessageBuilder, frame: Frame | None, bus: Bus
     ) -> None:
-        """``frame`` is None where it could not be built: what depends on it is not checked then."""
+        """``frame`` is None if it could not be built; checks that depend on it are skipped."""
         self._file = file
         self._report = report
         self._build = messages
@@ -102,7 +102,7 @@ class CommandBuilder:
                 "write request: {} for one without data",
             )
         if response is None:
-            hint = "write response: {} for an empty answer, response: none for no answer"
+            hint = "write response: {} for an empty response, response: none for no response"
             self._missing("bad-response", "response", path, f"{name} has no response", hint)
         self._check_answered(addressing, response, path)
         section, build = self._section(spec), self._build.directed
@@ -115,7 +115,7 @@ class CommandBuilder:
         return asked, answered
 
     def _missing(self, rule: str, key: str, path: Path, what: str, hint: str) -> None:
-        """Report a key that neither a command nor the defaults have."""
+        """Report a key that is missing in a command and in the defaults."""
         lost = self._report.touched((*path, key)) or self._report.incomplete(("defaults",))
         if not lost:
             self._report.error(rule, path, what, hint, of_key=True, absent=True)
@@ -134,9 +134,7 @@ class CommandBuilder:
         if given is None or given == "none":
             hint = "add addressing: node, broadcast, either or answered_broadcast"
             if not self._report.touched(("frame",)):
-                self._missing(
-                    "bad-addressing", "addressing", path, f"{path[-1]} does not say who is addressed", hint
-                )
+                self._missing("bad-addressing", "addressing", path, f"{path[-1]} has no addressing", hint)
             return "node"
         if given != "node" and self._bus.broadcast is None:
             what = f"'{given}' needs a broadcast address"
@@ -148,12 +146,12 @@ class CommandBuilder:
     ) -> None:
         place, needs = (*path, "response"), ((*path, "response"), (*path, "addressing"))
         if response == "none" and addressing == "answered_broadcast":
-            what = f"{path[-1]} has an answered broadcast and no response"
+            what = f"{path[-1]} has an answered broadcast but no response"
             self._report.error(
                 "bad-response", place, what, "use addressing: either", of_key=True, needs=needs
             )
         if response not in ("none", None) and addressing == "broadcast":
-            what = f"{path[-1]} is only broadcast and has a response"
+            what = f"{path[-1]} is only broadcast but has a response"
             hint = "use response: none, or addressing: answered_broadcast"
             self._report.error("bad-response", place, what, hint, of_key=True, needs=needs)
 
@@ -161,7 +159,7 @@ class CommandBuilder:
         if spec is None:
             hint = "write repeat: safe, unsafe or {counter: FIELD}"
             self._missing(
-                "bad-repeat", "repeat", path, f"{path[-1]} does not say whether it may be repeated", hint
+                "bad-repeat", "repeat", path, f"{path[-1]} does not state whether it may be repeated", hint
             )
             return Repeat(safe=False)
         if spec.counter is not None:
@@ -187,7 +185,7 @@ class CommandBuilder:
             self._report.error("bad-repeat", place, what, "use a plain unsigned integer", needs=needs)
 
     def _attributes(self, given: Mapping[str, Label], path: Path) -> Mapping[str, Label]:
-        """The attributes of a command, those of the defaults included."""
+        """The attributes of a command, including defaults."""
         merged: dict[str, Label] = {**self._file.defaults.attributes, **given}
         for key, value in merged.items():
             place = (*(path if key in given else ("defaults",)), "attributes", key)
@@ -205,10 +203,10 @@ class CommandBuilder:
             words = [shown(allowed).strip("'") for allowed in declared.values]
             hint = did_you_mean(str(value), words, f"use {listed(words, 'or')}")
             self._report.error(
-                "unknown-attribute", place, f"{key} is never {shown(value)}", hint, needs=needs
+                "unknown-attribute", place, f"{key} cannot be {shown(value)}", hint, needs=needs
             )
 
-    # What messages mean together
+    # Relations between messages
 
     def _check_ids(self) -> None:
         seen: dict[tuple[str, int], Path] = {}
@@ -222,7 +220,7 @@ class CommandBuilder:
                 if other != path:
                     what = f"{message.command} has the id of {other[1]}, {message.id:#04x}"
                     needs = (path, other)
-                    self._report.error("overlapping-id", path, what, "give it an id of its own", needs=needs)
+                    self._report.error("overlapping-id", path, what, "use another id", needs=needs)
 
     def _check_id_fits(self, message: Message, path: Path) -> None:
         most = 0xFF
@@ -253,5 +251,5 @@ class CommandBuilder:
                 hint = did_you_mean(name, known, f"there are {listed(known)}")
                 needs = (path, ("messages", name), ("commands", name))
                 self._report.error(
-                    "unknown-message", path, f"there is no message {shown(name)}", hint, needs=needs
+                    "unknown-message", path, f"unknown message {shown(name)}", hint, needs=needs
                 )

@@ -1,4 +1,4 @@
-"""Second pass, types of several values or of any size: byte strings, text, arrays, bit fields."""
+"""Second pass, compound types: byte strings, text, arrays, bit fields."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _CONTAINER_KEYS = ("scale", "offset", "range", "raw_range", "default", "const", 
 
 
 def build_length(text: TypeText, item_size: int, payload_max: int, location: Location) -> Length | None:
-    """How many items the brackets of a type allow; without a number, as many as the payload can hold."""
+    """The number of items from the brackets of a type; without a number, up to the size of the payload."""
     if text.count is None or not text.count.strip():
         return Length(0, payload_max // item_size)
     try:
@@ -32,13 +32,13 @@ def build_length(text: TypeText, item_size: int, payload_max: int, location: Loc
         location.fault(
             "bad-array",
             "type",
-            f"{text.base}[{text.count}] holds nothing",
+            f"{text.base}[{text.count}] is always empty",
             "remove the field, or raise the count",
         )
         return None
     if last * item_size > MAX_PAYLOAD:
         what = f"{text.base}[{text.count}] has up to {last * item_size} bytes"
-        location.fault("payload-too-long", "type", what, f"no payload has more than {MAX_PAYLOAD}")
+        location.fault("payload-too-long", "type", what, f"use at most {MAX_PAYLOAD}")
         return None
     return Length(first, last)
 
@@ -66,8 +66,8 @@ def _blob_default(spec: FieldSpec, text: TypeText, length: Length, location: Loc
     try:
         default = str(spec.default).encode("ascii") if is_text else _bytes(spec.default)
     except UnicodeEncodeError:
-        what = f"{shown(spec.default)} is no text"
-        location.fault("bad-value", "default", what, "write characters of 7 bits")
+        what = f"{shown(spec.default)} is not ASCII text"
+        location.fault("bad-value", "default", what, "use 7-bit characters")
         return b""
     except ValueError as error:
         what, _, hint = str(error).partition("; ")
@@ -75,9 +75,7 @@ def _blob_default(spec: FieldSpec, text: TypeText, length: Length, location: Loc
         return b""
     if not length.minimum <= len(default) <= length.maximum:
         what = f"the default has {len(default)} bytes"
-        location.fault(
-            "value-does-not-fit", "default", what, f"{text.base}[{text.count or ''}] is what it has to fit"
-        )
+        location.fault("value-does-not-fit", "default", what, f"it must fit {text.base}[{text.count or ''}]")
         return b""
     return default
 
@@ -89,7 +87,7 @@ def _bytes(value: object) -> bytes:
 def build_array(
     item: Scalar, spec: FieldSpec, text: TypeText, payload_max: int, location: Location
 ) -> Array | None:
-    """Integers in a row."""
+    """An array of integers."""
     length = build_length(text, item.size, payload_max, location)
     if length is None:
         return None
@@ -103,7 +101,7 @@ def _array_default(spec: FieldSpec, item: Scalar, length: Length, location: Loca
         return ()
     if not isinstance(spec.default, list):
         location.fault(
-            "wrong-type", "default", f"{shown(spec.default)} is no list", "write a list, like [1, 2]"
+            "wrong-type", "default", f"{shown(spec.default)} is not a list", "write a list, like [1, 2]"
         )
         return ()
     if len(spec.default) > length.maximum:
@@ -119,10 +117,10 @@ def _array_default(spec: FieldSpec, item: Scalar, length: Length, location: Loca
 
 
 def is_plain_item(spec: FieldSpec, plain: Plain, base: str, location: Location) -> bool:
-    """An array can hold it; keys that would have no effect on the items are reported."""
+    """Check that an array can hold the type, and that keys apply to its items."""
     if plain.meaning is not None or plain.scaling is not None:
         hint = "use u8 to i64, or a field for each"
-        location.fault("bad-array", "type", f"an array holds plain integers, not '{base}'", hint)
+        location.fault("bad-array", "type", f"an array cannot hold '{base}', only plain integers", hint)
         return False
     for key in _ITEM_KEYS:
         if getattr(spec, key) in (None, False):
@@ -130,7 +128,7 @@ def is_plain_item(spec: FieldSpec, plain: Plain, base: str, location: Location) 
         if key in location.written:
             location.reject(spec, (key,), "an array")
         else:
-            what = f"an array holds plain integers, and '{key}' belongs to its items' type"
+            what = f"an array holds plain integers, but the type of its items has '{key}'"
             location.fault("bad-array", "type", what, "use u8 to i64, or a field for each")
     return True
 
@@ -141,19 +139,19 @@ def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, locat
         spec, _CONTAINER_KEYS, "an integer with bits", "put it on one of the bit fields, or remove it"
     )
     if container.meaning is not None or container.scaling is not None:
-        location.fault("not-applicable", "type", "bits divide a plain integer", "use u8, u16 and so on")
+        location.fault("not-applicable", "type", "only plain integers can have bits", "use u8, u16 and so on")
     members: list[BitField] = []
     for name, bit in (spec.bits or {}).items():
         place = location.inner("bits", name, written=bit.model_fields_set)
         first, last = bit.at
         if last >= container.bits:
             place.fault(
-                "bits-do-not-fit", "", f"{name} reaches to bit {last}", f"bits are 0..{container.bits - 1}"
+                "bits-do-not-fit", "", f"{name} extends to bit {last}", f"use bits 0..{container.bits - 1}"
             )
             continue
         mask = (1 << (last + 1)) - (1 << first)
         if other := next((member.name for member in members if member.mask & mask), None):
-            place.fault("bits-overlap", "", f"{name} overlaps {other}", "give each bits of its own")
+            place.fault("bits-overlap", "", f"{name} overlaps {other}", "use different bits")
         scalar = _bit_scalar(bit, last + 1 - first, scalars, place)
         if scalar is not None:
             members.append(BitField(name, first, scalar, bit.doc))
@@ -186,12 +184,12 @@ def _bit_meaning(
     if plain is None:
         return "unknown"
     if plain.meaning is None:
-        hint = "leave type out, and write signed: true for a signed number"
+        hint = "omit type, and write signed: true for a signed number"
         location.fault("not-applicable", "type", f"'{spec.type}' is not the type of a bit field", hint)
         return "unknown"
     if plain.meaning == "bool":
         if width > 1:
-            location.fault("bits-do-not-fit", "", f"bool is one bit, not {width}", "use at: with one bit")
+            location.fault("bits-do-not-fit", "", f"bool has one bit, not {width}", "use at: with one bit")
         return "bool"
     if not plain.fits(width):
         location.fault("bits-do-not-fit", "", f"{spec.type} does not fit {width} bits", "widen the bit field")

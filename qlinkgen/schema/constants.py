@@ -10,18 +10,18 @@ from qlinkgen.schema.file_model import EnumSpec, FlagsSpec
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
-#: Widest integer that can be described.
+#: Maximum width of an integer.
 MAX_BITS = 64
 INTEGER = re.compile(r"(?P<sign>[ui])(?P<bits>[1-9][0-9]?)\Z", re.ASCII)
 
 
 def integer_range(bits: int, *, signed: bool) -> tuple[int, int]:
-    """Least and greatest value of an integer type."""
+    """Minimum and maximum of an integer type."""
     return (-(1 << (bits - 1)), (1 << (bits - 1)) - 1) if signed else (0, (1 << bits) - 1)
 
 
 def carrier(text: str) -> tuple[int, bool] | None:
-    """Bits and sign of an integer type, None for anything else."""
+    """Bits and sign of an integer type, None for other text."""
     match = INTEGER.match(text)
     if not match or int(match["bits"]) > MAX_BITS:
         return None
@@ -29,7 +29,7 @@ def carrier(text: str) -> tuple[int, bool] | None:
 
 
 def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:
-    """An enum as the file describes it."""
+    """The enum described by a mapping."""
     path: Path = ("enums", name)
     bits, signed = _carrier(spec.type, path, report, signed=True)
     members = {key: value.value for key, value in spec.values.items()}
@@ -40,11 +40,11 @@ def build_enum(name: str, spec: EnumSpec, report: Reporter) -> Enum:
 
 
 def build_flags(name: str, spec: FlagsSpec, report: Reporter) -> Flags:
-    """A set of flags as the file describes it."""
+    """The flags described by a mapping."""
     path: Path = ("flags", name)
     bits, _ = _carrier(spec.type, path, report, signed=False)
     members = {key: value.bit for key, value in spec.values.items()}
-    _check_members(members, (0, bits - 1), f"is no bit of {spec.type}", path, report)
+    _check_members(members, (0, bits - 1), f"is not a bit of {spec.type}", path, report)
     constants = tuple(NamedValue(key, value.bit, value.doc) for key, value in spec.values.items())
     return Flags(name, bits, constants, spec.reserved == "zero", spec.doc, spec.section)
 
@@ -72,5 +72,5 @@ def _check_members(
             report.error("value-does-not-fit", place, f"{key} = {value} {complaint}", hint, needs=intact)
         if value in seen:
             what = f"{key} and {seen[value]} are both {value}"
-            report.error("duplicate-value", place, what, "give each a number of its own", needs=intact)
+            report.error("duplicate-value", place, what, "give each a different number", needs=intact)
         seen.setdefault(value, key)

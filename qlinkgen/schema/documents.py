@@ -1,6 +1,6 @@
-"""Pages that are made from the front end itself: the rules, and the JSON Schema for editors.
+"""Generated documents: the page of rules, and the JSON Schema for editors.
 
-The examples on the page of rules are the broken files of the tests, so the page shows what really is said.
+The examples on the page of rules are broken files of the tests, so the page shows the actual messages.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ _INTRODUCTION = """\
 
 <!-- Generated from qlinkgen/schema/rules.py and tests/schema/broken; do not edit. -->
 
-`qlinkgen lint FILE` checks a schema file and reports every fault in one run, each with its place, the rule it
-breaks and what would mend it:
+`qlinkgen lint FILE` checks a schema file and reports all errors in one run, each with its location, the
+violated rule and a fix:
 
 ```
-file:line:col: error[RULE]: what is wrong; what to do about it
+file:line:col: error[RULE]: error; fix
 ```
 
-An error keeps the file from being used. A warning does not. What a fault leaves uncertain is not reported as
-a fault of its own: mend what is shown, and run again.
+A file with errors cannot be used, a file with only warnings can. Errors that may be consequences of another
+error are suppressed: fix the reported ones and run again.
 """
 
 
@@ -36,7 +36,7 @@ def outputs(root: Path | None = None) -> dict[str, str]:
     """Texts of the generated pages by their path below the repository.
 
     Args:
-        root: The repository, for the examples; without its tests, the page of rules has none.
+        root: The repository, for the examples; without its tests the page of rules has no examples.
     """
     root = root or schemas_dir().parent
     return {
@@ -51,7 +51,7 @@ def json_schema_text() -> str:
 
 
 def rules_page(examples: Path) -> str:
-    """Every rule: what it says, why, and what breaks it."""
+    """The page of rules: summary, reason and examples of each."""
     rows = "".join(
         f"| [{rule.id}](#{rule.id}) | {rule.severity} | {rule.summary} |\n" for rule in RULES.values()
     )
@@ -71,14 +71,14 @@ def _section(rule: Rule, examples: Path) -> str:
 
 
 def _excerpt(source: str, faults: list[Fault]) -> str:
-    """The lines that faults stand in, with the lines around them that say what they belong to."""
+    """The lines with faults, the lines nested below them, and their parents."""
     lines = source.splitlines()
     shown = {line for fault in faults for line in _context(lines, fault.line - 1)}
     return "\n".join(lines[line].replace("\t", "→") for line in sorted(shown))
 
 
 def _context(lines: list[str], at: int) -> list[int]:
-    """A line, what is deeper below it, and its parents."""
+    """A line, the lines nested below it, and its parents."""
     found = [at]
     below = at + 1
     while below < len(lines) and lines[below].strip() and _indent(lines[below]) > _indent(lines[at]):

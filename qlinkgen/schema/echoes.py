@@ -16,12 +16,12 @@ _RULE = "bad-echo"
 
 
 def check_echoes(file: SchemaFile, commands: Iterable[Command], report: Reporter) -> None:
-    """Check every echo of a file: it stands in a response, and its request has what it repeats."""
+    """Check that every echo is in a response and repeats a field of its request."""
     for fields, path, what in _unanswering(file):
         for name, spec in fields.items():
             if spec.echo:
                 place = (*path, name, "echo")
-                hint = "remove it; a response repeats what its request says"
+                hint = "remove it; only a field of a response can be an echo"
                 report.error(_RULE, place, f"'echo' has no effect in {what}", hint, of_key=True)
     for command in commands:
         paths = [_path(file, command.name, direction) for direction in ("request", "response")]
@@ -32,29 +32,29 @@ def check_echoes(file: SchemaFile, commands: Iterable[Command], report: Reporter
 
 
 def _unanswering(file: SchemaFile) -> Iterator[tuple[Fields, Path, str]]:
-    """Fields that answer nothing, their place, and what they are fields of."""
+    """Fields that are not part of a response, their path, and a name for their message."""
     yield file.defaults.request or {}, ("defaults", "request"), "a request"
     for name, command in file.commands.items():
         yield command.request or {}, ("commands", name, "request"), "a request"
     for name, message in file.messages.items():
-        yield message.fields, ("messages", name, "fields"), "a message that answers nothing"
+        yield message.fields, ("messages", name, "fields"), "a message without a request"
 
 
 def _path(file: SchemaFile, name: str, direction: str) -> Path:
-    """Where the fields of a command stand."""
+    """The path of the fields of a command."""
     written = getattr(file.commands[name], direction) is not None
     return ("commands", name, direction) if written else ("defaults", direction)
 
 
 def _fault(field: Field, request: Iterable[Field]) -> tuple[str, str] | None:
-    """What is wrong with an echo, and what would put it right."""
+    """Error and fix for an echo, None if it is right."""
     known = {each.name: each for each in request if _settable(each)}
     asked = known.get(field.name)
     if not _settable(field):
-        return f"{field.name} is no value: the codec fills it", "remove echo"
+        return f"{field.name} cannot be an echo: the codec fills it", "remove echo"
     if asked is None:
         hint = did_you_mean(field.name, known, f"its fields are {listed(known)}")
-        return f"the request has no field '{field.name}' that could be repeated", hint
+        return f"the request has no field '{field.name}' to repeat", hint
     if not _holds(field.type, asked.type):
         return f"{field.name} cannot hold every {field.name} of the request", "give both the same type"
     return None
@@ -65,7 +65,7 @@ def _settable(field: Field) -> bool:
 
 
 def _holds(kind: FieldType, other: FieldType) -> bool:
-    """Both are of the same type, and every value of the other one is in the range of this one."""
+    """Whether a type can hold every value of another."""
     match kind:
         case Blob():
             return isinstance(other, Blob) and kind.text == other.text and _longer(kind.length, other.length)
@@ -94,5 +94,5 @@ def _longer(length: Length, other: Length) -> bool:
 
 
 def _nature(scalar: Scalar) -> tuple[object, ...]:
-    """What a number is; its bytes may stand in another order."""
+    """The properties of a number except its byte order."""
     return scalar.bits, scalar.signed, scalar.scaling, scalar.unit, scalar.meaning

@@ -1,4 +1,4 @@
-"""Second pass, fields: the fields of one message, and the counts that tie some of them together."""
+"""Second pass, fields: builds the fields of a message and connects counts to fields."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class FieldBuilder:
     """Builds the fields of messages."""
 
     def __init__(self, file: SchemaFile, report: Reporter, types: TypeBuilder, payload_max: int) -> None:
-        """``payload_max`` is what a field without a bound may fill."""
+        """``payload_max`` limits the fields without a bound."""
         self._file = file
         self._report = report
         self._types = types
@@ -37,7 +37,7 @@ class FieldBuilder:
         return tuple(self._bounded(fields, path))
 
     def _inherited(self, spec: FieldSpec) -> tuple[str, bool]:
-        """What a field and the named types below it say: the first text, and whether all of them are sure."""
+        """The first description of a field and its named types, and whether all of them are confirmed."""
         doc, confirmed, seen = spec.doc, spec.confirmed, set[str]()
         while (name := type_text(spec.type).base) not in seen:
             seen.add(name)
@@ -53,7 +53,7 @@ class FieldBuilder:
     # Counts
 
     def _counted(self, fields: Sequence[Field], path: Path) -> list[Field]:
-        """The fields, where those that have a count know it."""
+        """The fields, each with the name of its count."""
         counters: dict[str, str] = {}
         for index, field in enumerate(fields):
             if isinstance(field.type, Scalar) and isinstance(count := field.type.role, Count):
@@ -69,8 +69,8 @@ class FieldBuilder:
         needs = (path[:-1], (*path[:-2], count.run))
         if target is None or not isinstance(target.type, Blob | Array) or target.type.length.fixed:
             known = [name for name, other in later.items() if not other.fixed]
-            hint = did_you_mean(count.run, known, f"such fields here: {listed(known)}")
-            what = f"{shown(count.run)} is no field of variable size behind {field.name}"
+            hint = did_you_mean(count.run, known, f"fields of variable size: {listed(known)}")
+            what = f"{field.name} is not followed by a field {shown(count.run)} of variable size"
             self._report.error("bad-count", path, what, hint, needs=needs)
             self._report.taint(path)
             return False
@@ -78,7 +78,7 @@ class FieldBuilder:
         unit = "bytes" if isinstance(target.type, Blob) else count.unit
         most = target.type.length.maximum * (target.type.item_size if unit == "bytes" else 1)
         if most > scalar.maximum and (*path[:-2], target.name) not in self._types.unbounded:
-            what = f"{field.name} counts up to {scalar.maximum}, {target.name} has up to {most} {unit}"
+            what = f"{field.name} counts up to {scalar.maximum}, but {target.name} has up to {most} {unit}"
             self._report.error(
                 "bad-count", path, what, f"shorten {target.name}, or use a wider count", needs=needs
             )
@@ -86,7 +86,7 @@ class FieldBuilder:
 
     def _check_open_ends(self, fields: Sequence[Field], path: Path) -> None:
         open_ends = [field.name for field in fields if is_open(field)]
-        # An integer that is broken may have been the count of one of them.
+        # An integer with an error may be the count of one of them.
         counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
         for name in open_ends[1:]:
             what = f"{name} and {open_ends[0]} both take the rest of the payload"
@@ -97,25 +97,27 @@ class FieldBuilder:
             )
             self._report.taint((*path, name))
         if open_ends:
-            self._check_counts_behind(open_ends[0], fields, path, counts)
+            self._check_later_counts(open_ends[0], fields, path, counts)
 
-    def _check_counts_behind(
+    def _check_later_counts(
         self, name: str, fields: Sequence[Field], path: Path, counts: Sequence[Path]
     ) -> None:
-        """Where a field takes what the counted ones leave, their counts come first."""
+        """Check that counts precede a field that takes the rest of the payload."""
         order = [field.name for field in fields]
         for field in fields[order.index(name) + 1 :]:
             if not isinstance(field.type, Blob | Array) or field.fixed:
                 continue
             count = field.type.length.counted_by
             if count and order.index(count) > order.index(name):
-                what = f"{count} counts {field.name} and follows {name}, which takes the rest of the payload"
+                what = (
+                    f"{count}, the count of {field.name}, follows {name}, which takes the rest of the payload"
+                )
                 hint = f"move {count} before {name}, or give {name} a count"
                 needs = ((*path, name), (*path, count), (*path, field.name), *counts)
                 self._report.error("bad-count", (*path, count, "counts"), what, hint, needs=needs)
 
     def _bounded(self, fields: Sequence[Field], path: Path) -> list[Field]:
-        """The fields, where one without a bound may fill what the others leave of the payload."""
+        """The fields; those without a bound are limited to the rest of the payload."""
         unbounded = {field.name for field in fields if (*path, field.name) in self._types.unbounded}
         room = self._payload_max - sum(field.max_size for field in fields if field.name not in unbounded)
         counters = {field.name: field.type for field in fields if isinstance(field.type, Scalar)}
@@ -132,8 +134,8 @@ class FieldBuilder:
         if counter and isinstance(counter.role, Count):
             most = min(most, counter.maximum // (kind.item_size if counter.role.unit == "bytes" else 1))
         if most == 0:
-            what = f"no room is left for {field.name}"
-            hint = f"the frame holds {self._payload_max} bytes; shorten the other fields"
+            what = f"the payload has no room for {field.name}"
+            hint = f"the frame allows {self._payload_max} bytes; shorten the other fields"
             self._report.error("payload-too-long", place, what, hint, of_key=True, needs=(path, ("frame",)))
             self._report.taint(place)
         return replace(field, type=replace(kind, length=replace(kind.length, maximum=max(1, most))))
@@ -147,5 +149,5 @@ def _with_counter(field: Field, counter: str | None) -> Field:
 
 
 def is_open(field: Field) -> bool:
-    """The field takes the rest of the payload."""
+    """Whether the field takes the rest of the payload."""
     return isinstance(field.type, Blob | Array) and not field.fixed and not field.type.length.counted_by

@@ -1,7 +1,7 @@
-"""The file format, as it is written: one class for each mapping, one attribute for each key.
+"""The schema file format: one class for each mapping, one attribute for each key.
 
-Checks what a mapping may hold; what the parts mean together is checked while the model is built from them.
-The editors' JSON Schema is generated from these classes, so every description here is shown while typing.
+These classes validate each mapping by itself; relations between them are checked while the model is built.
+The JSON Schema for editors is generated from these classes, so editors show the descriptions.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from qlinkgen.schema.kinds import (
 )
 from qlinkgen.schema.notation import shown
 
-#: Marks the branches of a union in the place of a fault; no key of a file can begin so.
+#: Prefix of union branches in the location of a fault; keys of a file cannot begin with it.
 BRANCH = "\0"
 
 
@@ -48,41 +48,41 @@ class _Mapping(BaseModel):
 
 
 class Fact(_Mapping):
-    """Something that the source document states."""
+    """A fact stated by the source document."""
 
-    doc: Text = Field(default="", description="What it is, in one sentence")
+    doc: Text = Field(default="", description="Description, in one sentence")
     section: Text = Field(default="", description="Section of the source document that states it")
     confirmed: StrictBool = Field(default=True, description="false: the source is weak; users are warned")
 
 
 class ProtocolSpec(_Mapping):
-    """Who and what the protocol is."""
+    """Name and source of the protocol."""
 
-    name: Name = Field(description="Prefix of everything generated")
-    title: Text = Field(default="", description="Name for people")
+    name: Name = Field(description="Prefix of generated names")
+    title: Text = Field(default="", description="Display name")
     revision: Text = Field(description="Revision of the source document")
-    source: Text = Field(description="The document that was read")
-    doc: Text = Field(default="", description="What the protocol is for")
+    source: Text = Field(description="Title of the source document")
+    doc: Text = Field(default="", description="Purpose of the protocol")
 
 
 class GroupSpec(_Mapping):
     """Integers sent in groups of less than eight bits, one group a byte."""
 
     bits: Annotated[StrictInt, Field(ge=1, le=7)] = Field(description="Bits of a group")
-    first: Literal["least", "most"] = Field(description="Which group of a number is sent first")
+    first: Literal["least", "most"] = Field(description="The group of a number that is sent first")
 
 
 class EnumValueSpec(_Mapping):
     """A named number."""
 
     value: StrictInt = Field(description="The number")
-    doc: Text = Field(default="", description="What it is, in one sentence")
+    doc: Text = Field(default="", description="Description, in one sentence")
 
 
 class EnumSpec(Fact):
     """Named numbers of one integer type."""
 
-    type: str = Field(description="Integer type that carries it")
+    type: str = Field(description="Its integer type")
     values: dict[str, Annotated[EnumValueSpec, ShortForm("value", "integer")]] = Field(
         min_length=1, description="Name: number"
     )
@@ -92,61 +92,61 @@ class FlagSpec(_Mapping):
     """A named bit."""
 
     bit: Id = Field(description="Number of the bit, 0 is the least significant")
-    doc: Text = Field(default="", description="What it is, in one sentence")
+    doc: Text = Field(default="", description="Description, in one sentence")
 
 
 class FlagsSpec(Fact):
     """Named bits of one integer type."""
 
-    type: str = Field(description="Integer type that carries them")
+    type: str = Field(description="Their integer type")
     values: dict[str, Annotated[FlagSpec, ShortForm("bit", "integer")]] = Field(
         min_length=1, description="Name: number"
     )
     reserved: Literal["keep", "zero"] = Field(
-        default="keep", description="Bits without a name: kept as they are, or an error unless zero"
+        default="keep", description="Unnamed bits: preserved, or an error unless zero"
     )
 
 
 class BitSpec(_Mapping):
-    """A run of bits inside an integer."""
+    """Consecutive bits of an integer."""
 
     at: WholeRange = Field(description="Bit, or first..last bit; 0 is the least significant")
     type: str | None = Field(
         default=None, description="bool, or the name of an enum or flags; an unsigned number if absent"
     )
-    signed: StrictBool = Field(default=False, description="The number is a two's complement")
+    signed: StrictBool = Field(default=False, description="The number is in two's complement")
     scale: Rational | None = Field(default=None, description="Value of one step in the unit")
     offset: Rational | None = Field(default=None, description="Value of raw 0 in the unit")
     unit: Text = Field(default="", description="Unit of the value")
     range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
     raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
-    default: ScalarValue | None = Field(default=None, description="Value where none is given, in the unit")
-    doc: Text = Field(default="", description="What it is, in one sentence")
+    default: ScalarValue | None = Field(default=None, description="Default value, in the unit")
+    doc: Text = Field(default="", description="Description, in one sentence")
 
 
 class FieldSpec(Fact):
     """A field of a message, or a named type that fields can have."""
 
     type: str = Field(description="u8-u64, i8-i64, bool, fixed32.32, bytes[..], text[..], u16[..] or a name")
-    byteorder: Order | None = Field(default=None, description="Where it differs from the file's")
-    groups: GroupSpec | None = Field(default=None, description="Sent in groups of less than eight bits")
+    byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
+    groups: GroupSpec | None = Field(default=None, description="Sent in groups of fewer than eight bits")
     parts: list[WholeRange] | None = Field(
-        default=None, description="Bit ranges in wire order, each begins a new byte"
+        default=None, description="Bit ranges in wire order; each begins a new byte"
     )
     scale: Rational | None = Field(default=None, description="Value of one step in the unit")
     offset: Rational | None = Field(default=None, description="Value of raw 0 in the unit")
     unit: Text | None = Field(default=None, description="Unit of the value")
     range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
     raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
-    default: ScalarValue | None = Field(default=None, description="Value where none is given, in the unit")
-    const: ScalarValue | None = Field(default=None, description="Always sent, and demanded when received")
+    default: ScalarValue | None = Field(default=None, description="Default value, in the unit")
+    const: ScalarValue | None = Field(default=None, description="Always sent, and required when received")
     reserved: StrictBool = Field(default=False, description="Sent as zero (or const), ignored when received")
     counts: str | None = Field(
-        default=None, description="Field of variable size whose length this one carries"
+        default=None, description="Field of variable size whose length this field holds"
     )
-    counts_in: Literal["items", "bytes"] = Field(default="items", description="What is counted")
+    counts_in: Literal["items", "bytes"] = Field(default="items", description="Unit of the count")
     echo: StrictBool = Field(
-        default=False, description="In a response: repeats the field of the same name of the request"
+        default=False, description="In a response: repeats the field of the same name in the request"
     )
     bits: dict[str, Annotated[BitSpec, ShortForm("at", "integer", "string")]] | None = Field(
         default=None, description="Fields inside the integer"
@@ -161,33 +161,27 @@ class PartSpec(Fact):
     """A part of a frame."""
 
     role: Literal["constant", "length", "message", "address", "payload", "checksum"] = Field(
-        description="What the part is for"
+        description="Role of the part"
     )
     type: str | None = Field(default=None, description="Integer type: u8, u16, u24, u32 or u64")
-    byteorder: Order | None = Field(default=None, description="Where it differs from the file's")
+    byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
     value: ByteText | None = Field(default=None, description="The constant bytes")
     counts: list[str] | None = Field(default=None, description="Parts whose bytes a length counts")
-    size: WholeRange | None = Field(default=None, description="Fewest..most payload bytes")
-    algorithm: str | None = Field(default=None, description="Name of the CRC catalogue, or sum8, sum16")
+    size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
+    algorithm: str | None = Field(default=None, description="Name in the CRC catalogue, or sum8, sum16")
     over: list[str] | None = Field(default=None, description="Parts that the checksum covers")
     sent: list[WholeRange] | None = Field(
-        default=None, description="Bits of the checksum that are sent, a byte each"
+        default=None, description="Bit ranges of the checksum that are sent, one per byte"
     )
-    only: list[str] | None = Field(
-        default=None, description="Messages that carry the checksum, if not all do"
-    )
-    words: Annotated[StrictInt, Field(ge=1, le=8)] = Field(
-        1, description="Bytes that a sum adds as one number"
-    )
-    rejected: Id | None = Field(
-        default=None, description="Check value by which an unknown command is refused"
-    )
+    only: list[str] | None = Field(default=None, description="Messages with the checksum; default: all")
+    words: Annotated[StrictInt, Field(ge=1, le=8)] = Field(1, description="Size of the words that a sum adds")
+    rejected: Id | None = Field(default=None, description="Check value that rejects an unknown command")
 
 
 class StuffingSpec(_Mapping):
-    """A byte inserted after each occurrence of others."""
+    """Inserts a byte after each occurrence of a pattern."""
 
-    after: ByteText = Field(description="Byte or bytes after which one is inserted")
+    after: ByteText = Field(description="Pattern after which a byte is inserted")
     insert: ByteText = Field(description="The inserted byte")
     exempt: list[str] = Field(default_factory=list, description="Parts that are not stuffed")
     checksum: Literal["before", "after"] = Field(
@@ -198,24 +192,24 @@ class StuffingSpec(_Mapping):
 
 
 class HeaderSpec(_Mapping):
-    """Where address and message id stand in the header byte."""
+    """Bits of address and message id in the header byte."""
 
     address: WholeRange = Field(description="Bits of the address")
     message: WholeRange = Field(description="Bits of the message id")
 
 
 class MarkedSpec(_Mapping):
-    """Frames whose header and end byte carry a marker bit."""
+    """Frames whose header and end byte have a marker bit."""
 
     marker: Annotated[StrictInt, Field(ge=1, le=0x80)] = Field(description="Mask of the marker bit")
-    header: HeaderSpec = Field(description="How the header byte is divided")
+    header: HeaderSpec = Field(description="Layout of the header byte")
     end: Id = Field(description="Message id bits of the end byte")
-    payload: WholeRange = Field(description="Fewest..most payload bytes")
+    payload: WholeRange = Field(description="Minimum..maximum payload size")
     checksum: PartSpec | None = Field(default=None, description="Between payload and end")
 
 
 class FrameSpec(Fact):
-    """How a message is wrapped: exactly one of parts, marked and packet."""
+    """The frame around a message: exactly one of parts, marked and packet."""
 
     parts: dict[str, PartSpec] | None = Field(default=None, description="Parts in wire order")
     stuffing: StuffingSpec | None = Field(default=None, description="Keeps the preamble unique")
@@ -226,33 +220,33 @@ class FrameSpec(Fact):
 
 
 class BusSpec(_Mapping):
-    """The line and who is on it."""
+    """The line and its nodes."""
 
-    kind: Literal["master_slave", "ring", "host"] = Field(description="Who talks to whom")
+    kind: Literal["master_slave", "ring", "host"] = Field(description="Topology of the bus")
     section: Text = Field(default="", description="Section of the source document that states it")
     nodes: WholeRange | None = Field(default=None, description="First..last address")
     broadcast: Id | None = Field(default=None, description="Address of all nodes at once")
-    baud: Count | None = Field(default=None, description="Usual speed of the line")
+    baud: Count | None = Field(default=None, description="Usual speed of the line in bit/s")
     bits_per_byte: Annotated[StrictInt, Field(ge=1, le=16)] = Field(
-        default=10, description="Bits on the line for a byte: start, data, parity and stop bits"
+        default=10, description="Bits on the line per byte: start, data, parity and stop bits"
     )
-    response_within: Time | None = Field(
-        default=None, description="Time that a slave may take to answer, where one is stated"
-    )
+    response_within: Time | None = Field(default=None, description="Response time limit, if one is stated")
 
 
 class AttributeSpec(_Mapping):
-    """Something that this protocol alone says of its commands."""
+    """A protocol-specific attribute of commands."""
 
-    doc: Text = Field(default="", description="What it is, in one sentence")
-    values: list[Label] = Field(min_length=1, description="All values it can have")
+    doc: Text = Field(default="", description="Description, in one sentence")
+    values: list[Label] = Field(min_length=1, description="Allowed values")
 
 
 class RepeatSpec(_Mapping):
-    """Whether a request may be sent again."""
+    """Whether a request may be repeated."""
 
-    safe: StrictBool = Field(default=True, description="Sending it again does no harm")
-    counter: str | None = Field(default=None, description="Field that tells a repeat from a new request")
+    safe: StrictBool = Field(default=True, description="Repeating the request is harmless")
+    counter: str | None = Field(
+        default=None, description="Field that distinguishes a repeat from a new request"
+    )
 
 
 def _repeat(value: object) -> object:
@@ -261,12 +255,12 @@ def _repeat(value: object) -> object:
     if value in ("safe", "unsafe"):
         return {"safe": value == "safe"}
     raise ValueError(
-        f"{shown(value)} does not say whether a repeat is safe; use safe, unsafe or {{counter: FIELD}}"
+        f"{shown(value)} does not state whether a repeat is safe; use safe, unsafe or {{counter: FIELD}}"
     )
 
 
 class _RepeatForms:
-    """Tell editors of the short form."""
+    """Adds the short form to the JSON Schema."""
 
     @staticmethod
     def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
@@ -289,43 +283,47 @@ Response = Annotated[
 
 
 class DefaultsSpec(_Mapping):
-    """What a command has that does not say otherwise."""
+    """Defaults for commands."""
 
     section: Text | None = Field(default=None, description="Section of the source document")
-    request: Fields | None = Field(default=None, description="What is asked: fields, {} for none")
-    response: Response | None = Field(default=None, description="Fields, {} for an empty answer, or none")
-    addressing: Addressing | None = Field(default=None, description="Who is addressed, and who answers")
-    repeat: Repeat | None = Field(default=None, description="Whether a request may be sent again")
-    in_flight: Count | None = Field(default=None, description="Requests under way at once")
+    request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
+    response: Response | None = Field(default=None, description="Fields, {} for an empty response, or none")
+    addressing: Addressing | None = Field(
+        default=None, description="Nodes addressed, and which of them respond"
+    )
+    repeat: Repeat | None = Field(default=None, description="Whether a request may be repeated")
+    in_flight: Count | None = Field(default=None, description="Maximum number of outstanding requests")
     attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
 
 
 class CommandSpec(Fact):
-    """A transaction: what is asked, what is answered, and how."""
+    """A transaction: request, response and their conditions."""
 
     section: Text | None = Field(  # type: ignore[assignment]  # None: that of `defaults`
         default=None, description="Section of the source document that states it"
     )
-    id: Id = Field(description="Number that tells it from the others")
-    request: Fields | None = Field(default=None, description="What is asked: fields, {} for none")
-    response: Response | None = Field(default=None, description="Fields, {} for an empty answer, or none")
+    id: Id = Field(description="Its number in the frame")
+    request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
+    response: Response | None = Field(default=None, description="Fields, {} for an empty response, or none")
     empty_request: Literal["defaults"] | None = Field(
-        default=None, description="defaults: a request of no bytes is taken as one with all defaults"
+        default=None, description="defaults: an empty payload is a request with every field at its default"
     )
-    addressing: Addressing | None = Field(default=None, description="Who is addressed, and who answers")
-    response_within: Time | None = Field(default=None, description="Where it differs from the bus's")
-    repeat: Repeat | None = Field(default=None, description="Whether a request may be sent again")
-    in_flight: Count | None = Field(default=None, description="Requests under way at once")
+    addressing: Addressing | None = Field(
+        default=None, description="Nodes addressed, and which of them respond"
+    )
+    response_within: Time | None = Field(default=None, description="Overrides the time limit of the bus")
+    repeat: Repeat | None = Field(default=None, description="Whether a request may be repeated")
+    in_flight: Count | None = Field(default=None, description="Maximum number of outstanding requests")
     attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
 
 
 class MessageSpec(Fact):
-    """A message that nobody answers."""
+    """A message without a response."""
 
-    id: Id = Field(description="Number that tells it from the others")
-    fields: Fields = Field(description="What it carries, in wire order")
+    id: Id = Field(description="Its number in the frame")
+    fields: Fields = Field(description="Its fields, in wire order")
     direction: Literal["request", "response"] | None = Field(
-        default=None, description="Who may send it; absent: anybody"
+        default=None, description="Direction of the message; default: any node sends it"
     )
 
 
@@ -333,25 +331,23 @@ class SchemaFile(_Mapping):
     """A protocol: identity, types, frame, bus, and commands or messages."""
 
     qlinkgen: Literal[1] = Field(description="Version of the file format")
-    protocol: ProtocolSpec = Field(description="Who and what the protocol is")
-    byteorder: Order = Field(default="big", description="Of every integer that does not say otherwise")
+    protocol: ProtocolSpec = Field(description="Name and source of the protocol")
+    byteorder: Order = Field(default="big", description="Default byte order of integers")
     groups: GroupSpec | None = Field(
-        default=None, description="Default for every integer that is not of whole bytes"
+        default=None, description="Default groups of integers that are not sent in whole bytes"
     )
     enums: dict[str, EnumSpec] = Field(default_factory=dict, description="Named numbers")
     flags: dict[str, FlagsSpec] = Field(default_factory=dict, description="Named bits")
     types: Fields = Field(default_factory=dict, description="Named types of fields")
-    frame: FrameSpec = Field(description="How a message is wrapped on the wire")
-    bus: BusSpec = Field(description="The line, and who is on it")
+    frame: FrameSpec = Field(description="The frame around each message")
+    bus: BusSpec = Field(description="The line and its nodes")
     attributes: dict[str, AttributeSpec] = Field(
-        default_factory=dict, description="What this protocol alone says of its commands"
+        default_factory=dict, description="Protocol-specific attributes of commands"
     )
-    defaults: DefaultsSpec = Field(
-        default_factory=DefaultsSpec, description="What a command has that does not say otherwise"
-    )
+    defaults: DefaultsSpec = Field(default_factory=DefaultsSpec, description="Defaults for commands")
     commands: dict[str, CommandSpec] = Field(default_factory=dict, description="Transactions by name")
     messages: dict[str, MessageSpec] = Field(
-        default_factory=dict, description="Messages that nobody answers, by name"
+        default_factory=dict, description="Messages without a response, by name"
     )
 
 

@@ -1,4 +1,4 @@
-"""Second pass, frames: from the written parts to one of the model's three kinds of frame."""
+"""Second pass, frames: builds one of the three kinds of frame."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PACKET_ROLES = ("message", "payload", "checksum")
 
 
 def payload_bounds(file: SchemaFile) -> tuple[int, int]:
-    """Fewest and most payload bytes of the frame; the widest bounds where it does not say."""
+    """Minimum and maximum payload size of the frame; the widest bounds if it states none."""
     if file.frame.marked is not None:
         return file.frame.marked.payload
     parts = {**(file.frame.parts or {}), **(file.frame.packet or {})}
@@ -32,13 +32,13 @@ class FrameBuilder:
     """Builds the frame of one file."""
 
     def __init__(self, file: SchemaFile, report: Reporter, crc: str | None = None) -> None:
-        """``crc`` replaces the algorithm that the file names."""
+        """``crc`` replaces the algorithm in the file."""
         self._file = file
         self._report = report
         self._parts = PartBuilder(file, report, crc)
 
     def build(self) -> Frame | None:
-        """The frame; None where a fault that was reported leaves nothing to go on with."""
+        """The frame; None after an error that prevents building it."""
         frame = self._build()
         if frame is None:
             self._report.taint(("frame",))
@@ -58,7 +58,7 @@ class FrameBuilder:
                 self._report.error("bad-frame", ("frame",), what, hint, of_key=True, absent=True)
             return None
         if spec.stuffing is not None and spec.parts is None:
-            what = "'stuffing' has an effect only on frames of parts"
+            what = "'stuffing' applies only to frames of parts"
             self._parts.fault("not-applicable", ("frame", "stuffing"), what, "remove it")
         if spec.parts is not None:
             return self._delimited(spec.parts)
@@ -80,15 +80,15 @@ class FrameBuilder:
         return frame
 
     def _check_order(self, frame: DelimitedFrame, path: Path) -> None:
-        """A receiver finds the end by what stands in front of the payload, and checks it behind."""
+        """Check that length, id and address precede the payload, and the checksum follows it."""
         names = [part.name for part in frame.parts]
         payload = names.index(frame.payload.name)
         for index, part in enumerate(frame.parts):
             if part.role in ("length", "message", "address") and index > payload:
-                what, hint = f"{part.name} stands behind the payload", "put it in front"
+                what, hint = f"{part.name} follows the payload", "move it before the payload"
                 self._parts.fault("bad-frame", (*path, part.name), what, hint)
             elif part.role == "checksum" and index < payload:
-                what, hint = f"{part.name} stands in front of the payload", "put it behind"
+                what, hint = f"{part.name} precedes the payload", "move it after the payload"
                 self._parts.fault("bad-frame", (*path, part.name), what, hint)
 
     def _check_length(self, frame: DelimitedFrame, path: Path) -> None:
@@ -125,7 +125,7 @@ class FrameBuilder:
             what = f"end {spec.end} does not fit the message bits"
             self._report.error("value-does-not-fit", (*path, "end"), what, f"use 0..{message.mask}")
         if spec.payload[1] > MAX_PAYLOAD:
-            what = f"a payload of {spec.payload[1]} bytes is too long for any frame"
+            what = f"a payload of {spec.payload[1]} bytes is too long"
             self._report.error("bad-frame", (*path, "payload"), what, f"use at most {MAX_PAYLOAD}")
         frame = self._file.frame
         return MarkedFrame(
@@ -139,16 +139,14 @@ class FrameBuilder:
             return None
         place = (*path, "checksum")
         if spec.checksum.role != "checksum":
-            what = f"a {spec.checksum.role} stands in the place of the checksum"
+            what = f"the checksum has role: {spec.checksum.role}"
             self._report.error("bad-frame", (*place, "role"), what, "use role: checksum")
             return None
         self._parts.reject(spec.checksum, ("value", "counts", "size", "words", "rejected"), "checksum", place)
         checksum = self._parts.checksum(spec.checksum, ("payload",), place)
         if checksum and any(chunk.mask & spec.marker for chunk in checksum.chunks):
-            what = f"a byte of the checksum can carry the marker bit {spec.marker:#04x}"
-            self._parts.fault(
-                "marker-in-payload", place, what, "say with sent how it is divided: [0..6, 7..13]"
-            )
+            what = f"a byte of the checksum can have the marker bit {spec.marker:#04x}"
+            self._parts.fault("marker-in-payload", place, what, "divide it with sent: [0..6, 7..13]")
         return checksum
 
     def _check_header(self, spec: MarkedSpec, path: Path) -> bool:
@@ -165,12 +163,12 @@ class FrameBuilder:
         ):
             what = "marker, address and message do not share one byte"
             self._parts.fault(
-                "bad-frame", path, what, "let marker be one bit, and use each of eight bits once"
+                "bad-frame", path, what, "use one bit for marker, and each of the eight bits at most once"
             )
             return False
         return True
 
-    # No frame at all
+    # Packets
 
     def _packet(self, specs: Mapping[str, PartSpec]) -> PacketFrame | None:
         path: Path = ("frame", "packet")
@@ -182,12 +180,12 @@ class FrameBuilder:
         id_spec, id_place = places["message"]
         self._parts.reject(id_spec, ("value", "counts", "size", "algorithm", "over"), "message", id_place)
         if self._parts.integer(id_spec, id_place).size != 1:
-            what = "the message id of a packet is one byte"
+            what = "the message id of a packet must be one byte"
             self._report.error("bad-packet", (*id_place, "type"), what, "use u8", needs=(id_place,))
         high = self._parts.payload_size(*places["payload"])[1]
         frame, id_name = self._file.frame, str(id_place[-1])
         if "checksum" not in places:
-            # Words are what a check value adds up; without one a message may have any size.
+            # Only a check value adds words; without one a message may have any size.
             return PacketFrame(id_name, high, word_size=1, doc=frame.doc, section=frame.section)
         check, check_place = places["checksum"]
         checksum = self._packet_checksum(check, specs, check_place)
@@ -201,7 +199,7 @@ class FrameBuilder:
     def _packet_roles_fit(self, specs: Mapping[str, PartSpec], path: Path) -> bool:
         wrong = [name for name, spec in specs.items() if spec.role not in _PACKET_ROLES]
         for name in wrong:
-            what = f"a packet has no {specs[name].role}"
+            what = f"a part with role {specs[name].role} is not allowed in a packet"
             self._parts.fault(
                 "bad-packet", (*path, name), what, f"use {listed(_PACKET_ROLES)}, or a frame of parts"
             )
@@ -214,7 +212,7 @@ class FrameBuilder:
         over = [name for name, part in specs.items() if part.role != "checksum"]
         checksum = self._parts.checksum(spec.model_copy(update={"over": over}), specs, place)
         if checksum is not None and not isinstance(checksum.algorithm, catalogue.Sum):
-            what = f"{checksum.algorithm.name} is no sum, and the check value of a packet is one"
+            what = f"the check value of a packet must be a sum, not {checksum.algorithm.name}"
             self._report.error("bad-packet", (*place, "algorithm"), what, "use sum16 or sum8")
             return None
         if checksum is not None and spec.rejected is not None and spec.rejected > checksum.algorithm.mask:

@@ -1,4 +1,4 @@
-"""The kinds of values that stand in a schema file: each with its check, and its JSON Schema for editors."""
+"""Types of values in a schema file, each with its validator and its JSON Schema for editors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from qlinkgen.schema.characters import CONTROL_CHARACTER, control_character
 from qlinkgen.schema.notation import shown
 
 NAME_PATTERN = r"^[a-z][a-z0-9_]*$"
-#: Most bytes of a payload; more would be no message on a serial line, and receivers reserve room for it.
+#: Maximum payload size; receivers reserve a buffer of the largest payload.
 MAX_PAYLOAD = 65535
 
 
@@ -48,7 +48,7 @@ def _scalar(value: object) -> object:
         return value
     if value is None or isinstance(value, dict | list):
         raise ValueError(
-            f"{shown(value)} is no value; write a number, true, false, text or a list of whole numbers"
+            f"{shown(value)} is not a value; write a number, true, false, text or a list of whole numbers"
         )
     return value
 
@@ -56,13 +56,13 @@ def _scalar(value: object) -> object:
 def _label(value: object) -> object:
     if not isinstance(value, int | str):
         raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
-            f"{shown(value)} is no label; write a word, a whole number, true or false"
+            f"{shown(value)} is not a label; write a word, a whole number, true or false"
         )
     return _uncontrolled(value) if isinstance(value, str) else value
 
 
 class ShortForm:
-    """A plain value stands for a mapping with one key; editors are told of both forms."""
+    """Accepts a plain value as a short form of a mapping with one key; the JSON Schema has both forms."""
 
     def __init__(self, key: str, *kinds: str) -> None:
         """``kinds`` are the JSON types of the short form."""
@@ -70,7 +70,7 @@ class ShortForm:
         self.kinds = kinds
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Expand the short form before the mapping is checked."""
+        """Expand the short form before the mapping is validated."""
         from_short = BeforeValidator(self._expand)
         schema: CoreSchema = from_short.__get_pydantic_core_schema__(source, handler)
         return schema

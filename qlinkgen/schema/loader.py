@@ -1,4 +1,4 @@
-"""From a schema file to the model, or to every fault in it."""
+"""Loads a schema file and returns its model, or its faults."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a so
 
 
 def shipped() -> tuple[str, ...]:
-    """Names of the schemas that come with the package."""
+    """Names of the schemas in the package."""
     return tuple(sorted(path.stem for path in schemas_dir().glob("*.yaml")))
 
 
 def find(protocol: str) -> FilePath:
-    """The file of a shipped schema's name, or of a path. Raises SchemaError where there is none."""
+    """The file of a shipped schema, or of a path. Raises SchemaError for an unknown name."""
     path = FilePath(protocol)
     if "/" not in protocol and not path.suffix:
         path = schemas_dir() / f"{protocol}.yaml"
@@ -42,14 +42,12 @@ def find(protocol: str) -> FilePath:
             hint = did_you_mean(
                 protocol, names, f"shipped are {', '.join(names)}; or give the path of a .yaml file"
             )
-            raise SchemaError(
-                [Fault(protocol, 1, 1, "file-unreadable", "there is no schema of this name", hint)]
-            )
+            raise SchemaError([Fault(protocol, 1, 1, "file-unreadable", "unknown schema", hint)])
     return path
 
 
 def lint(path: FilePath | str) -> list[Fault]:
-    """Every fault and warning of a schema file, in order of the text."""
+    """All errors and warnings of a schema file, in order of the text."""
     return sorted(_load(FilePath(path), None)[1])
 
 
@@ -58,10 +56,10 @@ def load(path: FilePath | str, *, crc: str | None = None) -> Protocol:
 
     Args:
         path: The file.
-        crc: Algorithm that replaces the one which the file names.
+        crc: Algorithm that replaces the one in the file.
 
     Raises:
-        SchemaError: with every fault of the file.
+        SchemaError: with all errors of the file.
     """
     protocol, faults = _load(FilePath(path), crc)
     errors = [fault for fault in faults if fault.severity == "error"]
@@ -71,7 +69,7 @@ def load(path: FilePath | str, *, crc: str | None = None) -> Protocol:
 
 
 def loads(text: str, file: str, *, crc: str | None = None) -> tuple[Protocol | None, list[Fault]]:
-    """The protocol that a text describes (None if it cannot be built), and its faults."""
+    """The protocol described by a text (None if it has errors), and its faults."""
     source = parse(text)
     report = Reporter(file, source)
     for fault in source.faults:
@@ -93,8 +91,8 @@ def _load(path: FilePath, crc: str | None) -> tuple[Protocol | None, list[Fault]
 
 
 def read_regular(path: FilePath) -> str:
-    """Return the text of a file. Raises OSError, also for what is not a regular file and may have no end."""
-    # Opening a FIFO waits for its writer otherwise.
+    """Return the text of a file. Raises OSError, also for files that are not regular and may be endless."""
+    # Otherwise opening a FIFO waits for a writer.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     try:
         mode = os.fstat(descriptor).st_mode

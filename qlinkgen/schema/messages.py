@@ -1,4 +1,4 @@
-"""Second pass, messages: one message in one direction, and whether its frame can carry it."""
+"""Second pass, messages: builds each message and checks that it fits the frame."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _FRAME: Path = ("frame",)
 
 
 class MessageBuilder:
-    """Builds messages, and checks each against the frame."""
+    """Builds messages and checks each against the frame."""
 
     def __init__(
         self, file: SchemaFile, report: Reporter, fields: FieldBuilder, frame: Frame | None, bus: Bus
     ) -> None:
-        """``frame`` is None where it could not be built: what depends on it is not checked then."""
+        """``frame`` is None if it could not be built; checks that depend on it are skipped."""
         self._file = file
         self._report = report
         self._fields = fields
@@ -31,7 +31,7 @@ class MessageBuilder:
 
     @property
     def addressed(self) -> bool:
-        """The frame has an address."""
+        """Whether the frame has an address."""
         if isinstance(self._frame, DelimitedFrame):
             return self._frame.part("address") is not None
         return isinstance(self._frame, MarkedFrame)
@@ -69,7 +69,7 @@ class MessageBuilder:
         return message
 
     def single(self, name: str, spec: MessageSpec) -> Message:
-        """A message that nobody answers."""
+        """A message without a response."""
         path: Path = ("messages", name, "fields")
         nodes = self._bus.nodes if self.addressed else None
         message = Message(
@@ -87,15 +87,15 @@ class MessageBuilder:
         )
         self._check(message, path)
         if isinstance(self._frame, PacketFrame) and spec.direction != "request":
-            what = f"{name} is no answer to a request"
-            hint = "say direction: request, or make it a command"
+            what = f"{name} is not the response to a request"
+            hint = "add direction: request, or make it a command"
             self._report.error("bad-packet", ("messages", name), what, hint, of_key=True, absent=True)
         return message
 
     def _addresses(
         self, addressing: Addressing, direction: Direction
     ) -> tuple[tuple[tuple[int, int], ...], int]:
-        """Ranges of addresses that a message may carry, and the one it has by default."""
+        """Ranges of legal addresses of a message, and its default address."""
         nodes, broadcast = self._bus.nodes, self._bus.broadcast
         if addressing == "none" or nodes is None:
             return (), 0
@@ -111,7 +111,7 @@ class MessageBuilder:
         only = marked.checksum.only if marked and marked.checksum else None
         return only is None or name in only
 
-    # What the frame demands
+    # Checks against the frame
 
     def _check(self, message: Message, path: Path) -> None:
         if self._frame is None:
@@ -125,7 +125,7 @@ class MessageBuilder:
         if isinstance(self._frame, PacketFrame):
             self._check_words(message, self._frame.word_size, path)
             if message.direction == "response" and not message.max_size and not self._frame.checksum:
-                what = f"{message.name} would have no bytes: it has neither fields nor a check value"
+                what = f"{message.name} would be empty: it has neither fields nor a check value"
                 self._error("bad-response", path, what, "use response: none, or add a checksum to the packet")
 
     def _error(self, rule: str, path: Path, what: str, hint: str) -> None:
@@ -141,26 +141,26 @@ class MessageBuilder:
                 low = self._file.frame.marked.payload[0]
         if message.max_size > high:
             excess = message.max_size - high
-            hint = f"the frame holds {high}; shorten a field by {excess}, or let the frame hold more"
+            hint = f"the frame allows {high}; shorten a field by {excess}, or raise this limit"
             self._error("payload-too-long", path, f"{message.name} has up to {message.max_size} bytes", hint)
         least = 0 if message.empty_is_default else message.min_size
         if least < low:
             what = f"{message.name} can have as few as {least} bytes"
-            hint = f"the frame demands {low}; lengthen a field by {low - least}, or let the frame hold less"
+            hint = f"the frame requires {low}; lengthen a field by {low - least}, or lower this limit"
             self._error("payload-too-short", path, what, hint)
 
     def _check_end(self, message: Message, path: Path) -> None:
-        """Without a length, the fields themselves must tell where the frame ends."""
+        """Check that the fields determine the end of a frame without a length."""
         if isinstance(self._frame, DelimitedFrame) and self._frame.part("length"):
             return
         for field in message.fields:
             if is_open(field):
                 neither = f"neither the frame nor {message.name} has a length"
-                what = f"nothing tells where {field.name} ends: {neither}"
+                what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length"
                 self._error("no-frame-end", (*path, field.name), what, hint)
         if message.empty_is_default and message.max_size:
-            what = f"nothing tells an empty {message.name} from a full one: the frame has no length"
+            what = f"an empty {message.name} cannot be distinguished from a full one: the frame has no length"
             self._error("no-frame-end", (*path[:-1], "empty_request"), what, "remove empty_request")
 
     def _check_words(self, message: Message, word: int, path: Path) -> None:
@@ -168,20 +168,20 @@ class MessageBuilder:
             variable = isinstance(field.type, Blob | Array) and not field.fixed
             if variable and not is_open(field):
                 what = f"{field.name} has no fixed size"
-                hint = "a packet has no frame around it; give each field a fixed size"
+                hint = "packets have no length; give each field a fixed size"
                 self._error("bad-packet", (*path, field.name), what, hint)
         if message.fixed and message.max_size % word:
-            what = f"{message.name} has {message.max_size} bytes, which are no whole words of {word}"
+            what = f"{message.name} has {message.max_size} bytes, not a multiple of the {word}-byte words"
             self._error("bad-packet", path, what, "add a reserved field, or change words of the checksum")
 
     def _check_marker(self, field: Field, marker: int, path: Path) -> None:
-        """A payload byte with the marker bit set would be taken for a header."""
+        """Check that payload bytes cannot have the marker bit."""
         if isinstance(field.type, Blob):
             marked = not field.type.text or marker < 0x80
         else:
             marked = any(chunk.mask & marker for chunk in _chunks(field))
         if marked:
-            what = f"a byte of {field.name} can carry the marker bit {marker:#04x}"
+            what = f"a byte of {field.name} can have the marker bit {marker:#04x}"
             hint = "send it in groups: {bits: 7, first: least}, or as text"
             self._error("marker-in-payload", (*path, field.name), what, hint)
 
@@ -202,7 +202,7 @@ def _chunks(field: Field) -> tuple[Chunk, ...]:
 
 
 def _joined(ranges: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
-    """Neighbouring ranges as one."""
+    """Merge adjacent ranges."""
     joined: list[tuple[int, int]] = []
     for first, last in sorted(ranges):
         if joined and first <= joined[-1][1] + 1:

@@ -1,4 +1,4 @@
-"""Names: what a schema's names become in Python and C, and that they stay different there."""
+"""Names: checks spelling, and that names remain distinct after conversion to Python and C."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
-#: Most characters of a name. In C it gets the names of the protocol and the message before it and a suffix
-#: after it, and compilers need to look at 63 characters only (C99, 5.2.4.1).
+#: Maximum length of a name. In C the names of protocol and message precede it and a suffix follows, and only
+#: 63 characters of an identifier are significant (C99, 5.2.4.1).
 MAX_NAME = 40
 _NAME = re.compile(NAME_PATTERN.removesuffix("$") + r"\Z")
-#: What a class of constants is where its name alone would mean something else.
+#: Suffixes of classes of constants whose name is taken.
 _KINDS = {"enums": "enum", "flags": "flags"}
 #: Macros that the C header defines for each message.
 _MESSAGE_MACROS = ("init", "id", "min_size", "max_size", "max_frame_size", "max_wire_size")
-#: The same for each scaled type.
+#: Macros that the C header defines for each scaled type.
 _TYPE_MACROS = ("factor", "bias", "divisor")
 _GLOBAL_MACROS = ("ok", "max_payload_size", "max_wire_size", "enable_float")
 
@@ -51,7 +51,7 @@ def check_names(file: SchemaFile, messages: Sequence[Message], report: Reporter)
 
 
 class _Checker:
-    """Reports names that do not do."""
+    """Reports invalid names and clashes."""
 
     def __init__(self, report: Reporter) -> None:
         self._report = report
@@ -62,12 +62,12 @@ class _Checker:
     def spelling(self, name: str, path: Path) -> bool:
         if len(name) > MAX_NAME:
             what = f"{shown(name)} has {len(name)} characters"
-            hint = f"use at most {MAX_NAME}: C compilers may tell names apart by 63 characters alone"
+            hint = f"use at most {MAX_NAME}: only 63 characters of a C identifier are significant"
             self._error("bad-name", path, what, hint)
             return False
         if _NAME.match(name):
             return True
-        hint = "use lower case letters, digits and underscores, beginning with a letter"
+        hint = "use lower-case letters, digits and underscores, beginning with a letter"
         self._error("bad-name", path, f"{shown(name)} is not a name", hint)
         return False
 
@@ -81,7 +81,7 @@ class _Checker:
             self.spelling(name, ("types", name))
 
     def parts(self, file: SchemaFile) -> str | None:
-        """Check the names of a frame's parts; return that of the address, an attribute of messages."""
+        """Check the names of the parts of a frame; return the name of the address."""
         address = "address" if file.frame.marked is not None else None
         for group in ("parts", "packet"):
             for name, part in (getattr(file.frame, group) or {}).items():
@@ -97,7 +97,7 @@ class _Checker:
                 self.spelling(member, (*path, name, "bits", member))
 
     def clashes(self, names: Iterable[tuple[str, str, Path]]) -> None:
-        """Report names that become the same: (what it becomes, what it is called in a message, its place)."""
+        """Report equal names among (converted name, text for messages, path)."""
         seen: dict[str, str] = {}
         for result, called, path in names:
             other = seen.setdefault(result, called)
@@ -140,7 +140,7 @@ def _attributes(message: Message, address: str | None, *, c: bool) -> Iterator[t
 
 
 def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
-    """Names that become classes: enums, flags and messages."""
+    """Names of classes: enums, flags and messages."""
     messages = frozenset(map(naming.message_class, _messages(file)))
     for group in ("enums", "flags"):
         for name in getattr(file, group):
@@ -160,7 +160,7 @@ def _messages(file: SchemaFile) -> Iterator[str]:
 
 
 def _methods(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
-    """Methods of bus modules, and members of tables of handlers."""
+    """Names of methods of bus modules, and of members of handler tables."""
     for name in file.commands:
         yield naming.method(name), f"the command '{name}'", ("commands", name)
     for name in file.messages:
@@ -168,13 +168,13 @@ def _methods(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
 
 
 def _class_base(file: SchemaFile, name: str) -> str:
-    """A message may have the name of an enum: its class and type get a suffix then."""
+    """The stem of a message; a suffix is appended if an enum or flags have the same name."""
     found = naming.stem(file.protocol.name, name, "message")
     return f"{found}_message" if found in file.enums or found in file.flags else found
 
 
 def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
-    """Names that become constants of the C header."""
+    """Names of constants of the C header."""
     prefix = upper(file.protocol.name)
     for name in _GLOBAL_MACROS:
         yield f"{prefix}_{upper(name)}", "a constant of every header", ("protocol", "name")
@@ -190,7 +190,7 @@ def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
 
 
 def _macro_owners(file: SchemaFile) -> Iterator[tuple[str, str, Sequence[str], Path]]:
-    """What constants of the C header belong to, and the last parts of their names."""
+    """Stem, owner, suffixes and path of constants of the C header."""
     for name in file.types:
         yield name, f"the type '{name}'", _TYPE_MACROS, ("types", name)
     for name in file.commands:

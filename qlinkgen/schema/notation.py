@@ -1,4 +1,4 @@
-"""The small notations inside YAML values: ranges, rationals, byte strings, durations, types."""
+"""Notations inside YAML values: ranges, rationals, byte strings, durations, types."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class TypeText:
 
 
 class DecimalNumber(int):
-    """A number of two decimal digits or more in the file; where bytes are meant, they may be hex."""
+    """A number of two decimal digits or more, which is ambiguous as a byte string: it may be hex."""
 
 
 def shown(value: object) -> str:
-    """A value of the file as a message shows it."""
+    """A value of the file for a message."""
     if isinstance(value, dict | list):
         return "a mapping" if isinstance(value, dict) else "a list"
     if value is None:
@@ -75,7 +75,7 @@ def rational(value: object) -> Fraction:
             return Fraction(int(value, 16))
         raise ValueError(f"{shown(value)} is not a number; write 10, 0.1, 1/10 or 1/2^16")
     if match["power"] and int(match["power"]) > _MAX_POWER:
-        raise ValueError(f"{shown(value)} has a power above {_MAX_POWER}; no field is that fine")
+        raise ValueError(f"{shown(value)} has a power above {_MAX_POWER}; use a smaller one")
     below = int(match["base"]) ** int(match["power"]) if match["base"] else int(match["below"] or 1)
     if below == 0:
         raise ValueError(f"{shown(value)} divides by zero; write another number")
@@ -98,17 +98,17 @@ def range_of(value: object) -> Range:
 
 
 def whole_range(value: object) -> tuple[int, int]:
-    """A range of whole numbers from 0 on. Raises ValueError."""
+    """A range of non-negative whole numbers. Raises ValueError."""
     found = range_of(value)
     if found.first.denominator != 1 or found.last.denominator != 1 or found.first < 0:
-        raise ValueError(f"{shown(value)} is not a range of whole numbers from 0 on; write one like 0..26")
+        raise ValueError(f"{shown(value)} is not a range of non-negative whole numbers; write one like 0..26")
     return int(found.first), int(found.last)
 
 
 def byte_string(value: object) -> bytes:
     """One number 0-255, or pairs of hex digits like ``A5 A5``. Raises ValueError.
 
-    YAML takes a bare ``10`` for ten, while ``1A`` and ``10 10`` are text, which is read as hex.
+    In YAML a plain ``10`` is the number ten, while ``1A`` and ``10 10`` are text, which is read as hex.
     """
     if isinstance(value, DecimalNumber) and value <= 99:
         raise ValueError(

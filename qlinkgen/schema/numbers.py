@@ -17,7 +17,7 @@ Written = int | bool | Decimal | str | list[int]
 
 
 class Quantity(Protocol):
-    """What fields and bit fields say of their number."""
+    """Keys of fields and bit fields that describe a number."""
 
     @property
     def scale(self) -> Fraction | None: ...  # noqa: D102 - see FieldSpec
@@ -32,7 +32,7 @@ class Quantity(Protocol):
 
 
 def quantified(scalar: Scalar, spec: Quantity, what: str, location: Location) -> Scalar:
-    """A scalar with the scale, offset and range that are written for it."""
+    """Apply scale, offset and range of a field to a scalar."""
     if spec.scale is not None or spec.offset is not None:
         if scalar.meaning is not None:
             location.reject(spec, ("scale", "offset"), what, "remove it, or use an integer type")  # type: ignore[arg-type]
@@ -53,11 +53,11 @@ def _scaled(scalar: Scalar, scale: Fraction | None, offset: Fraction | None, loc
     key = "scale" if scale is not None else "offset"
     if max(abs(scaling.factor), scaling.divisor, abs(scaling.bias)) >= 1 << MAX_BITS:
         hint = "use a scale and an offset of fewer digits"
-        location.fault("bad-scale", key, f"{key} needs integers of more than {MAX_BITS} bits", hint)
+        location.fault("bad-scale", key, f"the {key} requires integers of more than {MAX_BITS} bits", hint)
         return scalar
     if scaled.number == "decimal" and not _terminates(scaling.divisor):
         hint = f"use a scale like 1/10 or 1/2^16, or at most {DOUBLE_BITS} bits"
-        what = f"{scalar.bits} bits in steps of {scaling.scale} have values without a decimal form that ends"
+        what = f"values of {scalar.bits} bits in steps of {scaling.scale} have no finite decimal expansion"
         location.fault("inexact-scale", key, what, hint)
     return scaled
 
@@ -76,13 +76,13 @@ def _ranged(scalar: Scalar, limits: Range, key: str, scaling: Scaling | None, lo
     for written, end in zip((limits.first, limits.last), ends, strict=True):
         if end.denominator != 1:
             location.fault(
-                "bad-scale", key, f"the bound {_decimal(written)} lies between two steps", _step_hint(scaling)
+                "bad-scale", key, f"the bound {_decimal(written)} is between two steps", _step_hint(scaling)
             )
             return scalar
     low, high = sorted(int(end) for end in ends)
     if low < scalar.natural_minimum or high > scalar.natural_maximum:
         what = f"raw values of {low}..{high} do not fit {_bits(scalar)}"
-        hint = f"those hold {scalar.natural_minimum}..{scalar.natural_maximum}; use a wider type"
+        hint = f"these hold {scalar.natural_minimum}..{scalar.natural_maximum}; use a wider type"
         location.fault("range-does-not-fit", key, what, hint)
         return scalar
     return replace(scalar, minimum=low, maximum=high)
@@ -93,7 +93,7 @@ def _bits(scalar: Scalar) -> str:
 
 
 def _decimal(number: Fraction) -> str:
-    """A number as it was probably written."""
+    """A number as probably written in the file."""
     if number.denominator == 1 or not _terminates(number.denominator):
         return str(number)
     return str(Decimal(number.numerator) / Decimal(number.denominator))
@@ -102,11 +102,11 @@ def _decimal(number: Fraction) -> str:
 def _step_hint(scaling: Scaling | None) -> str:
     if scaling is None:
         return "use whole numbers"
-    return f"use a multiple of {scaling.scale}" + (f" from {scaling.offset} on" if scaling.offset else "")
+    return f"use a multiple of {scaling.scale}" + (f" above {scaling.offset}" if scaling.offset else "")
 
 
 def defaulted(scalar: Scalar, value: Written | None, key: str, location: Location) -> Scalar:
-    """A scalar with the default or constant that is written for it; without one, the number nearest to 0."""
+    """Apply the default or constant of a field to a scalar; without one, the number nearest to 0."""
     if value is None:
         nearest = min(max(0, scalar.minimum), scalar.maximum)
         return replace(scalar, default=nearest, role=Settable(required=nearest != 0))
@@ -115,7 +115,7 @@ def defaulted(scalar: Scalar, value: Written | None, key: str, location: Locatio
         return scalar
     if not scalar.natural_minimum <= raw <= scalar.natural_maximum:
         held = f"{scalar.natural_minimum}..{scalar.natural_maximum}"
-        hint = f"those hold {held}; use a wider type or another number"
+        hint = f"these hold {held}; use a wider type or another number"
         what = f"{shown(value)} does not fit {_bits(scalar)}"
         location.fault("value-does-not-fit", key, what, hint)
         return scalar
@@ -124,7 +124,7 @@ def defaulted(scalar: Scalar, value: Written | None, key: str, location: Locatio
         location.fault("default-out-of-range", key, f"{shown(value)} is out of range", f"use {low}..{high}")
         return scalar
     if isinstance(scalar.meaning, Flags) and scalar.meaning.reserved_zero and raw & ~scalar.meaning.mask:
-        hint = f"named are the bits {scalar.meaning.mask:#x}"
+        hint = f"use only the named bits {scalar.meaning.mask:#x}"
         location.fault(
             "default-out-of-range", key, f"{shown(value)} sets reserved bits of {scalar.meaning.name}", hint
         )
@@ -133,7 +133,7 @@ def defaulted(scalar: Scalar, value: Written | None, key: str, location: Locatio
 
 
 def _raw(scalar: Scalar, value: Written, key: str, location: Location) -> int | None:
-    """A default or constant as written, as an integer on the wire."""
+    """The raw integer of a default or constant."""
     if isinstance(scalar.meaning, Enum) and isinstance(value, str):
         return _named(scalar.meaning, value, key, location)
     if scalar.meaning == "bool" and isinstance(value, bool):
@@ -146,7 +146,7 @@ def _raw(scalar: Scalar, value: Written, key: str, location: Location) -> int | 
     if scalar.scaling is not None:
         steps = (steps - scalar.scaling.offset) / scalar.scaling.scale
     if steps.denominator != 1:
-        location.fault("bad-scale", key, f"{value} lies between two steps", _step_hint(scalar.scaling))
+        location.fault("bad-scale", key, f"{value} is between two steps", _step_hint(scalar.scaling))
         return None
     return int(steps)
 

@@ -1,4 +1,4 @@
-"""Second pass, parts of a frame: each by itself, and the names by which they refer to one another."""
+"""Second pass, parts of a frame: each part, and references between parts."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class PartBuilder:
     """Builds the parts of one frame."""
 
     def __init__(self, file: SchemaFile, report: Reporter, crc: str | None) -> None:
-        """``crc`` replaces the algorithm that the file names."""
+        """``crc`` replaces the algorithm in the file."""
         self._file = file
         self._report = report
         self._crc = crc
 
     def roles_fit(self, specs: Mapping[str, PartSpec], needed: Sequence[str], path: Path) -> bool:
-        """The roles that a frame needs are there, and each once."""
+        """Check that required roles are present, and each role but constant occurs once."""
         roles = [spec.role for spec in specs.values()]
         fit = True
         for index, (name, spec) in enumerate(specs.items()):
@@ -68,7 +68,7 @@ class PartBuilder:
         return fit
 
     def build(self, name: str, spec: PartSpec, names: Iterable[str], path: Path) -> Part:
-        """A part as the file describes it; what it lacks is reported, and made up."""
+        """The part described by a mapping; missing keys are reported and replaced by placeholders."""
         self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS[spec.role]], spec.role, path)
         value, size, checksum, scalar = b"", (0, 0), None, None
         if spec.role == "constant":
@@ -82,7 +82,7 @@ class PartBuilder:
         else:
             scalar = self.integer(spec, path)
             if spec.role == "length" and not spec.counts:
-                self._lacks("counts", "add counts: [the parts that it counts]", path)
+                self._lacks("counts", "add counts: [PART, ...]", path)
             self.known(spec.counts or (), names, (*path, "counts"))
         return Part(
             name=name,
@@ -99,11 +99,11 @@ class PartBuilder:
         )
 
     def fault(self, rule: str, path: Path, what: str, hint: str) -> None:
-        """Report a part, or one of its keys."""
+        """Report an error in a part, or in one of its keys."""
         self._report.error(rule, path, what, hint, of_key=True)
 
     def reject(self, spec: PartSpec, keys: Iterable[str], role: str, path: Path) -> None:
-        """Report keys that mean nothing in a part of this role."""
+        """Report keys that do not apply to a part with this role."""
         for key in keys:
             if key in spec.model_fields_set:
                 self.fault(
@@ -115,13 +115,13 @@ class PartBuilder:
             self._report.error("bad-frame", path, f"{path[-1]} has no {key}", hint, of_key=True, absent=True)
 
     def payload_size(self, spec: PartSpec, path: Path) -> tuple[int, int]:
-        """Fewest and most bytes of a payload."""
+        """Minimum and maximum size of a payload."""
         if spec.size is None:
             self._lacks("size", "add size: 0..26", path)
             self._report.taint(path)
         low, high = spec.size or (0, MAX_PAYLOAD)
         if high > MAX_PAYLOAD:
-            what = f"a payload of {high} bytes is too long for any frame"
+            what = f"a payload of {high} bytes is too long"
             self._report.error("bad-frame", (*path, "size"), what, f"use at most {MAX_PAYLOAD}")
         return low, high
 
@@ -133,7 +133,7 @@ class PartBuilder:
             if spec.type is None:
                 self._lacks("type", f"add type: {kinds}", path)
             else:
-                what = f"{shown(spec.type)} is no type for a part of a frame"
+                what = f"{shown(spec.type)} is not a type for a part of a frame"
                 self._report.error("unknown-type", (*path, "type"), what, f"use {kinds}")
             self._report.taint((*path, "type"))
             size = 1
@@ -141,7 +141,7 @@ class PartBuilder:
         return Scalar(bits=8 * size, chunks=chunks, minimum=0, maximum=(1 << 8 * size) - 1)
 
     def known(self, names: Iterable[str], parts: Iterable[str], path: Path) -> None:
-        """Every name is a part's, and stands once and in wire order."""
+        """Check that names refer to parts, without repetition, in wire order."""
         order = list(parts)
         last = -1
         if self._report.touched(path):
@@ -150,16 +150,14 @@ class PartBuilder:
             place, needs = (*path, index), ((*self._parts_path(path), name),)
             if name not in order:
                 hint = did_you_mean(name, order, f"the parts are {listed(order)}")
-                self._report.error(
-                    "unknown-part", place, f"there is no part {shown(name)}", hint, needs=needs
-                )
+                self._report.error("unknown-part", place, f"unknown part {shown(name)}", hint, needs=needs)
                 self._report.taint(place)
             elif order.index(name) <= last:
-                what = f"{name} stands before {order[last]} on the wire"
+                what = f"{name} precedes {order[last]} on the wire"
                 if name == order[last]:
-                    what = f"{name} stands twice"
+                    what = f"{name} is listed twice"
                 self._report.error(
-                    "part-order", place, what, "name each part once, in wire order", needs=needs
+                    "part-order", place, what, "list each part once, in wire order", needs=needs
                 )
             else:
                 last = order.index(name)
@@ -171,11 +169,11 @@ class PartBuilder:
     # Checksums
 
     def checksum(self, spec: PartSpec, names: Iterable[str], path: Path) -> Checksum | None:
-        """The checksum of a frame; None where its algorithm is unknown."""
+        """The checksum of a frame; None if its algorithm is unknown."""
         algorithm = self._algorithm(spec, path)
         covered = [name for name in names if name != path[-1]]
         if not spec.over:
-            self._lacks("over", "add over: [the parts that it covers]", path)
+            self._lacks("over", "add over: [PART, ...]", path)
         self.known(spec.over or (), covered, (*path, "over"))
         scalar = self.integer(spec, path)
         if algorithm is None:
@@ -194,7 +192,7 @@ class PartBuilder:
         for index, (first, last) in enumerate(spec.sent):
             place = (*path, "sent", index)
             if last >= scalar.bits or last - first >= 8:
-                what = f"{first}..{last} is no run of at most eight of {scalar.bits} bits"
+                what = f"{first}..{last} spans more than 8 bits, or exceeds the {scalar.bits}-bit checksum"
                 self._report.error(
                     "checksum-does-not-fit", place, what, "let each range fill one byte", needs=(path,)
                 )
@@ -210,9 +208,9 @@ class PartBuilder:
     def _ambiguous(self, name: str, found: catalogue.Checksum, path: Path) -> None:
         candidates = catalogue.candidates(name)
         if candidates:
-            what = f"{shown(name)} is taken for {found.name}, but is used for other algorithms too"
+            what = f"{shown(name)} is ambiguous and was taken as {found.name}"
             names = listed((f"{each.name} ({each.check:0{each.width // 4}X})" for each in candidates), "or")
-            hint = f"write the one that gives the check value of the document for 123456789: {names}"
+            hint = f"write the one whose check value for 123456789 matches the document: {names}"
             place = (*path, "algorithm")
             self._report.error("ambiguous-algorithm", place, what, hint, of_key=self._crc is not None)
 
@@ -230,6 +228,6 @@ class PartBuilder:
             if error.suggestions:
                 hint = f"did you mean {listed(map(repr, error.suggestions), 'or')}?"
             place = (*path, "algorithm")
-            what = f"no checksum algorithm is called {shown(name)}"
+            what = f"unknown checksum algorithm {shown(name)}"
             self._report.error("unknown-algorithm", place, what, hint, of_key=self._crc is not None)
             return None

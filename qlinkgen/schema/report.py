@@ -1,4 +1,4 @@
-"""Collects the faults of one file, so that a single run shows all of them and no follow-up of any."""
+"""Collects the faults of one file: a single run shows all of them, without consequential errors."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from qlinkgen.schema.source import Path, Position, Source
 
 
 class Reporter:
-    """Turns paths into places and keeps what was reported, in order of discovery.
+    """Converts paths to positions and collects faults in order of discovery.
 
-    What a fault has taken out is *tainted*: it is not what its author means, so nothing that was found by
-    looking at it is reported. Each fault says which paths it was concluded from.
+    Nodes removed after an error are *tainted*; errors derived from them are suppressed. Each error states the
+    paths that it was derived from.
     """
 
     def __init__(self, file: str, source: Source) -> None:
-        """Report on ``file``, whose parts stand where ``source`` says."""
+        """Report faults of ``file``; ``source`` holds the positions of its nodes."""
         self.file = file
         self.source = source
         self.faults: list[Fault] = []
@@ -42,20 +42,20 @@ class Reporter:
         """Report a fault at a path of the file.
 
         Args:
-            rule: The rule that is broken.
-            path: What breaks it.
-            message: What is wrong.
-            hint: What would put it right.
+            rule: The violated rule.
+            path: The node that violates it.
+            message: The error.
+            hint: The fix.
             of_key: Point at the key instead of its value.
-            absent: Something is not there; it may be what a fault in this mapping has taken out.
-            needs: Paths that must be intact for the fault to be one; ``path`` alone if not given.
+            absent: Something is missing, perhaps because it was removed after another error in this mapping.
+            needs: Paths that the error was derived from, none of which may be tainted; default: ``path``.
         """
         needs = needs if needs is not None else () if absent else (path,)
         if not (absent and self.incomplete(path)) and not any(self.touched(need) for need in needs):
             self.at(rule, self.source.position(path, of_key=of_key), message, hint)
 
     def at(self, rule: str, position: Position, message: str, hint: str = "") -> None:
-        """Report a fault at a place, whatever is tainted."""
+        """Report a fault at a position, even in a tainted node."""
         severity = RULES[rule].severity
         place = (position.line, position.column)
         fault = Fault(self.file, *place, rule, _one_line(message), _one_line(hint), severity)
@@ -65,17 +65,17 @@ class Reporter:
             self.failed |= severity == "error"
 
     def taint(self, path: Path) -> None:
-        """From now on report nothing that was concluded from this path or what is in it."""
+        """Suppress later errors derived from this path or from nodes inside it."""
         self._tainted.add(path)
         self._parents.add(path[:-1])
         self._around.update(path[:end] for end in range(len(path) + 1))
 
     def touched(self, path: Path) -> bool:
-        """Something at, in or around this path is tainted."""
+        """Whether a node at, inside or around this path is tainted."""
         return path in self._around or self._inside(path)
 
     def incomplete(self, path: Path) -> bool:
-        """Some key of this mapping, or all of it, was taken out: what is missing may have been meant."""
+        """Whether a key of this mapping, or the mapping itself, was removed after an error."""
         return path in self._parents or self._inside(path)
 
     def _inside(self, path: Path) -> bool:
@@ -83,12 +83,12 @@ class Reporter:
 
 
 def _one_line(text: str) -> str:
-    """What a file holds may hold line ends and worse; a fault is one line."""
+    """Escape line ends and other unprintable characters of the file; a fault is one line."""
     return text if text.isprintable() else "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def did_you_mean(word: str, known: Iterable[object], otherwise: str = "") -> str:
-    """A hint naming the closest known word, or else ``otherwise``."""
+    """A hint with the most similar known word, otherwise ``otherwise``."""
     close = similar(word, map(str, known))
     return f"did you mean '{close[0]}'?" if close else otherwise
 

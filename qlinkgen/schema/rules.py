@@ -1,4 +1,4 @@
-"""Every rule a schema file is held to: its id, what it says and why. docs/rules.md is made from this list."""
+"""The rules for schema files: id, summary and reason. docs/rules.md is generated from this list."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ class Rule:
     """A rule for schema files.
 
     Attributes:
-        id: what stands in brackets in a message.
+        id: the text in brackets in a message.
         summary: the rule, in one sentence.
-        reason: why it is one, and how to satisfy it.
-        severity: a warning does not keep a file from being used.
+        reason: the reason for it, and how to satisfy it.
+        severity: a file with only warnings can be used.
     """
 
     id: str
@@ -27,62 +27,62 @@ _ALL = (
     Rule(
         "yaml-syntax",
         "The file is YAML.",
-        "Nothing can be read behind the first fault of notation, so it is reported alone.",
+        "Parsing stops at the first syntax error, so it is the only one reported.",
     ),
     Rule(
         "control-character",
-        "Texts hold no control characters, line separators or marks that reorder text.",
-        "They are commands to a terminal, end lines of generated code, or make a reader see something else "
-        "than a compiler. Line breaks and tabs are allowed.",
+        "Texts do not contain control characters, line separators or marks that reorder text.",
+        "They control terminals, end lines of generated code, or display text that differs from what a "
+        "compiler reads. Line breaks and tabs are allowed.",
     ),
     Rule(
         "file-unreadable",
         "The file can be read as UTF-8 text.",
-        "The path must name a file with readable text.",
+        "The path must name a readable text file.",
     ),
     Rule(
-        "duplicate-key", "A key stands once in a mapping.", "YAML would silently keep one of the two values."
+        "duplicate-key", "A key occurs once in a mapping.", "YAML would silently keep one of the two values."
     ),
     Rule("unknown-key", "Only known keys are used.", "A misspelt key would silently have no effect."),
     Rule(
         "missing-key",
-        "Required keys are there.",
-        "Nothing can be made without them, and no default would be right for every protocol.",
+        "Required keys are present.",
+        "They have no default that would be right for every protocol.",
     ),
     Rule(
         "wrong-type",
-        "A value is of the kind that its key needs.",
+        "A value has the type that its key needs.",
         "A number, text, a list and a mapping mean different things.",
     ),
     Rule(
         "bad-value",
-        "A value is written in its notation and is one of those allowed.",
+        "A value has the notation of its key and is allowed there.",
         "The schema reference lists the notations.",
     ),
     Rule(
         "bad-name",
-        "Names are at most 40 lower case letters, digits and underscores, and begin with a letter.",
+        "Names consist of at most 40 lower-case letters, digits and underscores, and begin with a letter.",
         "They become names in Python and C.",
     ),
     Rule(
         "unknown-type",
         "A type is built in or defined under types, enums or flags.",
-        "A name that nobody defined has no layout.",
+        "An undefined type has no layout.",
     ),
     Rule(
         "type-clash",
-        "A name stands for one type.",
-        "enums, flags and types share one name space, with the built-in types.",
+        "A name denotes one type.",
+        "enums, flags and types share one name space with the built-in types.",
     ),
-    Rule("recursive-type", "A named type does not contain itself.", "Its layout would never end."),
+    Rule("recursive-type", "A named type does not contain itself.", "Its layout would be infinite."),
     Rule(
         "bad-width",
         "An integer has 8, 16, 24 ... 64 bits, or is sent in groups.",
-        "Other widths have no place in whole bytes; use bits, or groups whose parts cover it once.",
+        "Other widths do not fill whole bytes; use bits, or groups whose parts cover each bit once.",
     ),
     Rule(
         "not-applicable",
-        "A key is used only with types that it means something for.",
+        "A key is used only with types that it applies to.",
         "A scale on text or a count on a number would have no effect.",
     ),
     Rule(
@@ -92,13 +92,13 @@ _ALL = (
     ),
     Rule(
         "range-does-not-fit",
-        "A range lies inside what the integer can hold.",
+        "A range is within the range of its integer.",
         "Some of its values could not be sent.",
     ),
     Rule(
         "default-out-of-range",
-        "A default lies in the range.",
-        "A message with its defaults must be one that can be sent.",
+        "A default is in the range of its field.",
+        "A message with default values must be sendable.",
     ),
     Rule(
         "bad-scale",
@@ -107,105 +107,105 @@ _ALL = (
     ),
     Rule(
         "inexact-scale",
-        "Values of more than 53 bits have a scale whose decimal form ends.",
-        "They are carried as decimal numbers, and 1/3 has none that ends.",
+        "Values of more than 53 bits have a scale with a finite decimal expansion.",
+        "They are represented as decimal numbers, and 1/3 has no finite decimal expansion.",
     ),
     Rule(
         "duplicate-value",
-        "A number of an enum and a bit of flags have one name.",
-        "Decoding could not choose between two.",
+        "A number of an enum or a bit of flags has one name.",
+        "With two names, decoding would be ambiguous.",
     ),
     Rule("bits-overlap", "Bit fields do not overlap.", "Both would write the same bit."),
-    Rule("bits-do-not-fit", "Bit fields lie inside their integer.", "There is no such bit."),
+    Rule("bits-do-not-fit", "Bit fields are inside their integer.", "The integer does not have such a bit."),
     Rule(
         "bad-count",
         "A count names a later field of variable size in the same message, and is wide enough for it.",
-        "The codec fills and verifies it. It precedes a field that takes the rest of the payload.",
+        "The codec fills and verifies it. It must precede a field that takes the rest of the payload.",
     ),
     Rule(
         "two-open-ends",
         "At most one field of a message takes the rest of the payload.",
-        "Nobody could tell where one ends and the other begins; give one of them a count.",
+        "The boundary between two such fields is unknown; give one of them a count.",
     ),
-    Rule("bad-array", "Arrays hold plain integers.", "Give scaled or named values a field of their own."),
+    Rule("bad-array", "Arrays hold plain integers.", "Use separate fields for scaled or named values."),
     Rule(
         "payload-too-long",
         "A message's payload fits the frame.",
-        "A longer one could not be sent, and receivers would not have room for it.",
+        "A longer one could not be sent, and receive buffers would be too small.",
     ),
     Rule(
         "payload-too-short",
-        "A message's payload is as long as the frame demands.",
+        "A message's payload has at least the minimum size of the frame.",
         "A shorter one could not be sent.",
     ),
     Rule(
         "bad-frame",
-        "A frame is described in one of the three ways, and completely.",
+        "A frame is described completely, in one of three ways.",
         "See the schema reference: parts, marked or packet.",
     ),
     Rule(
         "unknown-part",
-        "Parts named by length, checksum or stuffing are parts of the frame.",
-        "What is not there cannot be counted, covered or exempt.",
+        "Length, checksum and stuffing name parts of the frame.",
+        "The name does not refer to a part of this frame.",
     ),
-    Rule("length-does-not-fit", "The length field can hold the longest frame.", "It would wrap around."),
+    Rule("length-does-not-fit", "The length field can hold the longest frame.", "It would overflow."),
     Rule(
         "unknown-algorithm",
-        "A checksum is one of the CRC catalogue, or a sum.",
-        "The catalogue's names and their aliases are understood.",
+        "A checksum is a CRC of the catalogue, or a sum.",
+        "Names of the catalogue and their aliases are accepted.",
     ),
     Rule(
         "ambiguous-algorithm",
-        "The name of a checksum means one algorithm.",
-        "Documents use crc16-ccitt, crc-16 and crc-32 for algorithms that give different values.",
+        "The name of a checksum is unambiguous.",
+        "Documents use crc16-ccitt, crc-16 and crc-32 for several different algorithms.",
         "warning",
     ),
     Rule(
         "checksum-does-not-fit",
-        "A checksum is as wide as its algorithm.",
-        "Bits would be lost; say with sent which bits go onto the wire.",
+        "A checksum has the width of its algorithm.",
+        "Bits would be lost; use sent to select the bits on the wire.",
     ),
     Rule(
         "part-order",
-        "Parts are named once, and in wire order.",
-        "A checksum over the same bytes in another order is another checksum.",
+        "Parts are listed once, in wire order.",
+        "A checksum depends on the order of the bytes.",
     ),
     Rule(
         "preamble-not-unique",
-        "Stuffing keeps the preamble from appearing inside a frame.",
-        "Otherwise it costs bytes and gains nothing: a receiver still has to look for false preambles.",
+        "Stuffing prevents the preamble from occurring inside a frame.",
+        "Otherwise it costs bytes without a benefit: receivers still have to handle false preambles.",
         "warning",
     ),
     Rule(
         "no-frame-end",
-        "A receiver can tell where every frame ends.",
+        "A receiver can determine the end of every frame.",
         "Without a length in the frame, the fields of a message must have fixed sizes or counts.",
     ),
     Rule(
         "marker-in-payload",
-        "No payload byte of a marked frame can carry the marker bit.",
-        "It would be taken for a header or an end.",
+        "Payload bytes of a marked frame cannot have the marker bit.",
+        "A receiver would take such a byte for a header or an end.",
     ),
     Rule(
         "bad-packet",
-        "A packet is one byte of message id, whole words, and a sum.",
-        "It has no frame around it, so everything else must be known from the id.",
+        "A packet consists of one byte of message id, whole words, and a sum.",
+        "It has no frame, so everything else must follow from the id.",
     ),
     Rule(
         "unknown-message",
-        "Messages, commands and fields that are referred to exist.",
-        "A name that nobody defined has no effect.",
+        "References name existing messages, commands and fields.",
+        "A reference to an unknown name would have no effect.",
     ),
     Rule(
         "overlapping-id",
-        "No two messages of a direction have the same id.",
-        "A receiver could not tell them apart.",
+        "Messages of one direction have different ids.",
+        "A receiver could not distinguish them.",
     ),
-    Rule("id-does-not-fit", "A message id fits its place in the frame.", "It could not be sent."),
+    Rule("id-does-not-fit", "A message id fits its part of the frame.", "It could not be sent."),
     Rule(
         "bad-addressing",
         "Addressing fits the frame and the bus.",
-        "A broadcast needs a broadcast address that is no node's, a node an address in the frame.",
+        "A broadcast needs an address that differs from all nodes, a node an address in the frame.",
     ),
     Rule(
         "address-does-not-fit",
@@ -214,18 +214,18 @@ _ALL = (
     ),
     Rule(
         "bad-repeat",
-        "A command says whether it may be repeated, and its repeat counter is a plain unsigned integer.",
-        "A master repeats a request when no answer came; doing so must be known to be safe.",
+        "A command states whether it may be repeated; a repeat counter is a plain unsigned integer.",
+        "A master repeats a request after a missing response, which must be safe.",
     ),
     Rule(
         "bad-response",
-        "A command says what is asked and what is answered, and addressing agrees with it.",
-        "Write response: {} for an answer without data, response: none for no answer.",
+        "A command states request and response, and addressing agrees with them.",
+        "Write response: {} for a response without data, response: none for no response.",
     ),
     Rule(
         "bad-echo",
-        "An echo stands in a response, and its request has a field of the same name and type.",
-        "By it a master tells the answer to its request from another; nothing else can be repeated.",
+        "An echo is a field of a response; its request has a field of the same name and type.",
+        "It identifies the request that a response belongs to.",
     ),
     Rule(
         "unknown-attribute",
@@ -234,24 +234,24 @@ _ALL = (
     ),
     Rule(
         "name-clash",
-        "Names stay different after they are turned into Python and C names.",
+        "Names remain distinct after conversion to Python and C names.",
         "One of the two would be lost.",
     ),
     Rule(
         "empty-protocol",
         "A protocol has at least one command or message.",
-        "There would be nothing to generate.",
+        "Otherwise there is nothing to generate.",
     ),
     Rule(
         "unused-type",
         "Types, enums and flags are used.",
-        "What nobody uses is often a misspelt name.",
+        "An unused name is often a typo.",
         "warning",
     ),
     Rule(
         "unconfirmed",
-        "What a weak source states is marked, and its use is announced.",
-        "Confirm it at the device before trusting it.",
+        "Facts from a weak source are marked, and their use is reported.",
+        "Check them on the device before relying on them.",
         "warning",
     ),
 )

@@ -1,4 +1,4 @@
-"""Second pass, scalars: integers and everything that is an integer with a meaning."""
+"""Second pass, scalars: integers, with or without a meaning."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from qlinkgen.schema.numbers import defaulted, quantified
 from qlinkgen.schema.report import did_you_mean
 
 FIXED = re.compile(r"(?P<sign>u?)fixed(?P<whole>[0-9]{1,2})\.(?P<fraction>[0-9]{1,2})\Z", re.ASCII)
-#: Built-in types that are no integers.
+#: Built-in types other than integers.
 KEYWORDS = ("bool", "bytes", "text")
 
 Meaning = Enum | Flags | Literal["bool"] | None
@@ -36,7 +36,7 @@ Meaning = Enum | Flags | Literal["bool"] | None
 
 @dataclass(frozen=True, slots=True)
 class Plain:
-    """What a type's name alone says of an integer."""
+    """The properties of an integer type by its name alone."""
 
     bits: int
     signed: bool
@@ -45,7 +45,7 @@ class Plain:
 
     @property
     def what(self) -> str:
-        """What it is, for messages."""
+        """Its kind, for messages."""
         if self.meaning == "bool":
             return "bool"
         return (
@@ -55,7 +55,7 @@ class Plain:
         )
 
     def fits(self, width: int) -> bool:
-        """Every named value fits so many bits."""
+        """Whether every named value fits ``width`` bits."""
         if not isinstance(self.meaning, Enum | Flags):
             return self.bits <= width
         limit = 1 << width if isinstance(self.meaning, Enum) else width
@@ -70,11 +70,11 @@ class ScalarBuilder:
         self._file = file
         self._enums = enums
         self._flags = flags
-        #: Names that some field has as its type.
+        #: Names of types in use.
         self.used: set[str] = set()
 
     def named(self, base: str, location: Location) -> Plain | None:
-        """A type by its name; one that is unknown is reported."""
+        """The type with a name; an unknown one is reported."""
         self.used.add(base)
         plain = self.plain(base)
         if plain is None:
@@ -103,9 +103,9 @@ class ScalarBuilder:
         return plain
 
     def plain(self, base: str) -> Plain | None:
-        """A type by its name; None where there is none."""
+        """The type with a name; None if it is unknown."""
         if base == "bool":
-            # Where a byte has room for seven bits only, a truth value still takes one byte.
+            # In groups of seven bits, a bool is a full group.
             return Plain(self._file.groups.bits if self._file.groups else 8, signed=False, meaning="bool")
         if enum := self._enums.get(base):
             found = carrier(self._file.enums[base].type)
@@ -122,7 +122,7 @@ class ScalarBuilder:
         return None
 
     def build(self, spec: FieldSpec, base: str, plain: Plain, location: Location) -> Scalar | None:
-        """The scalar of a field; None where its bytes cannot be told."""
+        """The scalar of a field; None if its layout is unknown."""
         chunks = self._chunks(spec, plain.bits, base, location)
         if chunks is None:
             return None
@@ -143,13 +143,13 @@ class ScalarBuilder:
 
     def _chunks(self, spec: FieldSpec, bits: int, base: str, location: Location) -> tuple[Chunk, ...] | None:
         if not 1 <= bits <= MAX_BITS:
-            location.fault("bad-width", "type", f"{base} has {bits} bits", f"1 to {MAX_BITS} are possible")
+            location.fault("bad-width", "type", f"{base} has {bits} bits", f"use 1 to {MAX_BITS}")
             return None
         groups = spec.groups or self._file.groups
         if groups is not None:
             parts = tuple(spec.parts or [(0, bits - 1)])
             if not _covered(parts, bits):
-                hint = f"name every bit from 0 to {bits - 1} once"
+                hint = f"list every bit from 0 to {bits - 1} once"
                 location.fault(
                     "bad-width", "parts", f"the parts do not cover the {bits} bits of {base}", hint
                 )
@@ -157,7 +157,7 @@ class ScalarBuilder:
             return group_chunks(parts, groups.bits, least_first=groups.first == "least")
         if bits % 8:
             hint = "use u8, u16, u24 ... u64, bits inside an integer, or groups"
-            location.fault("bad-width", "type", f"{base} has {bits} bits, which fill no whole bytes", hint)
+            location.fault("bad-width", "type", f"{base} has {bits} bits, not whole bytes", hint)
             return None
         if spec.parts:
             location.key_fault(
@@ -173,7 +173,7 @@ def _covered(parts: tuple[tuple[int, int], ...], bits: int) -> bool:
 
 
 def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
-    """Report keys that contradict one another."""
+    """Report contradictory keys."""
     if spec.counts is not None:
         location.reject(
             spec, ("scale", "offset", "range", "raw_range", "default", "const", "reserved"), "a count"
@@ -187,10 +187,10 @@ def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
     if spec.const is not None:
         location.reject(spec, ("default",), "a constant")
     elif spec.reserved:
-        location.reject(spec, ("default",), "reserved bytes", "use const for what is sent")
+        location.reject(spec, ("default",), "reserved bytes", "use const for the value sent")
     if spec.range is not None and spec.raw_range is not None:
         location.key_fault(
-            "not-applicable", "raw_range", "'raw_range' has no effect beside range", "keep one of them"
+            "not-applicable", "raw_range", "'raw_range' has no effect with range", "keep one of them"
         )
     if plain.meaning == "bool" or isinstance(plain.meaning, Flags):
         location.reject(spec, ("range", "raw_range"), plain.what)

@@ -1,8 +1,7 @@
-"""YAML text to plain data, with the line and column of every key and value.
+"""Parses YAML text to plain data, with the line and column of every key and value.
 
-Only the YAML 1.2 core notation is understood: ``on``, ``off``, ``yes`` and ``no`` are text, a number with a
-point is a Decimal (``7.10`` stays 7.10), and a key that stands twice in a mapping is reported instead of
-being overwritten.
+Follows the YAML 1.2 core schema: ``on``, ``off``, ``yes`` and ``no`` are text. A number with a decimal point
+is a Decimal (``7.10`` stays 7.10), and a duplicate key is reported instead of overwriting the first.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT, control_characte
 from qlinkgen.schema.notation import DecimalNumber
 
 Path: TypeAlias = tuple[str | int, ...]
-#: What a file holds; numbers with a point are Decimal.
+#: Contents of a file; numbers with a decimal point are Decimal.
 Data: TypeAlias = "str | int | Decimal | list[Data] | dict[str, Data] | None"
 
 _INTEGER = re.compile(
@@ -27,14 +26,12 @@ _INTEGER = re.compile(
 )
 _DECIMAL = re.compile(r"[-+]?[0-9]+\.[0-9]+\Z")
 _WORDS: Final = {"true": True, "false": False, "null": None, "~": None, "": None}
-#: A plain number longer than this is text: no field holds it, and Python refuses to convert thousands of
-#: digits.
+#: Longer plain numbers are text: they fit no field, and Python refuses to convert thousands of digits.
 _MAX_DIGITS = 100
 _MAX_DEPTH = 50
-#: Below this bound on its depth a text is composed without a look at its real depth.
+#: The depth of a text is determined only if its upper bound exceeds this.
 _SAFE_DEPTH = 1000
-#: A chain of aliases can stand for more data than a computer holds; each node has at least this many
-#: characters.
+#: Limits the number of nodes, because a chain of aliases can expand to any amount of data.
 _NODES_PER_CHARACTER = 2
 _CORE_TAGS = ("bool", "float", "int", "map", "merge", "null", "seq", "str", "timestamp", "value")
 _TAG = "tag:yaml.org,2002:"
@@ -44,7 +41,7 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """A place in the file; line and column count from 1."""
+    """A position in the file; line and column count from 1."""
 
     line: int
     column: int
@@ -52,7 +49,7 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class SyntaxFault:
-    """A fault of the notation itself."""
+    """A syntax error."""
 
     rule: str
     position: Position
@@ -62,7 +59,7 @@ class SyntaxFault:
 
 @dataclass
 class Source:
-    """A parsed file: its data, and where each part of it stands."""
+    """A parsed file: its data, and the position of each node."""
 
     data: Data = None
     keys: dict[Path, Position] = field(default_factory=dict)
@@ -70,7 +67,7 @@ class Source:
     faults: list[SyntaxFault] = field(default_factory=list)
 
     def position(self, path: Path, *, of_key: bool = False) -> Position:
-        """Where a key or value stands; for one that is not there, its nearest parent."""
+        """The position of a key or value; for a missing one, of its nearest parent."""
         for end in range(len(path), -1, -1):
             part = path[:end]
             if of_key and part in self.keys:
@@ -81,7 +78,7 @@ class Source:
 
 
 def parse(text: str) -> Source:
-    """Parse YAML text. Faults of notation are collected in the result, not raised."""
+    """Parse YAML text. Syntax errors are collected in the result, not raised."""
     source = Source()
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     fault = _forbidden(text)
@@ -91,7 +88,7 @@ def parse(text: str) -> Source:
             for line, column, character in written(text)
         ]
         if source.faults:
-            # Reported once; and some of them would end a line for the parser, but not for an editor.
+            # They have been reported, and some would end a line for the parser but not for an editor.
             text = CONTROL.sub(" ", text)
         fault = _too_deep(text)
     node = None
@@ -108,7 +105,7 @@ def parse(text: str) -> Source:
 
 
 def _forbidden(text: str) -> SyntaxFault | None:
-    """YAML allows no control characters; the parser's own position of one counts bytes."""
+    """Find a character that YAML does not allow; the position given by the parser counts bytes."""
     if not (match := yaml.reader.Reader.NON_PRINTABLE.search(text)):
         return None
     at = match.start()
@@ -119,7 +116,7 @@ def _forbidden(text: str) -> SyntaxFault | None:
 
 
 def _too_deep(text: str) -> SyntaxFault | None:
-    """The parser recurses in C, where too much of it ends the process."""
+    """Find excessive nesting, at which the recursive C parser would crash."""
     if _depth_bound(text) <= _SAFE_DEPTH:
         return None
     depth = 0
@@ -134,14 +131,14 @@ def _too_deep(text: str) -> SyntaxFault | None:
 
 
 def _depth_bound(text: str) -> int:
-    """Cheaply found number that the depth of a text cannot exceed."""
+    """A cheap upper bound of the depth of a text."""
     opened, longest = text.count("[") + text.count("{"), max(map(len, text.splitlines()), default=0)
     if opened + 2 * longest <= _SAFE_DEPTH:
         return opened + 2 * longest
     opened = 0
     for line in text.splitlines():
         brackets = line.count("[") + line.count("{")
-        # Only where no bracket can be quoted does a closing one surely close something.
+        # A closing bracket counts only if it cannot be quoted.
         plain = not any(quote in line for quote in "\"'#")
         opened += max(0, brackets - line.count("]") - line.count("}")) if plain else brackets
     return opened + 2 * longest
@@ -149,7 +146,7 @@ def _depth_bound(text: str) -> int:
 
 def _depth_fault(at: yaml.Event | yaml.Node) -> SyntaxFault:
     what = f"mappings and lists are nested more than {_MAX_DEPTH} deep"
-    return SyntaxFault("yaml-syntax", _mark(at), what, "no schema needs that")
+    return SyntaxFault("yaml-syntax", _mark(at), what, "reduce the nesting")
 
 
 def _marked(error: yaml.MarkedYAMLError) -> SyntaxFault:
@@ -165,17 +162,17 @@ def _syntax_hint(error: yaml.MarkedYAMLError) -> str:
     if "mapping values are not allowed" in problem:
         return "put text that contains ': ' in quotes"
     if "could not find expected ':'" in problem:
-        return "a key needs a colon and a space behind it"
-    return f"it was read {error.context}" if error.context else "see what stands in front of it"
+        return "write a colon and a space after the key"
+    return f"it was read {error.context}" if error.context else "check the text before it"
 
 
 def _mark(node: yaml.Node | yaml.Event) -> Position:
-    mark: yaml.Mark = node.start_mark  # type: ignore[assignment]  # set in whatever was parsed from text
+    mark: yaml.Mark = node.start_mark  # type: ignore[assignment]  # set for text
     return Position(mark.line + 1, mark.column + 1)
 
 
 class _Builder:
-    """Makes plain data of a node graph, and notes where everything stands."""
+    """Converts a node graph to plain data and records positions."""
 
     def __init__(self, source: Source, characters: int) -> None:
         self._source = source
@@ -200,14 +197,14 @@ class _Builder:
             return _depth_fault(node)
         if any(node is parent for parent in parents):
             return SyntaxFault(
-                "yaml-syntax", _mark(node), "an alias stands inside what it refers to", "remove it"
+                "yaml-syntax", _mark(node), "an alias refers to a node that contains it", "remove it"
             )
         if self._nodes_left == 0:
-            what = "the aliases of this file stand for far more data than it has"
-            return SyntaxFault("yaml-syntax", _mark(node), what, "use named types in place of aliases")
+            what = "the aliases of this file expand to too much data"
+            return SyntaxFault("yaml-syntax", _mark(node), what, "use named types instead of aliases")
         if not node.tag.startswith(_TAG) or node.tag.removeprefix(_TAG) not in _CORE_TAGS:
             tag = node.tag.replace(_TAG, "!!")
-            return SyntaxFault("yaml-syntax", _mark(node), f"tag '{tag}' means nothing here", "remove it")
+            return SyntaxFault("yaml-syntax", _mark(node), f"unknown tag '{tag}'", "remove it")
         return None
 
     def _mapping(self, node: yaml.MappingNode, path: Path, parents: tuple[yaml.Node, ...]) -> dict[str, Data]:
@@ -217,15 +214,18 @@ class _Builder:
                 break
             if not isinstance(key_node, yaml.ScalarNode):
                 fault = SyntaxFault(
-                    "yaml-syntax", _mark(key_node), "a mapping or list is no key", "write a plain word"
+                    "yaml-syntax",
+                    _mark(key_node),
+                    "a key cannot be a mapping or a list",
+                    "write a plain word",
                 )
                 self._source.faults.append(fault)
                 continue
             key = key_node.value
             if key in result:
                 first = self._source.keys[(*path, key)]
-                hint = f"it stands first in line {first.line}; remove or rename one of them"
-                fault = SyntaxFault("duplicate-key", _mark(key_node), f"key '{key}' stands twice", hint)
+                hint = f"it first occurs in line {first.line}; remove or rename one of them"
+                fault = SyntaxFault("duplicate-key", _mark(key_node), f"duplicate key '{key}'", hint)
                 self._source.faults.append(fault)
                 continue
             self._source.keys[(*path, key)] = _mark(key_node)
@@ -235,7 +235,7 @@ class _Builder:
 
 def _scalar(node: yaml.ScalarNode) -> Data:
     text: str = node.value
-    if node.style:  # quoted or block text; the two parsers give None or "" for a plain word
+    if node.style:  # quoted or block text; the parsers give None or "" for a plain word
         return text
     if text.lower() in _WORDS:
         return _WORDS[text.lower()]

@@ -1,8 +1,8 @@
-"""First pass: what each mapping of the file holds.
+"""First pass: validates each mapping of the file.
 
-A wrong part is reported and taken out, and the rest is checked again, so that one mistake does not hide the
-others. Where what was taken out cannot be done without, a stand-in takes its place; both are tainted in the
-report, so that nothing is concluded from them.
+A wrong node is reported and removed, and the rest is validated again, so that one error does not hide others.
+A required node is replaced by a placeholder. Both are tainted in the report, so that errors derived from them
+are suppressed.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Data, Path
 
-#: Required keys whose absence should not keep the rest of their mapping from being checked.
+#: Placeholders of required keys, so that the rest of their mapping can be validated.
 _STAND_INS: dict[str, Data] = {
     "qlinkgen": 1, "protocol": {}, "name": "unnamed", "revision": "", "source": "",
     "frame": {}, "bus": {}, "kind": "host",
     "type": "u8", "id": 0, "fields": {}, "at": 0,
 }  # fmt: skip
-#: More rounds than mappings can be nested in one another.
+#: More rounds than levels of nested mappings.
 _ROUNDS = 40
 _EXPECTED = {
     "int_type": "write a whole number",
@@ -37,7 +37,7 @@ _EXPECTED = {
 
 
 def check_structure(data: Data, report: Reporter) -> SchemaFile | None:
-    """Validate plain data as a schema file, without what is wrong; None where nothing usable is left."""
+    """Validate plain data as a schema file, without its wrong nodes; None if nothing usable is left."""
     if not isinstance(data, dict):
         what = "the file is empty" if data is None else f"the file is {shown(data)}, not a mapping of keys"
         report.error("wrong-type", (), what, "begin with qlinkgen: 1 and protocol:")
@@ -55,7 +55,7 @@ def check_structure(data: Data, report: Reporter) -> SchemaFile | None:
 
 
 class _Round:
-    """What one validation found: reports it, and repairs the data for the next."""
+    """Reports the errors of one validation, and repairs the data for the next."""
 
     def __init__(self, details: Sequence[ErrorDetails], data: Data, report: Reporter) -> None:
         self._details = [(detail, _path_in(data, detail["loc"])) for detail in details]
@@ -63,7 +63,7 @@ class _Round:
         self._report = report
 
     def run(self) -> None:
-        """Report every fault first: repairs change the data that their texts come from."""
+        """Report all errors before repairs, which change the data that their texts quote."""
         for detail, path in self._details:
             if detail["type"] == "missing":
                 self._missing(path)
@@ -81,7 +81,7 @@ class _Round:
         )
 
     def _meant(self, parent: Path) -> set[str]:
-        """Keys of a mapping that unknown ones were probably meant to be."""
+        """Keys of a mapping of which unknown keys are probably misspellings."""
         unknown = [path for detail, path in self._details if detail["type"] == "extra_forbidden"]
         known = _keys_at(parent)
         hints = [did_you_mean(str(path[-1]), known) for path in unknown if path[:-1] == parent]
@@ -99,7 +99,7 @@ class _Round:
 
     def _repair(self, path: Path, *, missing: bool) -> None:
         parent, key = _at(self._data, path[:-1]), path[-1] if path else ""
-        # Taking one item out of a list would move the places of those behind it.
+        # Removing an item from a list would shift the indices of later items.
         while isinstance(parent, list):
             path = path[:-1]
             parent, key = _at(self._data, path[:-1]), path[-1]
@@ -115,7 +115,7 @@ class _Round:
 
 
 def _explained(kind: str, seen: object, detail: ErrorDetails) -> tuple[str, str, str]:
-    """Rule, message and hint for a value that is not what its key needs."""
+    """Rule, message and hint for an invalid value."""
     context = detail.get("ctx", {})
     if kind == "literal_error":
         allowed = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
@@ -138,7 +138,7 @@ def _explained(kind: str, seen: object, detail: ErrorDetails) -> tuple[str, str,
         )
     return (
         "wrong-type",
-        f"{shown(seen)} is of the wrong kind",
+        f"{shown(seen)} has the wrong type",
         _EXPECTED.get(kind, "write a mapping (key: value)"),
     )
 
@@ -150,7 +150,7 @@ def _purpose(path: Path) -> str:
 
 
 def _path_in(data: Data, location: tuple[int | str, ...]) -> Path:
-    """The place of a fault in the file, without branches of unions and keys that short forms imply."""
+    """The path of an error in the file, without branches of unions and keys implied by short forms."""
     path: list[int | str] = []
     for step in location:
         if isinstance(step, str) and step.startswith(BRANCH):
@@ -188,7 +188,7 @@ def _model_at(path: Path) -> type[BaseModel] | None:
 
 
 def _mapping_type(annotation: object) -> object:
-    """The part of an annotation that says what a mapping or list holds."""
+    """The mapping or list inside an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     if getattr(annotation, "__origin__", None) in (dict, list):

@@ -1,4 +1,4 @@
-"""Second pass, stuffing: what is inserted where, and whether that keeps the preamble unique."""
+"""Second pass, stuffing: builds the rule, and checks that it keeps the preamble unique."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _PATH: Path = ("frame", "stuffing")
 def build_stuffing(
     spec: StuffingSpec, parts: tuple[Part, ...], builder: PartBuilder, report: Reporter
 ) -> Stuffing:
-    """The stuffing as the file describes it."""
+    """The stuffing described by the file."""
     builder.known(spec.exempt, [part.name for part in parts], (*_PATH, "exempt"))
     if len(spec.insert) != 1:
-        what = f"{len(spec.insert)} bytes are inserted"
+        what = f"{len(spec.insert)} bytes cannot be inserted"
         report.error("bad-value", (*_PATH, "insert"), what, "write one byte, like 0x00")
     exempt = tuple(spec.exempt)
     after_stuffing = spec.checksum == "after"
@@ -28,7 +28,7 @@ def build_stuffing(
         _check_middle(exempt, parts, report)
     payload = next(part for part in parts if part.role == "payload")
     if payload.name in spec.exempt:
-        what = f"{payload.name} is exempt, which leaves nothing worth stuffing"
+        what = f"{payload.name} is exempt, so stuffing has no effect"
         report.error(
             "bad-frame",
             (*_PATH, "exempt"),
@@ -40,61 +40,59 @@ def build_stuffing(
 
 
 def _all_but_payload(spec: StuffingSpec, parts: tuple[Part, ...], report: Reporter) -> tuple[str, ...]:
-    """Length and checksum count and cover stuffed bytes, so they cannot be stuffed themselves."""
+    """All parts except the payload: length and checksum apply to stuffed bytes and cannot be stuffed."""
     others = tuple(part.name for part in parts if part.role != "payload")
     missing = [name for name in others if name not in spec.exempt]
     if spec.exempt and missing:
         what = f"{missing[0]} would be stuffed, though the checksum is computed after the stuffing"
-        hint = "exempt all parts but the payload, or leave exempt out"
+        hint = "exempt all parts except the payload, or omit exempt"
         report.error("bad-frame", (*_PATH, "exempt"), what, hint)
     return others
 
 
 def _check_end(parts: tuple[Part, ...], report: Reporter) -> None:
-    """The end of a payload that is stuffed first follows from a length, and a checksum covers it."""
+    """Check that a payload stuffed before the checksum has a length and a checksum."""
     roles, place = [part.role for part in parts], (*_PATH, "checksum")
     needs = (place, ("frame", "parts"))
     if "checksum" not in roles:
-        what, hint = "there is no checksum to compute after the stuffing", "remove it, or add a checksum"
+        what, hint = "the frame has no checksum to compute after the stuffing", "remove it, or add a checksum"
         report.error("bad-frame", place, what, hint, needs=needs)
     if "length" not in roles:
-        what = "nothing tells where a payload ends that is stuffed before the checksum is computed"
+        what = "a payload that is stuffed before the checksum has no length to determine its end"
         hint = "add a length that counts the payload, or remove checksum: after"
         report.error("no-frame-end", place, what, hint, needs=needs)
 
 
 def _check_middle(exempt: tuple[str, ...], parts: tuple[Part, ...], report: Reporter) -> None:
-    """Stuffed parts follow one another."""
+    """Check that stuffed parts are adjacent."""
     stuffed = [index for index, part in enumerate(parts) if part.name not in exempt]
     for part in parts[stuffed[0] : stuffed[-1]] if stuffed else ():
         if part.name in exempt and part.role != "payload":
             place = (*_PATH, "exempt", exempt.index(part.name))
-            what = f"{part.name} is exempt between parts that are stuffed"
-            hint = "exempt only parts at the front and at the end of the frame"
+            what = f"{part.name} is exempt but is between stuffed parts"
+            hint = "exempt only parts at the beginning and the end of the frame"
             report.error("bad-frame", place, what, hint, needs=(place, ("frame", "parts")))
 
 
 def check_unique(frame: DelimitedFrame, report: Reporter) -> None:
-    """Warn of stuffing under which the preamble can still appear."""
+    """Warn if the preamble can occur in a stuffed frame."""
     stuffing = frame.stuffing
     if stuffing is None:
         return
     needs = (_PATH, ("frame", "parts"))
     if not frame.preamble:
         what, hint = (
-            "the frame begins with no constant that stuffing could keep unique",
+            "the frame does not begin with a constant, so stuffing has no use",
             "remove it, or add a preamble",
         )
         report.error("preamble-not-unique", _PATH, what, hint, of_key=True, needs=needs)
     elif not _broken(frame.preamble, stuffing.after, stuffing.insert):
-        what = (
-            f"stuffing does not keep the preamble {frame.preamble.hex(' ').upper()} from appearing in a frame"
-        )
-        hint = "let after be a part of the preamble, and insert a byte that does not follow it there"
+        what = f"the preamble {frame.preamble.hex(' ').upper()} can occur inside a frame despite the stuffing"
+        hint = "use a part of the preamble for after, and insert a byte that does not follow it there"
         report.error("preamble-not-unique", _PATH, what, hint, of_key=True, needs=needs)
 
 
 def _broken(preamble: bytes, after: bytes, insert: int) -> bool:
-    """Somewhere in the preamble the stuffed bytes stand without the inserted one behind them."""
+    """Whether the preamble contains the pattern without the inserted byte after it."""
     ends = (at + len(after) for at in range(len(preamble) - len(after)) if preamble[at:].startswith(after))
     return any(preamble[end] != insert for end in ends)

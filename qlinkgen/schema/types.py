@@ -1,4 +1,4 @@
-"""Second pass, types: from the written notation of a type to the model's immutable one."""
+"""Second pass, types: builds the types of fields, and resolves named types."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from qlinkgen.schema.scalars import FIXED, KEYWORDS, ScalarBuilder
 from qlinkgen.schema.source import Path
 
 _GROUPS = ("enums", "flags", "types")
-#: Longest chain of named types; each may refine the one below.
+#: Maximum length of a chain of named types.
 _MAX_CHAIN = 20
 
 
 class TypeBuilder:
-    """Knows the named types of one file and builds the types of fields."""
+    """Holds the named types of one file and builds the types of fields."""
 
     def __init__(self, file: SchemaFile, report: Reporter, payload_max: int) -> None:
-        """``payload_max`` bounds byte strings and arrays that are written without a bound."""
+        """``payload_max`` limits byte strings and arrays without a bound."""
         self._file = file
         self._report = report
         self._payload_max = payload_max
         self.enums = {name: build_enum(name, spec, report) for name, spec in file.enums.items()}
         self.flags = {name: build_flags(name, spec, report) for name, spec in file.flags.items()}
         self._scalars = ScalarBuilder(file, self.enums, self.flags)
-        #: Fields that are written without a bound: the rest of the payload bounds them.
+        #: Fields without a bound; the rest of the payload limits them.
         self.unbounded: set[Path] = set()
         self._checked: set[str] = set()
         self._chain = 0
@@ -47,12 +47,12 @@ class TypeBuilder:
                     what = f"'{name}' is a built-in type"
                     self._report.error("type-clash", path, what, "rename it", of_key=True, needs=())
                 elif name in seen:
-                    what = f"'{name}' stands under {seen[name]} too"
+                    what = f"'{name}' is also defined under {seen[name]}"
                     self._report.error("type-clash", path, what, "rename one of them", of_key=True, needs=())
                 seen.setdefault(name, group)
 
     def _check_named(self, name: str) -> None:
-        """Report a fault of a named type once, at its own place, and not wherever it is used."""
+        """Report an error in a named type once, at its definition."""
         if name in self._checked or self._chain > _MAX_CHAIN:
             return
         self._checked.add(name)
@@ -68,7 +68,7 @@ class TypeBuilder:
         self._chain -= 1
 
     def report_unused(self) -> None:
-        """Warn of named types that no field has."""
+        """Warn of unused types."""
         for group in _GROUPS:
             for name in getattr(self._file, group):
                 if name not in self._scalars.used:
@@ -78,9 +78,9 @@ class TypeBuilder:
                     self._report.error("unused-type", (group, name), what, hint, of_key=True, needs=needs)
 
     def build(self, spec: FieldSpec, path: Path, seen: tuple[str, ...] = ()) -> FieldType | None:
-        """The type of a field; None where a fault that was reported leaves nothing to go on with.
+        """The type of a field; None after an error that prevents building it.
 
-        ``seen`` are the named types that are being built, to find those that contain themselves.
+        ``seen`` are the named types being built, to detect recursion.
         """
         location = Location(self._report, path, frozenset(spec.model_fields_set))
         resolved = self._resolve(spec, location, seen)
@@ -90,7 +90,7 @@ class TypeBuilder:
         return self._named(spec, kind)
 
     def _named(self, spec: FieldSpec, kind: FieldType | None) -> FieldType | None:
-        """The type with the name that the file gives it."""
+        """The type with its name in the file."""
         if not isinstance(kind, Scalar | Array):
             return kind
         name = type_text(spec.type).base
@@ -122,7 +122,7 @@ class TypeBuilder:
         if text.base == "bytes" and self._file.groups is not None:
             hint = f"use text or an array of u{self._file.groups.bits}"
             location.fault(
-                "bad-width", "type", f"bytes have no place in groups of {self._file.groups.bits} bits", hint
+                "bad-width", "type", f"bytes cannot be sent in groups of {self._file.groups.bits} bits", hint
             )
             return None
         return build_blob(spec, text, self._payload_max, location)
@@ -136,7 +136,7 @@ class TypeBuilder:
     def _resolve(
         self, spec: FieldSpec, location: Location, seen: tuple[str, ...]
     ) -> tuple[FieldSpec, TypeText] | None:
-        """Follow named types down to a built-in type, an enum or flags."""
+        """Resolve named types to a built-in type, an enum or flags."""
         try:
             text = type_text(spec.type)
         except ValueError as error:
@@ -156,14 +156,14 @@ class TypeBuilder:
                 if text.base in seen
                 else "the chain of types is too long"
             )
-            location.fault("recursive-type", "type", what, "end the chain in a built-in type")
+            location.fault("recursive-type", "type", what, "use a built-in type")
             return None
         return self._refine(spec, text, named, location, (*seen, text.base))
 
     def _refine(
         self, spec: FieldSpec, text: TypeText, named: FieldSpec, location: Location, seen: tuple[str, ...]
     ) -> tuple[FieldSpec, TypeText] | None:
-        """What a field says, on top of what its named type says."""
+        """Merge the keys of a field into those of its named type."""
         resolved = self._resolve(named, location, seen)
         if resolved is None:
             return None
@@ -178,5 +178,5 @@ class TypeBuilder:
 
 
 def _bare(spec: FieldSpec, base: str) -> FieldSpec:
-    """The integer alone, without what describes the array or the bit fields that it is part of."""
+    """The keys of the integer of an array or of bit fields."""
     return FieldSpec(type=base, byteorder=spec.byteorder, groups=spec.groups, parts=spec.parts)

@@ -1,4 +1,4 @@
-"""Warnings of what a weak source states."""
+"""Warns of facts from a weak source."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MOST_NAMED = 3
 
 
 def report_unconfirmed(file: SchemaFile, report: Reporter) -> None:
-    """Warn where something is marked, and say who relies on it."""
+    """Warn of each unconfirmed fact, and list the fields that use it."""
     users = _users(file)
     for path, called in _marked(file):
         relying = users.get(str(path[-1]), []) if path[0] in ("enums", "flags", "types") else []
@@ -21,11 +21,11 @@ def report_unconfirmed(file: SchemaFile, report: Reporter) -> None:
         names = ", ".join(relying[:_MOST_NAMED]) if more else listed(relying[:_MOST_NAMED])
         used = f", used by {names}{more}," if relying else ""
         what = f"{called}{used} is not confirmed by its source"
-        report.error("unconfirmed", path, what, "check it at the device", of_key=True, needs=())
+        report.error("unconfirmed", path, what, "check it on the device", of_key=True, needs=())
 
 
 def _marked(file: SchemaFile) -> Iterator[tuple[Path, str]]:
-    """Place and name of everything that is marked."""
+    """Path and name of every unconfirmed fact."""
     for path, called, fact in _facts(file):
         if not fact.confirmed:
             yield path, called

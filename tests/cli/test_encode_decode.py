@@ -366,7 +366,7 @@ def test_an_own_schema(qlinkgen: Run, thermo: Path) -> None:
             'qlink node_info --node 1 --json {"message":"motion.request","fields":{}}',
             "--json: the object is a motion.request, not a node_info.request",
         ),
-        ("qlink motion --node 1 --set crc=bogus", "--set crc=bogus: no checksum algorithm"),
+        ("qlink motion --node 1 --set crc=bogus", "--set crc=bogus: unknown checksum algorithm"),
         ("qlink motion --node 1 --set crc=crc-32/iso-hdlc", "--set crc=crc-32/iso-hdlc: "),
         ("qlink motion --node 1 --json [1]", "a JSON object is needed"),
         ("qlink motion --node 1 --json {", "no JSON at character"),

@@ -213,7 +213,7 @@ def test_another_crc(qlinkgen: Run, out: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (("--set", "crc=crc-16/nonsense"), 2, "--set crc=crc-16/nonsense: no checksum algorithm"),
+        (("--set", "crc=crc-16/nonsense"), 2, "--set crc=crc-16/nonsense: unknown checksum algorithm"),
         (("--set", "crc=crc-32/iso-hdlc"), 2, "has 32 bits, crc 16"),
         (("--set", "speed=9600"), 2, "only crc=NAME"),
         (("--set", "crc="), 2, "only crc=NAME"),

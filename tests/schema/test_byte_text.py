@@ -116,7 +116,7 @@ def test_what_is_clear(tmp_path: Path, key: str, text: str, meant: str) -> None:
 @pytest.mark.parametrize("text", ["10 10", "'1010'", "1A1B", "0010", "'10 20 30'"])
 def test_pairs(tmp_path: Path, key: str, text: str) -> None:
     if key == "insert":
-        with pytest.raises(SchemaError, match="bytes are inserted"):
+        with pytest.raises(SchemaError, match="bytes cannot be inserted"):
             loaded(tmp_path, key, text)
     else:
         assert READ[key](loaded(tmp_path, key, text)) == bytes.fromhex(text.strip("'"))

@@ -89,9 +89,11 @@ def test_of_another_type(request_type: str, response_type: str) -> None:
 
 @pytest.mark.parametrize("key", ["const: 3", "reserved: true"])
 def test_of_what_the_codec_fills(key: str) -> None:
-    assert faults("x: u8", f"x: {{type: u8, {key}, echo: true}}") == ["x is no value: the codec fills it"]
+    assert faults("x: u8", f"x: {{type: u8, {key}, echo: true}}") == [
+        "x cannot be an echo: the codec fills it"
+    ]
     (said,) = faults(f"x: {{type: u8, {key}}}", "x: {type: u8, echo: true}")
-    assert said == "the request has no field 'x' that could be repeated"
+    assert said == "the request has no field 'x' to repeat"
 
 
 def test_the_values_of_bit_fields_are_what_is_repeated() -> None:
@@ -114,6 +116,4 @@ def test_of_a_response_that_the_defaults_give() -> None:
 
 
 def test_nothing_is_concluded_from_a_request_that_is_wrong() -> None:
-    assert faults("x: {type: u9}", "x: {type: u8, echo: true}") == [
-        "u9 has 9 bits, which fill no whole bytes"
-    ]
+    assert faults("x: {type: u9}", "x: {type: u8, echo: true}") == ["u9 has 9 bits, not whole bytes"]
