@@ -38,7 +38,7 @@ from ._support import (
     wrong_size,
 )
 
-TYPE_CHECKING = False  # type checkers know the name; importing `typing` costs 5 ms
+TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from typing import ClassVar, Final, Literal, Self
 
@@ -351,16 +351,16 @@ class LimitSwitches:
 
 # The frame ------------------------------------------------------------------------------
 
-#: Bits of the checksum, and bytes that it adds as one number.
+#: Mask of the checksum, its size, and the size of the words that it adds.
 _CHECK_MASK = 0xFFFF
 _CHECK_SIZE = 2
 _WORD = 2
-#: The checksum by which a command is refused as unknown.
+#: The checksum that rejects an unknown command.
 _REJECTED = 0x0000
 
 
 def _sum(number: int, *payloads: bytes) -> int:
-    """The checksum over the number of a message and the words of its payloads."""
+    """The checksum over the id of a message and the words of its payloads."""
     total = number
     for payload in payloads:
         for place in range(_WORD):
@@ -369,7 +369,7 @@ def _sum(number: int, *payloads: bytes) -> int:
 
 
 def _check_bytes(check: int) -> bytes:
-    """The checksum as it is sent."""
+    """The wire bytes of a checksum."""
     return check.to_bytes(2, "big")
 
 
@@ -394,27 +394,27 @@ class Message(BaseMessage):
 
     @classmethod
     def measure_payload(cls, data: bytes, at: int) -> int:
-        """Payload bytes, as far as its counts are there to tell; -1 for a wrong count."""
+        """Payload size as far as counts have been received; -1 for a count out of range."""
         return cls.MAX_SIZE
 
 
 class Request(Message):
-    """A packet of the host: the number of the message, then its payload."""
+    """A packet of the host: the id of the message, then its payload."""
 
     __slots__ = ()
 
     def to_frame(self) -> bytes:
-        """The whole packet as it is on the wire. Raises EncodeError."""
+        """The whole packet as sent. Raises EncodeError."""
         return bytes((self.ID,)) + self.to_bytes()
 
 
 class Response(Message):
-    """The answer to a packet: the payload, then a checksum over both directions."""
+    """The response to a packet: the payload, then a checksum over both directions."""
 
     __slots__ = ()
 
     def to_frame(self, request: Request) -> bytes:
-        """The whole answer to a request as it is on the wire. Raises EncodeError."""
+        """The whole response to a request as sent. Raises EncodeError."""
         payload = self.to_bytes()
         return payload + _check_bytes(_sum(request.ID, request.to_bytes(), payload))
 
@@ -4221,10 +4221,10 @@ class GetPhaseOffsetResponse(Response):
         return message
 
 
-#: The line and who is on it.
+#: The line and its nodes.
 BUS = Bus("host", bits_per_byte=10)
 
-#: Every message by its name in the schema.
+#: Message classes by name in the schema.
 MESSAGES: dict[str, type[Message]] = {
     "set_1.request": Set1Request,
     "set_1.response": Set1Response,
@@ -4430,7 +4430,7 @@ MESSAGES: dict[str, type[Message]] = {
     "get_phase_offset.response": GetPhaseOffsetResponse,
 }
 
-#: Every transaction by its name.
+#: Transactions by name.
 COMMANDS: dict[str, Command] = {
     "set_1": Command(
         "set_1",
@@ -5582,10 +5582,10 @@ def decode_request(data: BytesLike) -> Request:
     """The request of exactly one packet. Raises DecodeError."""
     packet = as_bytes(data)
     if not packet:
-        raise DecodeError("a packet has at least one byte", "truncated")
+        raise DecodeError("no data; a packet has at least one byte", "truncated")
     message = _REQUESTS.get(packet[0])
     if message is None:
-        text = f"no request has the number {packet[0]:#04x}"
+        text = f"unknown request number {packet[0]:#04x}"
         raise DecodeError(text, "unknown", data=packet)
     if len(packet) - 1 < message.MIN_SIZE and not (len(packet) == 1 and message.EMPTY):
         raise short_of(message, packet, message.MIN_SIZE + 1)
@@ -5593,10 +5593,10 @@ def decode_request(data: BytesLike) -> Request:
 
 
 def decode_response(data: BytesLike, request: Request) -> Response:
-    """The response to a request. Raises DecodeError; of the kind illegal where it was refused."""
+    """The response to a request. Raises DecodeError; of kind illegal if it was rejected."""
     packet = as_bytes(data)
     if not packet:
-        raise DecodeError("a response has at least one byte", "truncated")
+        raise DecodeError("no data; a response has at least one byte", "truncated")
     message = _RESPONSES.get(request.ID)
     if message is None:
         raise DecodeError(f"{request.NAME} has no response", "unknown", data=packet)
@@ -5608,9 +5608,9 @@ def decode_response(data: BytesLike, request: Request) -> Response:
     right = _check_bytes(_sum(request.ID, request.to_bytes(), payload))
     if check != right:
         if check == _check_bytes(_REJECTED):
-            text = f"{request.NAME}: refused: the command is not known"
+            text = f"{request.NAME}: rejected as an unknown command"
             raise DecodeError(text, "illegal", data=packet)
-        seen = f"checksum {check.hex(' ')} was received, {right.hex(' ')} is right"
+        seen = f"received checksum {check.hex(' ')}, expected {right.hex(' ')}"
         raise DecodeError(
             f"{message.NAME}: {seen}", "crc", offset=len(payload), data=packet
         )
@@ -5618,14 +5618,13 @@ def decode_response(data: BytesLike, request: Request) -> Response:
 
 
 class StreamDecoder:
-    """Splits a stream of bytes into packets: messages and faults in order.
+    """Splits a byte stream into packets; returns messages and faults in order.
 
-    Requests tell their size by their number. Responses tell nothing: `expect` says which
-    request is answered, before the bytes of the response are fed.
+    The number of a request determines its size. A response has no number: pass its request
+    to `expect` before feeding the response.
 
     Args:
-        direction: who sends: "request" is what the device hears, "response" what the host
-            hears.
+        direction: "request" to decode as the device, "response" as the host.
     """
 
     __slots__ = ("_answers", "_buffer", "_expected", "_offset", "counters")
@@ -5637,11 +5636,11 @@ class StreamDecoder:
         self._answers = direction == "response"
         self._buffer: bytes = b""
         self._expected: list[Request] = []
-        self._offset: int = 0  # of the buffer's first byte in the stream
+        self._offset: int = 0  # of the buffer in the stream
         self.counters = Counters()
 
     def expect(self, request: Request) -> None:
-        """The next bytes, after what is expected already, answer this request."""
+        """Expect the response to a request, after those already expected."""
         if not self._answers:
             text = "requests are not expected; make a StreamDecoder for responses"
             raise ValueError(text)
@@ -5649,7 +5648,7 @@ class StreamDecoder:
             self._expected.append(request)
 
     def feed(self, data: BytesLike) -> list[Message | Fault]:
-        """Take the next bytes of the stream; return what they complete."""
+        """Feed bytes of the stream; return the messages and faults that they complete."""
         buf = self._buffer + data
         events: list[Message | Fault] = []
         pos = 0
@@ -5666,7 +5665,7 @@ class StreamDecoder:
         return events
 
     def finish(self) -> list[Message | Fault]:
-        """The stream has ended: the fault of an unfinished packet. The decoder is as new."""
+        """End the stream: return the fault of an incomplete packet and reset the decoder."""
         rest, self._buffer = self._buffer, b""
         self._expected.clear()
         self._offset += len(rest)
@@ -5676,7 +5675,7 @@ class StreamDecoder:
         return [self._fault("truncated", -len(rest), rest, text)]
 
     def _request_size(self, buf: bytes, pos: int) -> int:
-        """Bytes of the packet that begins here, 0 where none does."""
+        """Size of the packet at `pos`, 0 for an unknown number."""
         message = _REQUESTS.get(buf[pos])
         return message.measure_payload(buf, pos + 1) + 1 if message else 0
 
@@ -5698,7 +5697,7 @@ class StreamDecoder:
         if not self._answers:
             return decode_request(raw)
         if not known:
-            raise DecodeError("no response is expected", "frame")
+            raise DecodeError("unexpected response", "frame")
         return decode_response(raw, self._expected.pop(0))
 
     def _fault(self, kind: str, pos: int, raw: bytes, text: str) -> Fault:

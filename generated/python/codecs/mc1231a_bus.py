@@ -212,7 +212,7 @@ from .mc1231a import (
     UpdateResponse,
 )
 
-TYPE_CHECKING = False  # type checkers know the name; importing `typing` costs 5 ms
+TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from typing import TypeVar
 
@@ -235,11 +235,11 @@ class HostCalls:
     __slots__ = ()
 
     def ask(self, request: Message, response: type[_R], axis: int | None = None) -> _R:
-        """Send a request, for an axis if one is given, and wait for its response."""
+        """Send a request, optionally for an axis, and wait for its response."""
         raise NotImplementedError
 
     def tell(self, request: Message, axis: int | None = None) -> None:
-        """Send a request without response, for an axis if one is given."""
+        """Send a request without a response, optionally for an axis."""
         raise NotImplementedError
 
     def set_1(self) -> Set1Response:
@@ -1325,11 +1325,11 @@ class AxisCalls:
     number: int
 
     def ask(self, request: Message, response: type[_R]) -> _R:
-        """Send a request and wait for its response, of the class given."""
+        """Send a request and wait for its response of a class."""
         raise NotImplementedError
 
     def tell(self, request: Message) -> None:
-        """Send a request that is not answered."""
+        """Send a request without a response."""
         raise NotImplementedError
 
     def set_prfl_s_crv(self) -> SetPrflSCrvResponse:
@@ -2014,11 +2014,11 @@ class AsyncHostCalls:
     async def ask(
         self, request: Message, response: type[_R], axis: int | None = None
     ) -> _R:
-        """Send a request, for an axis if one is given, and wait for its response."""
+        """Send a request, optionally for an axis, and wait for its response."""
         raise NotImplementedError
 
     async def tell(self, request: Message, axis: int | None = None) -> None:
-        """Send a request without response, for an axis if one is given."""
+        """Send a request without a response, optionally for an axis."""
         raise NotImplementedError
 
     async def set_1(self) -> Set1Response:
@@ -2799,11 +2799,11 @@ class AsyncAxisCalls:
     number: int
 
     async def ask(self, request: Message, response: type[_R]) -> _R:
-        """Send a request and wait for its response, of the class given."""
+        """Send a request and wait for its response of a class."""
         raise NotImplementedError
 
     async def tell(self, request: Message) -> None:
-        """Send a request that is not answered."""
+        """Send a request without a response."""
         raise NotImplementedError
 
     async def set_prfl_s_crv(self) -> SetPrflSCrvResponse:

@@ -45,7 +45,7 @@ from ._support import (
     wrong_size,
 )
 
-TYPE_CHECKING = False  # type checkers know the name; importing `typing` costs 5 ms
+TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, ClassVar, Final, Literal, Self
@@ -141,21 +141,21 @@ class MotorStatus:
 
 # The frame ------------------------------------------------------------------------------
 
-#: Begins a frame and appears nowhere inside one: 0x00 follows every 0xA5 there.
+#: Begins a frame and does not occur inside it, where 0x00 follows every 0xA5.
 _PREAMBLE = b"\xa5\xa5"
 _MARK = 0xA5
 _INSERT = 0x00
 _STUFFED = bytes((_MARK, _INSERT))
 _UNSTUFFED = _STUFFED[:1]
-#: Bytes before the payload, and all bytes beside it. A body is a frame without preamble.
+#: Sizes of the header, and of header and trailer. A body is a frame without preamble.
 _HEADER = 5
 _OVERHEAD = 7
-#: Bytes up to the length, and what a frame has beyond the number that the length says.
+#: Offset after the length, and the number of bytes of a frame that the length does not count.
 _LENGTH_END = 3
 _UNCOUNTED = 3
 _MIN_LENGTH = 4
 _MAX_LENGTH = 30
-#: What a buffer may end in while a frame begins there.
+#: Possible beginnings of a preamble at the end of a buffer.
 _BEGINNINGS = (b"", _PREAMBLE[:1], _PREAMBLE)
 
 _CHECKSUM = find_crc("crc-16/ibm-3740")
@@ -176,19 +176,19 @@ def _payload(body: bytes) -> bytes:
 
 
 def _stuffed(body: bytes, crc: int) -> bytes:
-    """The frame of what follows the preamble."""
+    """The frame of a body and its CRC."""
     check = crc.to_bytes(2, "big")
     return _PREAMBLE + (body + check).replace(_UNSTUFFED, _STUFFED)
 
 
 def _frame_with(message: Message, checksum: Checksum) -> bytes:
-    """The frame of a message with a check value by another algorithm."""
+    """The frame of a message with the check value of another algorithm."""
     body = message.to_frame()[2:].replace(_STUFFED, _UNSTUFFED)[:-2]
     return _stuffed(body, checksum.compute(body, checksum.start))
 
 
 def _address(message: type[Message], node: int | None) -> bytes:
-    """The address for the header of a payload that is decoded alone."""
+    """The address bytes for the header of a payload."""
     number = message.DEFAULT_ADDRESS if node is None else node
     try:
         return number.to_bytes(1, "big")
@@ -207,11 +207,11 @@ class Message(BaseMessage):
     DEFAULT_ADDRESS: ClassVar[int] = 1
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         raise NotImplementedError
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         return _payload(self.to_frame()[2:].replace(_STUFFED, _UNSTUFFED))
 
     @classmethod
@@ -228,7 +228,7 @@ class Message(BaseMessage):
 
     @classmethod
     def from_checked(cls, body: bytes) -> Self:
-        """The message in a whole frame without preamble and stuffing.
+        """The message of an unstuffed frame without its preamble.
 
         Raises struct.error, LookupError or DecodeError.
         """
@@ -2011,7 +2011,7 @@ class LoopBackResponse(Message):
         return message
 
 
-#: The line and who is on it.
+#: The line and its nodes.
 BUS = Bus(
     "master_slave",
     first_node=1,
@@ -2021,7 +2021,7 @@ BUS = Bus(
     bits_per_byte=10,
 )
 
-#: Every message by its name in the schema.
+#: Message classes by name in the schema.
 MESSAGES: dict[str, type[Message]] = {
     "node_setup.request": NodeSetupRequest,
     "node_setup.response": NodeSetupResponse,
@@ -2060,7 +2060,7 @@ MESSAGES: dict[str, type[Message]] = {
     "loop_back.response": LoopBackResponse,
 }
 
-#: Every transaction by its name.
+#: Transactions by name.
 COMMANDS: dict[str, Command] = {
     "node_setup": Command(
         "node_setup",
@@ -2353,11 +2353,11 @@ def _known(
 
 
 def _unstuff(buf: bytes, start: int) -> tuple[str, int, bytes]:
-    """Undo the stuffing of the frame that begins at `start`: (fault, end, frame).
+    """Unstuff the frame that begins at `start`: (fault, end, frame).
 
-    The fault is "" for a whole frame. It is "missing" while bytes are; then `end` is what
-    the buffer must reach before it is worth looking again. A mark that is the frame's last
-    byte ends it: its inserted byte is not waited for.
+    The fault is "" for a whole frame, "missing" for an incomplete one; then `end` is the
+    buffer size needed for the next attempt. If the last byte of the frame is a mark, its
+    inserted byte is not part of the result.
     """
     size, at = len(buf), start + _LENGTH_END
     if size < at:
@@ -2387,14 +2387,14 @@ def _unstuff(buf: bytes, start: int) -> tuple[str, int, bytes]:
 
 
 def _stuffed_end(buf: bytes, start: int, end: int) -> int:
-    """Where a body ends on the wire that would end at `end` without stuffing."""
+    """The end on the wire of a body that would end at `end` without stuffing."""
     stop, marks = end, 0
     while marks != (found := buf.count(_MARK, start, stop)) and found <= end - start:
         stop, marks = end + found, found
     return stop
 
 
-#: What is wrong with a frame that cannot be read to its end.
+#: Error texts of incomplete and malformed frames.
 _COMPLAINTS = {
     "length": f"the length is not {_MIN_LENGTH}..{_MAX_LENGTH}",
     "missing": "the end of the frame is missing",
@@ -2406,7 +2406,7 @@ _COMPLAINTS = {
 def _judge(
     frame: bytes, known: dict[int, type[Message]], checksum: Checksum
 ) -> Message:
-    """The message of a whole frame without stuffing. Raises DecodeError."""
+    """The message of a whole unstuffed frame. Raises DecodeError."""
     seen, body = frame[-2:], frame[2:-2]
     right = checksum.compute(body, checksum.start).to_bytes(2, "big")
     if seen != right:
@@ -2414,7 +2414,7 @@ def _judge(
     number = frame[3]
     message = known.get(number)
     if message is None:
-        text = f"no message has the number {number:#04x}"
+        text = f"unknown message number {number:#04x}"
         raise DecodeError(text, "unknown", offset=3, data=frame)
     try:
         return message.from_checked(frame[2:])
@@ -2425,10 +2425,10 @@ def _judge(
 def _decode(
     wire: BytesLike, known: dict[int, type[Message]], checksum: Checksum = _CHECKSUM
 ) -> Message:
-    """One whole frame as it is on the wire. Raises DecodeError."""
+    """Decode exactly one frame. Raises DecodeError."""
     data = as_bytes(wire)
     if data[: len(_PREAMBLE)] != _PREAMBLE[: len(data)]:
-        text = f"a frame begins with {_PREAMBLE.hex(' ')}"
+        text = f"the frame does not begin with {_PREAMBLE.hex(' ')}"
         raise DecodeError(text, "frame", data=data)
     kind, end, frame = _unstuff(data, 0)
     if kind:
@@ -2442,7 +2442,7 @@ def _decode(
 
 
 def decode_request(wire: BytesLike) -> Message:
-    """The message of exactly one request frame as it is on the wire. Raises DecodeError."""
+    """The message of exactly one request frame. Raises DecodeError."""
     try:
         body: Any = wire[2:]
         if (
@@ -2452,12 +2452,12 @@ def decode_request(wire: BytesLike) -> Message:
         ):
             return _REQUEST_READERS[body[1]](body)
     except UNREADABLE:
-        pass  # _decode says what is wrong
+        pass  # _decode reports the error
     return _decode(wire, _REQUESTS)
 
 
 def decode_response(wire: BytesLike) -> Message:
-    """The message of exactly one response frame as it is on the wire. Raises DecodeError."""
+    """The message of exactly one response frame. Raises DecodeError."""
     try:
         body: Any = wire[2:]
         if (
@@ -2467,21 +2467,20 @@ def decode_response(wire: BytesLike) -> Message:
         ):
             return _RESPONSE_READERS[body[1]](body)
     except UNREADABLE:
-        pass  # _decode says what is wrong
+        pass  # _decode reports the error
     return _decode(wire, _RESPONSES)
 
 
 class StreamDecoder:
-    """Finds messages in a stream of bytes: messages and faults in the order of the wire.
+    """Decodes messages from a byte stream; returns messages and faults in wire order.
 
-    The events do not depend on how the stream is cut into pieces. A message is handed out
-    with the last byte of its checksum. After a bad frame the search goes on at once, so
-    every intact frame that follows is delivered. At most one frame is kept.
+    Events do not depend on how the stream is split into pieces. A message is returned with
+    the last byte of its checksum. After a bad frame the search continues immediately, so
+    every later intact frame is delivered. At most one frame is buffered.
 
     Args:
-        direction: who sends: "request" is what a slave hears, "response" what the master
-            hears.
-        checksum: another algorithm than the schema's, see Codec.
+        direction: "request" to decode as a slave, "response" as the master.
+        checksum: replaces the algorithm of the schema, see Codec.
     """
 
     __slots__ = (
@@ -2507,15 +2506,15 @@ class StreamDecoder:
         self._checksum = checksum
         self._check = checksum.verifier(2, "big")
         self._buffer: bytes = b""
-        self._need: int = 0  # a frame that has begun is not complete with fewer bytes
-        self._offset: int = 0  # of the buffer's first byte in the stream
-        # The buffer's first byte is a mark that ended a frame: an inserted one may follow.
+        self._need: int = 0  # minimum size of the frame in the buffer
+        self._offset: int = 0  # of the buffer in the stream
+        # The buffer begins with a mark that ended a frame; an inserted byte may follow.
         self._tail = False
         self._counters = Counters()
-        self._events = 0  # handed out, faults included
+        self._events = 0  # returned, faults included
 
     def feed(self, data: BytesLike) -> list[Message | Fault]:
-        """Take the next bytes of the stream; return what they complete."""
+        """Feed bytes of the stream; return the messages and faults that they complete."""
         buf = self._buffer + data
         size = len(buf)
         if size < self._need and _MARK not in data:
@@ -2524,10 +2523,10 @@ class StreamDecoder:
         events: list[Message | Fault] = []
         readers, check, start = self._readers, self._check, self._checksum.start
         last = size - _LENGTH_END + 1
-        pos = self._careful(buf, 0, events) if self._tail else 0
+        pos = self._slow(buf, 0, events) if self._tail else 0
         while pos >= 0:
             while pos < last:
-                # The straight way: a good frame begins here. All else goes the careful way.
+                # Fast path: a valid frame begins here. Everything else takes the slow path.
                 length = buf[pos + 2]
                 end = pos + _UNCOUNTED + length
                 if end <= size:
@@ -2546,13 +2545,13 @@ class StreamDecoder:
                 elif (
                     _MIN_LENGTH <= length <= _MAX_LENGTH and _MARK not in buf[pos + 2 :]
                 ):
-                    # No other frame can begin in here, and this one is not complete yet.
+                    # The frame is incomplete, and no other frame can begin inside it.
                     self._buffer = buf[pos:]
                     self._need = end - pos
                     self._offset += pos
                     self._events += len(events)
                     return events
-                pos = self._careful(buf, pos, events)
+                pos = self._slow(buf, pos, events)
                 if pos < 0:
                     break
             else:
@@ -2562,7 +2561,7 @@ class StreamDecoder:
                     self._need = 0
                     self._offset += pos
                     break
-                pos = self._careful(buf, pos, events)
+                pos = self._slow(buf, pos, events)
         self._events += len(events)
         return events
 
@@ -2574,7 +2573,7 @@ class StreamDecoder:
         return counters
 
     def finish(self) -> list[Message | Fault]:
-        """The stream has ended: the fault of an unfinished frame. The decoder is as new."""
+        """End the stream: return the fault of an incomplete frame and reset the decoder."""
         rest, start, tail = self._buffer, self._offset, self._tail
         self._buffer, self._need, self._tail = b"", 0, False
         self._offset += len(rest)
@@ -2590,21 +2589,21 @@ class StreamDecoder:
         return Fault(kind, offset, raw, text)
 
     def _keep(self, buf: bytes, start: int, need: int) -> int:
-        """Wait until the buffer has `need` bytes."""
+        """Keep the buffer from `start` on until it has `need` bytes."""
         self._buffer = buf[start:]
         self._need = need
         self._offset += start
         return -1
 
-    def _careful(self, buf: bytes, pos: int, events: list[Message | Fault]) -> int:
-        """Steps until the straight way can be tried again: where to go on, -1 for later."""
+    def _slow(self, buf: bytes, pos: int, events: list[Message | Fault]) -> int:
+        """Process events until the fast path applies; return the next position, -1 to wait."""
         pos = self._step(buf, pos, events)
         while self._tail and pos >= 0:
             pos = self._step(buf, pos, events)
         return pos
 
     def _step(self, buf: bytes, pos: int, events: list[Message | Fault]) -> int:
-        """One frame or fault."""
+        """Process one frame or fault; return the next position, -1 to wait."""
         if self._tail:
             if len(buf) - pos < 2:
                 return self._keep(buf, pos, 0)
@@ -2622,13 +2621,13 @@ class StreamDecoder:
         return end - self._tail
 
     def _find(self, buf: bytes, pos: int) -> int:
-        """The next preamble, -1 where there is none: a first half of one is then kept."""
+        """Find the next preamble; -1 if there is none, keeping its possible first half."""
         start = buf.find(_PREAMBLE, pos)
         if start < 0:
             start = len(buf) - buf.endswith(_PREAMBLE[:1], pos)
             self._counters.skipped += start - pos
             return self._keep(buf, start, 0)
-        # Of a longer run of marks the last two are the preamble.
+        # The last two of several marks are the preamble.
         while buf[start + 2 : start + 3] == _PREAMBLE[:1]:
             start += 1
         if start > pos:
@@ -2649,22 +2648,22 @@ class StreamDecoder:
 
 
 class Codec:
-    """Encodes and decodes with another 16-bit CRC than the schema's.
+    """Encodes and decodes with a 16-bit CRC that replaces the one of the schema.
 
-    It takes the place of the module wherever one is asked for.
+    It can be used in place of the module.
 
     Args:
         crc: name of the algorithm in the CRC catalogue, such as crc-16/xmodem.
 
     Attributes:
         checksum: the algorithm.
-        BUS: the line and who is on it.
-        COMMANDS: every transaction by its name.
-        MESSAGES: every message by its name in the schema.
+        BUS: the line and its nodes.
+        COMMANDS: transactions by name.
+        MESSAGES: message classes by name in the schema.
         DecodeError: raised for bytes that are not a valid frame.
 
     Raises:
-        ValueError: no 16-bit algorithm has the name.
+        ValueError: the name is not a 16-bit algorithm.
     """
 
     BUS = BUS
@@ -2676,7 +2675,7 @@ class Codec:
         self.checksum = find_crc(crc)
 
     def encode(self, message: Message) -> bytes:
-        """The whole frame of a message as it is on the wire. Raises EncodeError."""
+        """The whole frame of a message as sent. Raises EncodeError."""
         return _frame_with(message, self.checksum)
 
     def decode_request(self, wire: BytesLike) -> Message:
@@ -2693,5 +2692,5 @@ class Codec:
 
 
 def encode(message: Message) -> bytes:
-    """The whole frame of a message as it is on the wire. Raises EncodeError."""
+    """The whole frame of a message as sent. Raises EncodeError."""
     return message.to_frame()

@@ -47,7 +47,7 @@ from .qlink import (
     WriteResponse,
 )
 
-TYPE_CHECKING = False  # type checkers know the name; importing `typing` costs 5 ms
+TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import TypeVar
@@ -72,11 +72,11 @@ class MasterCalls:
     __slots__ = ()
 
     def ask(self, request: Message, response: type[_R]) -> _R:
-        """Send a request and wait for its response, of the class given."""
+        """Send a request and wait for its response of a class."""
         raise NotImplementedError
 
     def tell(self, request: Message) -> None:
-        """Send a request that is not answered."""
+        """Send a request without a response."""
         raise NotImplementedError
 
     def node_setup(
@@ -341,11 +341,11 @@ class NodeCalls:
     number: int
 
     def ask(self, request: Message, response: type[_R]) -> _R:
-        """Send a request and wait for its response, of the class given."""
+        """Send a request and wait for its response of a class."""
         raise NotImplementedError
 
     def tell(self, request: Message) -> None:
-        """Send a request that is not answered."""
+        """Send a request without a response."""
         raise NotImplementedError
 
     def node_setup(
@@ -554,11 +554,11 @@ class AsyncMasterCalls:
     __slots__ = ()
 
     async def ask(self, request: Message, response: type[_R]) -> _R:
-        """Send a request and wait for its response, of the class given."""
+        """Send a request and wait for its response of a class."""
         raise NotImplementedError
 
     async def tell(self, request: Message) -> None:
-        """Send a request that is not answered."""
+        """Send a request without a response."""
         raise NotImplementedError
 
     async def node_setup(
@@ -739,11 +739,11 @@ class AsyncNodeCalls:
     number: int
 
     async def ask(self, request: Message, response: type[_R]) -> _R:
-        """Send a request and wait for its response, of the class given."""
+        """Send a request and wait for its response of a class."""
         raise NotImplementedError
 
     async def tell(self, request: Message) -> None:
-        """Send a request that is not answered."""
+        """Send a request without a response."""
         raise NotImplementedError
 
     async def node_setup(
@@ -889,21 +889,21 @@ class AsyncNodeCalls:
 
 
 class SlaveHandlers:
-    """What a slave does, a method for each command: override those that it supports.
+    """Handlers of a slave, a method for each command; override those that it supports.
 
-    Each takes a request that is addressed to the slave, and the time in seconds by the
-    caller's clock. It returns the response, or None where there is none. A command that is
-    not overridden is not supported: it is not answered.
+    Each method takes a request addressed to the slave, and the time in seconds by the
+    caller's clock. It returns the response, or None for no response. Commands that are not
+    overridden are not answered.
 
     Attributes:
-        number: Address that the slave answers to now, 1..16.
+        number: Current address of the slave, 1..16.
     """
 
     def __init__(self, number: int) -> None:
         self.number = number
 
     def handle(self, request: Message, now: float) -> Message | None:
-        """The response of the method for the request's command, None where there is none."""
+        """Call the method for a request and return its response, None for no response."""
         name = _METHODS.get(type(request))
         if name is None:
             return None
@@ -1041,7 +1041,7 @@ class SlaveHandlers:
         """
 
 
-#: Name of the method for each class of requests: looked up by name, so that an overridden one is found.
+#: Method names by class of request; lookup by name finds overridden methods.
 _METHODS: dict[type[Message], str] = {
     NodeSetupRequest: "node_setup",
     NodeInfoRequest: "node_info",

@@ -45,7 +45,7 @@ from ._support import (
     wrong_size,
 )
 
-TYPE_CHECKING = False  # type checkers know the name; importing `typing` costs 5 ms
+TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from typing import ClassVar, Literal, Self
 
@@ -94,17 +94,17 @@ class KeypadModeEnum(OpenEnum):
 
 # The frame ------------------------------------------------------------------------------
 
-#: Set in the header and the end byte of a message, and in no other.
+#: Set only in the header and the end byte of a message.
 _MARKER = 0x80
-#: They hold the address and the number of the message too; an end byte has 0 for a number.
+#: Both also hold the address and the message number, which is 0 in an end byte.
 _ADDRESS_SHIFT = 3
 _ADDRESS_MASK = 0x0F
 _ID_SHIFT = 0
 _ID_MASK = 0x07
 _END = 0
-#: Most bytes between header and end.
+#: Maximum number of bytes between header and end.
 _MOST = 258
-#: The same, for nodes that send messages on.
+#: The layout for nodes that forward messages.
 MARKING = Marking(
     marker=_MARKER,
     address_shift=_ADDRESS_SHIFT,
@@ -120,7 +120,7 @@ _CHECK_SIZE = 2
 
 
 def _check(payload: bytes, checksum: Checksum) -> bytes:
-    """The check value of a payload as it is sent."""
+    """The wire bytes of the check value of a payload."""
     crc = checksum.compute(payload, checksum.start)
     return bytes((crc & 0x7F, crc >> 8 & 0x7F))
 
@@ -144,11 +144,11 @@ class Message(BaseMessage):
     address: int
     ADDRESS = "address"
     DEFAULT_ADDRESS: ClassVar[int] = 1
-    #: The message carries a check value.
+    #: Whether the message has a check value.
     CHECKED: ClassVar[bool] = False
 
     def to_frame(self) -> bytes:
-        """The whole message as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         return _frame_with(self, _CHECKSUM)
 
     @classmethod
@@ -167,7 +167,7 @@ class Message(BaseMessage):
 
     @classmethod
     def from_checked(cls, payload: bytes) -> Self:
-        """The message of a payload, but for its address.
+        """The message of a payload, without its address.
 
         Raises struct.error, LookupError or DecodeError.
         """
@@ -450,10 +450,10 @@ class KeypadMode(Message):
         return message
 
 
-#: The line and who is on it.
+#: The line and its nodes.
 BUS = Bus("ring", first_node=1, last_node=15, bits_per_byte=10)
 
-#: Every message by its name in the schema.
+#: Message classes by name in the schema.
 MESSAGES: dict[str, type[Message]] = {
     "character_transfer": CharacterTransfer,
     "direct_variable_transfer": DirectVariableTransfer,
@@ -461,7 +461,7 @@ MESSAGES: dict[str, type[Message]] = {
     "keypad_mode": KeypadMode,
 }
 
-#: Every transaction by its name.
+#: Transactions by name.
 COMMANDS: dict[str, Command] = {}
 
 
@@ -485,7 +485,7 @@ def _known(direction: str) -> dict[int, type[Message]]:
     return _DIRECTIONS[direction]
 
 
-#: Makes the marker bit findable: everything else of a byte becomes 0.
+#: Translation table that clears all but the marker bit.
 _MARKS = bytes(byte & _MARKER for byte in range(256))
 
 
@@ -497,12 +497,12 @@ def _judge(
     address = frame[0] >> _ADDRESS_SHIFT & _ADDRESS_MASK
     message = known.get(number)
     if message is None:
-        raise DecodeError(f"no message has the number {number}", "frame", data=frame)
+        raise DecodeError(f"unknown message number {number}", "frame", data=frame)
     if address == 0:
-        text = f"{message.NAME}: address 0 is not a node's"
+        text = f"{message.NAME}: address 0 is reserved"
         raise DecodeError(text, "frame", "address", data=frame)
     if frame[-1] >> _ADDRESS_SHIFT & _ADDRESS_MASK != address:
-        text = f"{message.NAME}: the end byte has another address than the header"
+        text = f"{message.NAME}: the addresses of header and end byte differ"
         raise DecodeError(text, "frame", "address", len(frame) - 1, frame)
     check = _CHECK_SIZE if message.CHECKED else 0
     payload = frame[1 : len(frame) - 1 - check]
@@ -525,12 +525,13 @@ def _decode(
     known: dict[int, type[Message]],
     checksum: Checksum = _CHECKSUM,
 ) -> Message:
-    """One whole frame as it is on the wire. Raises DecodeError."""
+    """Decode exactly one frame. Raises DecodeError."""
     data = as_bytes(wire)
     if not data:
-        raise DecodeError("a message has at least two bytes", "truncated")
+        raise DecodeError("no data; a message has at least two bytes", "truncated")
     if not _is_header(data[0]):
-        raise DecodeError("a message begins with a header byte", "frame", data=data)
+        text = "the message does not begin with a header byte"
+        raise DecodeError(text, "frame", data=data)
     end = data.translate(_MARKS).find(_MARKER, 1)
     if end < 0:
         text, kind, end = "the end byte is missing", "truncated", len(data)
@@ -544,20 +545,20 @@ def _decode(
 
 
 def decode(wire: BytesLike) -> Message:
-    """The message of exactly one frame as it is on the wire. Raises DecodeError."""
+    """The message of exactly one frame. Raises DecodeError."""
     return _decode(wire, _MESSAGES)
 
 
 class StreamDecoder:
-    """Finds messages in a stream of bytes: messages and faults in the order of the wire.
+    """Decodes messages from a byte stream; returns messages and faults in wire order.
 
-    The events do not depend on how the stream is cut into pieces. A header inside a message
+    Events do not depend on how the stream is split into pieces. A header inside a message
     begins a new one, so every intact message after a bad one is delivered. At most one
-    message is kept.
+    message is buffered.
 
     Args:
-        direction: who sends.
-        checksum: another algorithm than the schema's, see Codec.
+        direction: direction of the messages.
+        checksum: replaces the algorithm of the schema, see Codec.
     """
 
     __slots__ = (
@@ -577,13 +578,13 @@ class StreamDecoder:
     ) -> None:
         self._messages = _known(direction)
         self._checksum = checksum
-        self._message = b""  # from the header on; b"" between messages
-        self._hunting = False  # a fault was reported: only a header is of interest
+        self._message = b""  # header and payload so far; b"" between messages
+        self._hunting = False  # skip to the next header after a reported fault
         self._offset: int = 0  # of the next byte in the stream
         self.counters = Counters()
 
     def feed(self, data: BytesLike) -> list[Message | Fault]:
-        """Take the next bytes of the stream; return what they complete."""
+        """Feed bytes of the stream; return the messages and faults that they complete."""
         chunk = as_bytes(data)
         marks = chunk.translate(_MARKS)
         events: list[Message | Fault] = []
@@ -608,7 +609,7 @@ class StreamDecoder:
         return events
 
     def finish(self) -> list[Message | Fault]:
-        """The stream has ended: the fault of an unfinished message. The decoder is as new."""
+        """End the stream: return the fault of an incomplete message and reset the decoder."""
         rest, self._message, self._hunting = self._message, b"", False
         if not rest:
             return []
@@ -617,7 +618,7 @@ class StreamDecoder:
     def _collect(
         self, chunk: bytes, pos: int, stop: int, events: list[Message | Fault]
     ) -> int:
-        """Add payload bytes to the message; where to go on."""
+        """Add payload bytes to the message; return the next position."""
         room = _MOST + 1 - len(self._message)
         if stop - pos <= room:
             self._message += chunk[pos:stop]
@@ -660,23 +661,23 @@ class StreamDecoder:
 
 
 class Codec:
-    """Encodes and decodes with another 16-bit CRC than the schema's.
+    """Encodes and decodes with a 16-bit CRC that replaces the one of the schema.
 
-    It takes the place of the module wherever one is asked for.
+    It can be used in place of the module.
 
     Args:
         crc: name of the algorithm in the CRC catalogue, such as crc-16/xmodem.
 
     Attributes:
         checksum: the algorithm.
-        BUS: the line and who is on it.
-        COMMANDS: every transaction by its name.
-        MESSAGES: every message by its name in the schema.
+        BUS: the line and its nodes.
+        COMMANDS: transactions by name.
+        MESSAGES: message classes by name in the schema.
         DecodeError: raised for bytes that are not a valid frame.
-        MARKING: the place of address and number in headers and end bytes.
+        MARKING: the layout of headers and end bytes.
 
     Raises:
-        ValueError: no 16-bit algorithm has the name.
+        ValueError: the name is not a 16-bit algorithm.
     """
 
     BUS = BUS
@@ -689,7 +690,7 @@ class Codec:
         self.checksum = find_crc(crc)
 
     def encode(self, message: Message) -> bytes:
-        """The whole frame of a message as it is on the wire. Raises EncodeError."""
+        """The whole frame of a message as sent. Raises EncodeError."""
         return _frame_with(message, self.checksum)
 
     def decode(self, wire: BytesLike) -> Message:
@@ -702,5 +703,5 @@ class Codec:
 
 
 def encode(message: Message) -> bytes:
-    """The whole frame of a message as it is on the wire. Raises EncodeError."""
+    """The whole frame of a message as sent. Raises EncodeError."""
     return message.to_frame()

@@ -1,4 +1,4 @@
-"""The statements that turn a message into bytes: one struct for each row of steps of fixed size."""
+"""Generates the statements that encode a message: one struct for consecutive steps of fixed size."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _INDENT = 12
 
 @dataclass(eq=False)
 class Row:
-    """Steps of fixed size in a row: formats and arguments; ``items`` is the run among them, if any."""
+    """Consecutive steps of fixed size: formats and arguments; ``items`` is the run among them, if any."""
 
     codes: list[str] = field(default_factory=list)
     arguments: list[str] = field(default_factory=list)
@@ -59,8 +59,8 @@ class Encoder:
 
     Attributes:
         message: the plan.
-        place: what surrounds the payload.
-        title: the message in the names of its constants.
+        place: the surroundings of the payload.
+        title: the part of the names of constants that identifies the message.
         number: expression for its id.
         scales: constant that converts each scaled value.
         constants: definitions that precede the class.
@@ -78,7 +78,7 @@ class Encoder:
     _pieces: list[Row | str] = field(default_factory=list)
 
     def statements(self, name: str) -> list[str]:
-        """Lines that compute the bytes as the local ``name``, or return them where it is empty."""
+        """Statements that assign the bytes to the local ``name``, or return them if it is empty."""
         self._tabled = tabled(self.message.payload, self.place.byteorder)
         self._measure()
         for part in self.place.front:
@@ -99,7 +99,7 @@ class Encoder:
     def _require(self, number: str, *rules: Condition) -> None:
         self._terms += [integers.holds(rule, number) for rule in rules]
 
-    # Sizes of what is variable
+    # Variable sizes
 
     def _measure(self) -> None:
         for run in self.message.payload.runs:
@@ -180,14 +180,14 @@ class Encoder:
                 assert_never(step)
 
     def _number(self, integer: Integer, value: int) -> None:
-        """A number that is known here; what struct has no letter for is bytes."""
+        """Add a constant number, as bytes if struct has no letter for it."""
         if integers.letter(integer, self.place.byteorder):
             self._integer(integer, str(value))
         else:
             self._add(f"{integer.size}s", literal(integer.pack(value)))
 
     def _computed(self, name: str, integer: Integer, number: str) -> None:
-        """A number that is an expression; what struct has no letter for uses it as a local."""
+        """Add an expression, as a local if struct has no letter for it."""
         if integers.letter(integer, self.place.byteorder):
             self._integer(integer, number)
             return
@@ -200,7 +200,7 @@ class Encoder:
         if step.number.scaling is not None:
             self._lines.append(f"{step.name}_raw = {self.scales[step.name]}.raw({source})")
             self._integer(step.integer, f"{step.name}_raw")
-        elif plain:  # struct asks for an integer, and refuses one that does not fit
+        elif plain:  # struct checks type and range
             self._require(source, *step.conditions)
             self._integer(step.integer, source)
         else:
@@ -208,7 +208,7 @@ class Encoder:
             self._integer(step.integer, f"{step.name}_raw")
 
     def _indexed(self, name: str, number: Scalar) -> None:
-        """A local that holds a value as an integer of Python's own, in range."""
+        """Assign a value to a local as an int, and check its range."""
         self._lines.append(f"{name}_raw = {self.place.use('index')}(self.{attribute(name)})")
         self._require(f"{name}_raw", *limits(number))
 
@@ -216,7 +216,7 @@ class Encoder:
         terms = list(map(self._member, step.members)) or ["0"]
         raw = f"{step.name}_whole"
         self._lines.append(f"{raw} = {' | '.join(terms)}")
-        if step.integer.signed:  # bits have no sign; only the way out of the struct has
+        if step.integer.signed:  # struct packs a signed number
             self._lines.append(f"{raw} = {integers.sign_extended(raw, step.integer.bits)}")
         self._integer(step.integer, raw)
 
@@ -259,7 +259,7 @@ class Encoder:
             self._pieces.append(f'{self.place.use("pack")}(f"{order}{{{step.name}_count}}{code}", *{source})')
 
     def _odd_items(self, step: ItemsStep, source: str) -> None:
-        """Items that struct does not know, not in this byte order, or not all of their values."""
+        """Add items that struct does not support, in this byte order or with these conditions."""
         local = f"{step.name}_raw"
         self._lines.append(f"{local} = [{self.place.use('index')}(item) for item in {source}]")
         rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
@@ -277,7 +277,7 @@ class Encoder:
     # The expression
 
     def _expression(self, name: str) -> list[str]:
-        """Statements that put the pieces together as ``name``, or return them where it is empty."""
+        """Statements that join the pieces and assign them to ``name``, or return them if it is empty."""
         rows = [piece for piece in self._pieces if isinstance(piece, Row)]
         if not self._pieces:
             return [f'{name} = b""' if name else 'return b""']
@@ -293,7 +293,7 @@ class Encoder:
         return [before + piece] if isinstance(piece, str) else self._call(piece, rows, before)
 
     def _call(self, row: Row, rows: list[Row], before: str) -> list[str]:
-        # Before the title, as a message may be called like another one with a number after it.
+        # The number precedes the title, because the name of a message may end in a number.
         name = f"_PACK_{rows.index(row) + 1}_{self.title}" if len(rows) > 1 else f"_PACK_{self.title}"
         text = self.place.prefix + format_of(row.codes)
         if row.items is None:

@@ -1,21 +1,21 @@
-"""Lines of Python as ``ruff format`` leaves them: one where it fits, else a line for each item."""
+"""Lays out lines of Python like ``ruff format``: one line if it fits, otherwise one line per item."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-#: Longest line of generated code.
+#: Maximum line length of generated code.
 WIDTH = 88
 
 
 def indented(lines: Iterable[str], levels: int = 1) -> list[str]:
-    """Lines moved to the right."""
+    """Indent lines."""
     return ["    " * levels + line if line else line for line in lines]
 
 
 def wrapped(head: str, items: Iterable[str], tail: str, indent: int) -> list[str]:
-    """``head item, item tail``; ``indent`` is that of the line."""
+    """``head item, item tail``; ``indent`` is the indentation of the line."""
     listed = list(items)
     line = f"{head}{', '.join(listed)}{tail}"
     if indent + len(line) <= WIDTH or not listed:
@@ -36,7 +36,7 @@ class Call:
         return f"{self.name}({', '.join(self.arguments)})"
 
     def item(self, indent: int) -> list[str]:
-        """The call as an item of a display that has a line for each."""
+        """The call as an item of a display with one line per item."""
         return [*wrapped(f"{self.name}(", self.arguments, "),", indent)]
 
 
@@ -50,13 +50,13 @@ def calls(head: str, items: Sequence[Call], tail: str, indent: int) -> list[str]
 
 
 def listing(head: str, items: Iterable[str], tail: str, indent: int) -> list[str]:
-    """The same for a tuple display: a single item has its comma."""
+    """Like `wrapped`, for a tuple display, in which a single item has a comma."""
     listed = list(items)
     return [f"{head}{listed[0]},{tail}"] if len(listed) == 1 else wrapped(head, listed, tail, indent)
 
 
 def slice_of(data: str, start: str, end: str) -> str:
-    """``data[start:end]``, with blanks around the colon where an index is an expression."""
+    """``data[start:end]``, with blanks around the colon if an index is an expression."""
     simple = all(each.lstrip("-").isdecimal() or each.isidentifier() for each in (start, end) if each)
     return f"{data}[{start}:{end}]" if simple else f"{data}[{start} : {end}]"
 
@@ -67,7 +67,7 @@ def in_hex(number: int, size: int = 1) -> str:
 
 
 def literal(data: bytes) -> str:
-    """Bytes as source text, with the quotes that ``ruff format`` prefers."""
+    """Bytes as a literal, with the quotes that ``ruff format`` prefers."""
     text = repr(data)
     if text.startswith('b"') or '"' in text:
         return text

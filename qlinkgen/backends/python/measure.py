@@ -1,4 +1,4 @@
-"""How long a message is that no length announces: its own counts tell."""
+"""The size of a message in a frame without a length, derived from its counts."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan
 
 
 def measure_lines(payload: PayloadPlan) -> list[str]:
-    """Body of the method that finds the size of a payload from its beginning; empty where it never varies.
+    """Body of the method that finds the size of a payload from its beginning; empty if it is constant.
 
-    The method takes the bytes and the index of the payload. It returns the size as far as the counts are
-    there to tell; where one is not allowed, the index after it, negative.
+    The method takes the bytes and the offset of the payload. It returns the size as far as counts have been
+    received, or the negative offset after a count that is out of range.
     """
     if payload.fixed:
         return []

@@ -1,4 +1,4 @@
-"""Formats of structs, and how many of them there are for a run of items."""
+"""Formats of structs, and tables of structs by number of items."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.types import Length
 from qlinkgen.plan.payload import ItemsStep, PayloadPlan
 
-#: Up to so many items there is a struct for each count; beyond, the format is made when it is needed.
+#: A run of at most this many items gets a struct for each count; longer ones build the format at run time.
 MANY_ITEMS = 128
 
 
 def format_of(codes: Iterable[str]) -> str:
-    """Formats in a row, pad bytes that follow one another as one."""
+    """Concatenate formats, adjacent pad bytes merged."""
     text, pads = "", 0
     for code in codes:
         if code.endswith("x"):
@@ -26,9 +26,9 @@ def format_of(codes: Iterable[str]) -> str:
 
 
 def tabled(payload: PayloadPlan, byteorder: ByteOrder) -> ItemsStep | None:
-    """The run that has a struct of the whole payload for each of its counts, None where there is none.
+    """The run that gets a table of structs of the whole payload, None if there is none.
 
-    It is the only run of the payload that takes a starred target, and short enough.
+    It must be short and the only run of the payload.
     """
     arrays = [step for step in payload.steps if isinstance(step, ItemsStep)]
     if len(payload.runs) != 1 or len(arrays) != 1 or payload.runs[0] is not arrays[0]:
@@ -38,11 +38,11 @@ def tabled(payload: PayloadPlan, byteorder: ByteOrder) -> ItemsStep | None:
 
 
 def counts_of(length: Length) -> str:
-    """The numbers of items that a run may have, as a range."""
+    """The legal numbers of items of a run, as a range."""
     first = f"{length.minimum}, " if length.minimum else ""
     return f"range({first}{length.maximum + 1})"
 
 
 def table(name: str, text: str, method: str, run: ItemsStep, key: str) -> list[str]:
-    """The definition of a struct for each count; ``key`` is an expression on ``n``."""
+    """The definition of a table of structs by count; ``key`` is an expression of ``n``."""
     return [f'{name} = {{{key}: Struct(f"{text}").{method} for n in {counts_of(run.length)}}}']
