@@ -64,12 +64,22 @@ class Astray(Exception):
 
 
 class Missing(Exception):
-    """The bytes so far may be the beginning of a frame; at least ``size`` are needed to decide."""
+    """The bytes so far may be the beginning of a frame.
 
-    def __init__(self, size: int = 0) -> None:
-        """Note the size."""
-        super().__init__(size)
+    Attributes:
+        size: at least so many bytes are needed to decide,
+        telling: or fewer that end with this byte, as an inserted byte may have to follow it.
+    """
+
+    def __init__(self, size: int = 0, telling: bytes = b"") -> None:
+        """Note both."""
+        super().__init__(size, telling)
         self.size = size
+        self.telling = telling
+
+    def still(self, wire: bytes) -> bool:
+        """Return whether one more byte than before decides nothing either."""
+        return len(wire) < self.size and wire[-1:] != self.telling
 
 
 @dataclass
@@ -128,7 +138,7 @@ class Cursor:
         """The bytes up to the next inserted one."""
         start, left = self.at, len(self._wire) - self.at
         if left == 0:
-            raise Missing(start + 1)
+            raise Missing(start + most, rule.after[-1:] if rule is not None else b"")
         last = -1 if rule is None else self._wire.find(rule.after[-1:], start, start + most)
         size = min(most, left) if last < 0 else last + 1 - start
         self.at += size

@@ -119,8 +119,8 @@ class HuntingReceiver(Receiver):
         self._reader = FrameReader(plan.frame, self.known, direction)
         self._marks = 0
         self._raw = b""
-        #: Minimum size of the frame.
-        self._needed = 0
+        #: Why the frame is not complete.
+        self._missing = Missing()
 
     def take(self, byte: int) -> Iterator[Event]:
         """Search for a preamble, or collect a frame."""
@@ -136,16 +136,16 @@ class HuntingReceiver(Receiver):
             return
         marks, self._marks = self._marks, 0
         if marks >= 2:
-            self._raw, self._needed = bytes((self._mark, self._mark, byte)), 0
+            self._raw, self._missing = bytes((self._mark, self._mark, byte)), Missing()
             yield from self._inside()
 
     def _inside(self) -> Iterator[Event]:
-        if len(self._raw) < self._needed:
+        if self._missing.still(self._raw):
             return
         try:
             taken = self._reader.read(self._raw, hunting=True)
         except Missing as missing:
-            self._needed = missing.size
+            self._missing = missing.with_traceback(None)
             return
         except BadFrame as bad:
             aborted = bad.kind == "truncated"
@@ -175,18 +175,18 @@ class RescanningReceiver(Receiver):
         self._reader = FrameReader(plan.frame, self.known, direction)
         self._longest = plan.frame.envelopes[direction].max_frame
         self._buffer, self._skipped, self._due = b"", b"", b""
-        #: Minimum size of the frame that may start the buffer.
-        self._needed = 0
+        #: Why the frame that may begin the buffer is not complete.
+        self._missing = Missing()
 
     def take(self, byte: int) -> Iterator[Event]:
         """Buffer the byte and search for frames."""
         self._buffer += bytes((byte,))
-        if len(self._buffer) >= self._needed:
+        if not self._missing.still(self._buffer):
             yield from self._scan()
 
     def _scan(self) -> Iterator[Event]:
         while self._buffer:
-            self._needed = 0
+            self._missing = Missing()
             due, self._due = self._due, b""
             if due and self._buffer[:1] == due:
                 self._buffer = self._buffer[1:]
@@ -195,7 +195,7 @@ class RescanningReceiver(Receiver):
                 taken = self._reader.read(self._buffer)
             except Missing as missing:
                 if not self.ended:
-                    self._needed = missing.size
+                    self._missing = missing.with_traceback(None)
                     return
                 yield from self._drop("", b"")
             except Astray:
@@ -247,7 +247,7 @@ class RescanningReceiver(Receiver):
             self._buffer = self._buffer[1:]
         yield from self._scan()
         yield from self._report(self.taken)
-        self._buffer, self._due, self._needed = b"", b"", 0
+        self._buffer, self._due, self._missing = b"", b"", Missing()
 
 
 class MarkReceiver(Receiver):
