@@ -61,11 +61,12 @@ class Running:
         self.firmware.stop()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def firmware_line(build_firmware: BuildFirmware) -> Iterator[FirmwareLines]:
     """Return a function that gives the line to the Q.link node of a port.
 
-    It runs once for each worker, for all tests: whoever uses it configures it first.
+    It runs once for each module of tests, for all of them: a test configures it first. It ends with the
+    module, as an idle emulator takes processor time from other tests.
     """
     running: dict[str, Running] = {}
 
