@@ -248,8 +248,8 @@ def agree(protocol: Protocol) -> None:
     """Random values of every message are the same frame in Python and construct; calls can be made."""
     module, live, codec = python.load(protocol), construct.live(protocol), Codec(plan_of(protocol))
     loaded(protocol, module)
-    for path, text in construct.generate(protocol, Options()).items():
-        compile(text, path, "exec")
+    for text in construct.generate(protocol, Options()).values():
+        compiles(text)
     address, requests = protocol.address_name, dict[str, bytes]()
     for message in codec.plan.messages:
         raw = choice.random(Chance(message.name)).values(message.payload)
@@ -272,6 +272,12 @@ def agree(protocol: Protocol) -> None:
             naming.record_key(name): value for name, value in place.items()
         }
         assert parsed["message"] == message.name
+
+
+@cache
+def compiles(text: str) -> None:
+    """Compile a module, once where it is the same for all protocols."""
+    compile(text, "<generated>", "exec")
 
 
 def native_of(value: Value, raw: Raw) -> object:
