@@ -143,7 +143,7 @@ def groups() -> Iterator[Group]:
 
 
 GROUPS = tuple(groups())
-#: Few enough to compile: every kind alone, and every common one in front of every other.
+#: Few enough to compile: every kind alone, and every common one before every other.
 COMPILED = (
     Group("alone", tuple(LAYOUTS["alone"])),
     Group("chains", tuple(chains(COMMON, 4)), LENGTH, "little"),
@@ -151,7 +151,13 @@ COMPILED = (
 SANITIZED = ("-O0", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 EDGES: tuple[Edge, ...] = ("least", "most", "any")
 
-every_group = pytest.mark.parametrize("group", GROUPS, ids=str)
+#: With this scope the tests of one group run in a row, and mostly in the worker that has made its outputs.
+every_group = pytest.mark.parametrize(
+    "group",
+    [pytest.param(group, marks=() if group.name == "alone from 0" else pytest.mark.slow) for group in GROUPS],
+    ids=str,
+    scope="module",
+)
 
 
 @contextmanager
