@@ -13,12 +13,6 @@ from collections.abc import Iterable
 from qlinkgen.model.texts import escaped, one_line, visible
 
 _QUOTES = re.compile('"{3,}|"$')
-#: Strings of generated code and its comments; f-strings are kept, for the names in them.
-_SAID = re.compile(
-    r'(?P<kept>\bf"(?:[^"\\\n]|\\.)*")|"""(?:[^"\\]|\\.|"(?!""))*"""|b?"(?:[^"\\\n]|\\.)*"'
-    r"|b?'(?:[^'\\\n]|\\.)*'|#[^\n]*",
-    re.DOTALL,
-)
 
 
 def literal(text: str) -> str:
@@ -53,8 +47,3 @@ def _in_docstring(line: str) -> str:
 def comment(text: str, width: int) -> list[str]:
     """The text of comments of at most ``width`` characters each, without their marks."""
     return textwrap.wrap(one_line(text), width)
-
-
-def bare(code: str) -> str:
-    """Generated code without its strings and comments: the names that it uses are in it, and no text."""
-    return _SAID.sub(lambda found: found["kept"] or '""', code)
