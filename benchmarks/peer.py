@@ -35,7 +35,7 @@ class Peer:
 
 def load(package: str, install: str = "") -> ModuleType:
     """Import what is not a dependency of the project."""
-    if importlib.util.find_spec(package) is None:
+    if importlib.util.find_spec(package.partition(".")[0]) is None:  # find_spec imports parents
         raise PeerMissing(f"{package} is not installed (pip install {install or package})")
     return importlib.import_module(package)
 
