@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from decimal import Context, Decimal
 from fractions import Fraction
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, byte_chunks, group_chunks
 from qlinkgen.model.texts import Text
@@ -63,6 +63,7 @@ class NamedValue:
 class Enum:
     """Named numbers. A number without a name is legal."""
 
+    kind: ClassVar = "enum"
     name: str
     bits: int
     members: tuple[NamedValue, ...]
@@ -78,6 +79,7 @@ class Enum:
 class Flags:
     """Named bits of an integer; ``NamedValue.value`` is the bit's number. Other bits are reserved."""
 
+    kind: ClassVar = "flags"
     name: str
     bits: int
     members: tuple[NamedValue, ...]

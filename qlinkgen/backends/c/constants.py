@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import assert_never
 
 from qlinkgen.backends import c_text
 from qlinkgen.backends.c.names import Names, bracketed, integer_type, literal, unsigned
@@ -60,15 +61,14 @@ def _all(protocol: Protocol) -> list[Enum | Flags]:
 
 
 def _view(each: Enum | Flags, names: Names) -> EnumView:
-    is_enum, signed = isinstance(each, Enum), _is_signed(each)
-    kind = "Enum" if is_enum else "Flags"
+    signed = _is_signed(each)
     section = f" (section {each.section})" if each.section else ""
     doc = f": {each.doc}" if each.doc else ""
     return EnumView(
         name=names.constants(each),
-        is_enum=is_enum,
+        is_enum=each.kind == "enum",
         type=constant_type(each),
-        title=c_text.comment_line(f"{kind} {each.name}{section}{doc}"),
+        title=c_text.comment_line(f"{each.kind.capitalize()} {each.name}{section}{doc}"),
         members=[
             ConstantView(
                 name=member.name,
@@ -87,10 +87,14 @@ def constant_type(each: Enum | Flags) -> str:
 
 
 def _is_signed(each: Enum | Flags) -> bool:
-    return isinstance(each, Enum) and any(member.value < 0 for member in each.members)
+    return any(member.value < 0 for member in each.members)  # the bit of a flag has no sign
 
 
 def _number(member: NamedValue, each: Enum | Flags, *, signed: bool) -> str:
-    if isinstance(each, Flags):
-        return unsigned(1 << member.value, each.bits, hexadecimal=True)
-    return bracketed(literal(member.value, each.bits, signed=signed))
+    match each:
+        case Flags():
+            return unsigned(1 << member.value, each.bits, hexadecimal=True)
+        case Enum():
+            return bracketed(literal(member.value, each.bits, signed=signed))
+        case _:
+            assert_never(each)

@@ -114,8 +114,13 @@ def _facts(scalar: Scalar) -> list[str]:
         facts.append(f"in {scalar.unit}")
     if not scalar.full_range and scalar.meaning != "bool":
         facts.append(f"{scalar.minimum}..{scalar.maximum}")
-    if isinstance(scalar.meaning, Enum | Flags):
-        facts.append(f"{'enum' if isinstance(scalar.meaning, Enum) else 'flags'} {scalar.meaning.name}")
+    match scalar.meaning:
+        case Enum() | Flags():
+            facts.append(f"{scalar.meaning.kind} {scalar.meaning.name}")
+        case "bool" | None:
+            pass
+        case _:
+            assert_never(scalar.meaning)
     return facts
 
 

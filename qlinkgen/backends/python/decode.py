@@ -486,7 +486,13 @@ def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) ->
 
 def _is_plain(number: Scalar) -> bool:
     """The attribute holds the number on the wire."""
-    return number.scaling is None and (number.meaning is None or isinstance(number.meaning, Flags))
+    match number.meaning:
+        case Flags() | None:
+            return number.scaling is None
+        case Enum() | "bool":
+            return False
+        case _:
+            assert_never(number.meaning)
 
 
 def _expected(count: CountStep) -> str:

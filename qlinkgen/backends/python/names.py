@@ -26,11 +26,7 @@ def constant_classes(plan: Plan) -> Mapping[str, str]:
     """Class of each enum and flags; one whose name a message has is told apart by what it is."""
     messages = frozenset(class_name(message) for message in plan.messages)
     groups: list[Enum | Flags] = [*plan.protocol.enums, *plan.protocol.flags]
-    return {each.name: naming.constant_class(each.name, _kind(each), messages) for each in groups}
-
-
-def _kind(each: Enum | Flags) -> str:
-    return "enum" if isinstance(each, Enum) else "flags"
+    return {each.name: naming.constant_class(each.name, each.kind, messages) for each in groups}
 
 
 def constant_name(name: str) -> str:

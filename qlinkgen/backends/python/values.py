@@ -12,7 +12,7 @@ from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.message import Value
 from qlinkgen.model.types import Enum, Flags, Scalar
-from qlinkgen.model.values import native_from_raw
+from qlinkgen.model.values import Native, native_from_raw
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -55,11 +55,15 @@ def annotation(each: Settable, place: Place) -> str:
 
 
 def _number_type(number: Scalar, place: Place) -> str:
-    if isinstance(number.meaning, Enum):
-        return f"{place.classes[number.meaning.name]} | int"
-    if number.meaning == "bool":
-        return "bool"
-    return place.use("Decimal") if number.number == "decimal" else number.number
+    match number.meaning:
+        case Enum() as enum:
+            return f"{place.classes[enum.name]} | int"
+        case "bool":
+            return "bool"
+        case Flags() | None:
+            return place.use("Decimal") if number.number == "decimal" else number.number
+        case _:
+            assert_never(number.meaning)
 
 
 def argument(each: Settable, place: Place) -> str:
@@ -103,15 +107,23 @@ def default(each: Settable, place: Place) -> str:
 
 
 def _default_number(number: Scalar, place: Place) -> str:
-    native = native_from_raw(number, number.default)
-    if isinstance(number.meaning, Enum) and (name := number.meaning.name_of(number.default)):
-        return f"{place.classes[number.meaning.name]}.{name.upper()}"
-    if isinstance(number.meaning, Flags) and number.default:
-        return f"0x{number.default:X}"
-    if isinstance(native, Decimal):
-        whole = native == native.to_integral_value()
-        return f"Decimal({native})" if whole else f'Decimal("{native}")'
-    return repr(native)
+    match number.meaning:
+        case Enum() as enum:
+            member = enum.name_of(number.default)
+            return f"{place.classes[enum.name]}.{member.upper()}" if member else str(number.default)
+        case Flags():
+            return f"0x{number.default:X}" if number.default else "0"
+        case "bool" | None:
+            return _native(native_from_raw(number, number.default))
+        case _:
+            assert_never(number.meaning)
+
+
+def _native(value: Native) -> str:
+    if isinstance(value, Decimal):
+        whole = value == value.to_integral_value()
+        return f"Decimal({value})" if whole else f'Decimal("{value}")'
+    return repr(value)
 
 
 # Scales and rules
@@ -175,9 +187,13 @@ def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, 
     name = attribute(field)
     if number.scaling is not None:
         return _rule(place, "ScaledRule", name, scales[field], unit=number.unit)
-    if isinstance(number.meaning, Flags) and number.meaning.reserved_zero:
-        return _rule(place, "MaskRule", name, f"0x{number.meaning.mask:X}")
-    return _rule(place, "IntRule", name, number.minimum, number.maximum, unit=number.unit)
+    match number.meaning:
+        case Flags(reserved_zero=True) as flags:
+            return _rule(place, "MaskRule", name, f"0x{flags.mask:X}")
+        case Flags() | Enum() | "bool" | None:
+            return _rule(place, "IntRule", name, number.minimum, number.maximum, unit=number.unit)
+        case _:
+            assert_never(number.meaning)
 
 
 # Descriptions
@@ -210,10 +226,15 @@ def _facts(each: Settable, place: Place) -> str:
 
 
 def _number_facts(number: Scalar, place: Place) -> str:
-    if isinstance(number.meaning, Flags):
-        return f"masks of {place.classes[number.meaning.name]}"
-    if number.meaning is not None:
-        return ""
+    match number.meaning:
+        case Flags() as flags:
+            return f"masks of {place.classes[flags.name]}"
+        case Enum() | "bool":
+            return ""
+        case None:
+            pass
+        case _:
+            assert_never(number.meaning)
     low, high = sorted((number.physical(number.minimum), number.physical(number.maximum)))
     step = f" in steps of {number.scaling.scale}" if number.scaling else ""
     return f"{low}..{high}{_of(number)}{step}"
