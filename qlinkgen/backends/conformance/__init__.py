@@ -1,8 +1,8 @@
-"""Conformance kits: one C program for each protocol that holds a header against the vectors, on any target.
+"""Conformance kits: a C program for each protocol that tests a header with the vectors, on any target.
 
-It prints TAP and needs nothing but the header. What a stream brings is what the plan's receivers say. The
-header's names and the vectors are arguments, as back-ends do not know each other: ``generate(protocol,
-options, sources)``.
+It prints TAP and needs only the header. The receiver of the plan determines the expected events of a stream.
+Names of the header and vectors are passed as arguments, because back-ends do not depend on each other:
+``generate(protocol, options, sources)``.
 """
 
 from __future__ import annotations

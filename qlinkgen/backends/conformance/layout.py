@@ -1,4 +1,4 @@
-"""Bytes and comments as lines of C."""
+"""Lays out bytes and comments as lines of C."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from qlinkgen.backends import c_text
 
-#: Columns, the indentation of a table not counted.
+#: Line length without the indentation of tables.
 WIDTH = 112
 
 
@@ -22,7 +22,7 @@ def wrapped(text: str) -> list[str]:
 
 
 def comment(text: str) -> list[str]:
-    """A comment of its own, none where there is nothing to say."""
+    """A separate comment, empty for an empty text."""
     lines = wrapped(text)
     if not lines:
         return []
@@ -31,12 +31,12 @@ def comment(text: str) -> list[str]:
 
 
 def folded(text: str) -> list[str]:
-    """A list that may need several lines."""
+    """A list in one or more lines."""
     return textwrap.wrap(text, WIDTH, break_long_words=False, break_on_hyphens=False)
 
 
 def row_lines(pieces: Sequence[str]) -> list[str]:
-    """One line where all pieces of a row fit, or else a line for each; what is still too long is folded."""
+    """The pieces of a row in one line if they fit, otherwise a line each; long pieces are folded."""
     one = " ".join(pieces)
     if len(one) <= WIDTH:
         return [one]
@@ -45,7 +45,7 @@ def row_lines(pieces: Sequence[str]) -> list[str]:
 
 
 def call(text: str) -> list[str]:
-    """A call that is broken behind its opening parenthesis where it is too long."""
+    """A call, with a line break after the opening parenthesis if it is too long."""
     if len(text) <= WIDTH:
         return [text]
     head, arguments = text.split("(", 1)

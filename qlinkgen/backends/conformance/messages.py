@@ -1,4 +1,4 @@
-"""Everything that a kit says of its messages: names, tables, and how many tests they come to."""
+"""The messages of a kit: names, tables and numbers of tests."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _RANGE = "range"
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What a slave sends for a message."""
+    """The response of a slave to a message."""
 
     number: int
     stem: str
@@ -40,10 +40,10 @@ class Entry:
     """A message.
 
     Attributes:
-        members: those of its struct, in the order of the vectors' values.
-        framed: it is taken apart without being told which message it is.
-        taken_as: the direction in which it is heard.
-        received: it has a stream, which may be ``noisy``.
+        members: members of its struct, in the order of values in vectors.
+        framed: its frame identifies the message.
+        taken_as: the direction in which it is received.
+        received: whether it has a stream, which may be ``noisy``.
         lines: its rows.
         unsent_lines: rows that an encoder refuses.
         tests: their number; ``asked_tests`` and ``told_tests`` are those of slave and listener.
@@ -79,7 +79,7 @@ class Entry:
 
     @property
     def entry_lines(self) -> list[str]:
-        """The message in the table of messages."""
+        """The row of the table of messages."""
         stem, answer = self.stem, self.answer or self
         numbers_of = (answer.number, self.tests, self.asked_tests, self.told_tests, len(self.members))
         facts = (self.is_response, self.received, self.noisy)
@@ -99,7 +99,7 @@ class Entry:
 
 
 class Entries:
-    """Lowers the messages that are kept, in schema order."""
+    """Converts the selected messages to views, in schema order."""
 
     def __init__(self, plan: Plan, header: Header, rows: Mapping[str, Sequence[Row]]) -> None:
         """``rows`` are the vectors of each message."""
@@ -109,27 +109,27 @@ class Entries:
         self._numbers = {message.name: number for number, message in enumerate(plan.messages)}
         self._streams = {each.name: streams.stream(plan, each, rows[each.name]) for each in plan.messages}
         most = max(size for each in rows.values() for row in each for size in _sizes(row))
-        #: Bytes that say how long a part of a row is.
+        #: Size of the length of each part of a row.
         self.size_bytes = 1 if most <= 0xFF else 2 if most <= 0xFFFF else 3
 
     @property
     def most_events(self) -> int:
-        """Most events that a row of a stream brings."""
+        """Maximum number of events of a row of a stream."""
         found = [each.events for each in self._streams.values() if each]
         return max((len(events) for each in found for events in each if events is not None), default=0)
 
     def views(self) -> list[Entry]:
-        """Each message for the templates."""
+        """The views of all messages."""
         return [self._view(message) for message in self._plan.messages]
 
-    # Who does what
+    # Roles
 
     def _asked(self, message: MessagePlan) -> bool:
-        """A slave has a function for it."""
+        """Whether a slave has a function for it."""
         return "request" in self._plan.heard and message.direction != "response"
 
     def _told(self, message: MessagePlan) -> bool:
-        """A listener has a function for it."""
+        """Whether a listener has a function for it."""
         listens = self._plan.heard != ("request",)
         return bool(self._header.listener) and listens and message.direction != "request"
 
@@ -185,7 +185,7 @@ class Entries:
         )
 
     def _tests(self, plan: MessagePlan, rows: Sequence[Row], found: Stream | None) -> int:
-        """Tests of making, taking apart and receiving."""
+        """Number of tests of encoding, decoding and receiving."""
         sent = sum(isinstance(row, Right) and not row.decode_only for row in rows)
         fed = sum(each is not None for each in found.events) if found else 0
         return fed + (sent if plan.encoded else 0) + (len(rows) if plan.decoded else 0)
@@ -219,7 +219,7 @@ class Entries:
     # Rows
 
     def _lines(self, row: Row, found: Stream | None, index: int) -> list[str]:
-        """A row of the table, with a comment where there is more to say than its first byte does."""
+        """A row of the table, with a comment if its first byte does not describe it."""
         pieces = [self._head(row)]
         if isinstance(row, Right) and row.message.values:
             pieces.append(self._sized(row.values))

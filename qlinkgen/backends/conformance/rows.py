@@ -1,4 +1,4 @@
-"""Vectors as the kit holds them: the values of the C struct as bytes, and the frame."""
+"""Vectors of the kit: the values of the C struct as bytes, and the frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueSt
 
 @dataclass(frozen=True, slots=True)
 class Right:
-    """A frame as it should be. ``values`` are those of the struct, numbers with the high byte first."""
+    """A valid frame. ``values`` are the values of the struct, numbers big-endian."""
 
     message: Message
     kinds: tuple[str, ...]
@@ -26,20 +26,20 @@ class Right:
     payload: bytes
     wire: bytes
     request: bytes = b""
-    #: It is understood, but never sent.
+    #: It is decoded but never sent.
     decode_only: bool = False
-    #: Where it comes from, for a vector that was worked out by hand.
+    #: Source of a vector worked out by hand.
     source: str = ""
 
     @property
     def by_hand(self) -> bool:
-        """People worked it out; what is generated is of a kind."""
+        """Whether it was worked out by hand; generated vectors have kinds."""
         return not self.kinds
 
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
-    """A frame that is refused, and why."""
+    """A frame that must be rejected, and the reason."""
 
     message: Message
     kind: str
@@ -51,7 +51,7 @@ class Wrong:
 
     @property
     def by_hand(self) -> bool:
-        """People worked it out; what is generated says what is wrong."""
+        """Whether it was worked out by hand; generated faults have a description."""
         return not self.what
 
 
@@ -59,9 +59,9 @@ Row = Right | Wrong
 
 
 def rows_of(plan: Plan, sources: Sources) -> dict[str, list[Row]]:
-    """Every vector by the full name of its message; the wrong ones are mixed with the right ones.
+    """Vectors by the full name of their message, wrong ones among valid ones.
 
-    The last one of a message is right: after it nothing is left in a receiver.
+    The last vector of a message is valid, so that the receiver is empty after it.
     """
     right: dict[str, list[Right]] = {message.name: [] for message in plan.messages}
     wrong: dict[str, list[Wrong]] = {message.name: [] for message in plan.messages}
@@ -120,12 +120,12 @@ def _source(entry: JsonObject) -> str:
 
 
 def most_values(header: Header, message: MessagePlan) -> int:
-    """Most bytes that the values of a message have."""
+    """Maximum size of the values of a message."""
     return sum(_most(header, step) for step in message.payload.settable)
 
 
 def value_sizes(header: Header, message: MessagePlan, right: Right) -> list[int]:
-    """Bytes of each value in a vector of a message."""
+    """Size of each value in a vector of a message."""
     sizes: list[int] = []
     for step in message.payload.settable:
         match step:
@@ -152,12 +152,12 @@ def _most(header: Header, step: ValueStep | Member | RunStep) -> int:
 
 
 def _counted(header: Header, run: RunStep) -> int:
-    """Bytes of the struct member that counts a run, 0 where its size is always the same."""
+    """Size of the struct member that counts a run, 0 if its size is constant."""
     return 0 if run.fixed else header.count_width(run.length.maximum)
 
 
 def _item(header: Header, run: RunStep) -> int:
-    """Bytes of an item of a run in the struct."""
+    """Size of an item of a run in the struct."""
     match run:
         case BytesStep():
             return 1
@@ -168,7 +168,7 @@ def _item(header: Header, run: RunStep) -> int:
 
 
 def _value(header: Header, value: Value, step: ValueStep | Member | RunStep, entry: JsonObject) -> bytes:
-    """One value: a number, or a count where it varies and the items."""
+    """One value: a number, or the items of a run with their count if it varies."""
     native = _native(value, entry)
     match step:
         case ValueStep() | Member():
@@ -188,7 +188,7 @@ def _value(header: Header, value: Value, step: ValueStep | Member | RunStep, ent
 
 
 def _native(value: Value, entry: JsonObject) -> Native:
-    """What the entry says, or else the default."""
+    """The value of an entry, or the default."""
     if value.name not in entry["fields"]:
         return default_of(value)
     given = entry["fields"][value.name]
@@ -196,12 +196,12 @@ def _native(value: Value, entry: JsonObject) -> Native:
 
 
 def number_bytes(raw: int, width: int) -> bytes:
-    """A number of a vector: its high byte first."""
+    """A big-endian number of a vector."""
     return (raw & (1 << 8 * width) - 1).to_bytes(width, "big")
 
 
 def kinds_in(rows: Mapping[str, Sequence[Row]]) -> Iterator[str]:
-    """Names of the kinds of generated vectors, in order of their first use."""
+    """Names of the kinds of generated vectors, in order of first use."""
     yield from dict.fromkeys(
         kind for each in rows.values() for row in each if isinstance(row, Right) for kind in row.kinds
     )

@@ -1,4 +1,4 @@
-"""What the kit is made of beside the plan: arguments all, as back-ends do not know each other."""
+"""Inputs of the kit in addition to the plan; arguments, because back-ends do not depend on each other."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from typing import Any
 from qlinkgen.model.message import Field, Message
 from qlinkgen.model.types import Scalar
 
-#: A document of vectors or one line of it. Any: what an entry holds depends on its message.
+#: A document of vectors or one line of it. Any: the entries depend on the message.
 JsonObject = Mapping[str, Any]
 
 
 class Header(typing.Protocol):
-    """The header that the kit is compiled with: its names, and the habits of its frame."""
+    """The interface of the header under test: names and properties of its frame."""
 
     @property
     def prefix(self) -> str:
-        """What functions and types begin with."""
+        """Prefix of functions and types."""
         ...
 
     @property
     def upper(self) -> str:
-        """What macros begin with."""
+        """Prefix of macros."""
         ...
 
     @property
@@ -39,80 +39,80 @@ class Header(typing.Protocol):
 
     @property
     def address(self) -> str:
-        """Member of the frame that holds the address, "" where there is none."""
+        """Member of the frame that holds the address, "" if there is none."""
         ...
 
     @property
     def address_bits(self) -> int:
-        """Width of its C type, 0 where there is none."""
+        """Width of its C type, 0 if there is none."""
         ...
 
     @property
     def directed(self) -> bool:
-        """Taking frames apart and receiving are told which direction is expected."""
+        """Whether decoding and receiving frames need the expected direction."""
         ...
 
     @property
     def unpacks(self) -> bool:
-        """Taking a frame apart needs a buffer."""
+        """Whether decoding a frame needs a buffer."""
         ...
 
     @property
     def listener(self) -> str:
-        """What the struct is called that is told of messages, "" where there is none."""
+        """Name of the struct that receives messages, "" if there is none."""
         ...
 
     @property
     def sum_bits(self) -> int:
-        """Width of the part of an answer's check value that its request makes, 0 where there is none."""
+        """Width of the sum of a request in the check value of its response, 0 if there is none."""
         ...
 
     @property
     def check_bits(self) -> int:
-        """Width of the check value's functions, 0 where there are none."""
+        """Width of the functions of the check value, 0 if there are none."""
         ...
 
     def stem(self, message: Message) -> str:
-        """A message's part of a name."""
+        """The part of names that identifies a message."""
         ...
 
     def function(self, message: Message) -> str:
-        """What a message's functions and its struct begin with."""
+        """Prefix of the functions and the struct of a message."""
         ...
 
     def constant(self, message: Message) -> str:
-        """What a message's macros begin with."""
+        """Prefix of the macros of a message."""
         ...
 
     def count_member(self, field: Field) -> str:
-        """The struct member that says how much of a field of variable size there is."""
+        """The struct member with the number of items of a field of variable size."""
         ...
 
     def slave_member(self, message: Message) -> str:
-        """The member of the slave's struct that handles a request."""
+        """The member of the slave struct that handles a request."""
         ...
 
     def told_member(self, message: Message) -> str:
-        """The member of the listener's struct that is told of a message."""
+        """The member of the listener struct that handles a message."""
         ...
 
     def width(self, scalar: Scalar) -> int:
-        """Bytes of the struct member of an integer."""
+        """Size of the struct member of an integer."""
         ...
 
     def count_width(self, most: int) -> int:
-        """Bytes of the struct member that counts up to ``most``."""
+        """Size of the struct member that counts up to ``most``."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """Everything that the kit states, and what it is written against.
+    """The vectors and the header of a kit.
 
     Attributes:
         header: the header.
         generated: vectors as the target `vectors` writes them: ``vectors`` and ``faults``.
-        by_hand: vectors that people worked out, in the form of schemas/vectors; {} where there are none.
+        by_hand: vectors worked out by hand, in the format of schemas/vectors; {} if there are none.
     """
 
     header: Header

@@ -1,6 +1,6 @@
-"""The stream of a message: its vectors, right and wrong, one after the other with noise between them.
+"""The stream of a message: its valid and wrong vectors with noise between them.
 
-What a receiver tells of it is what the plan's receiver says.
+The receiver of the plan determines the expected events.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from qlinkgen.plan.codec import Decoded
 from qlinkgen.plan.framing import Hunt, InStep, MarkPart, Marks, Rescan
 from qlinkgen.plan.receive import receiver
 
-#: The word for an event that is an intact frame.
+#: The event of an intact frame.
 INTACT = "intact"
-#: Most events that a row of the kit can hold.
+#: Maximum number of events of a row.
 _MOST_EVENTS = 0xFE
 
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What a receiver tells of a message's rows, one after the other.
+    """The expected events for the rows of a message.
 
     Attributes:
-        noisy: a piece of noise precedes each row that is fed, see :func:`noise`.
-        events: for each row the words of what it completes, "intact" or the kind of a fault; None for a row
-            that is left out.
+        noisy: whether a piece of noise precedes each row, see :func:`noise`.
+        events: for each row the events that it completes, "intact" or the kind of a fault; None for an
+            omitted row.
     """
 
     noisy: bool
@@ -37,7 +37,7 @@ class Stream:
 
 
 def noise(plan: Plan) -> tuple[bytes, ...]:
-    """Pieces that are sent between frames, in turn: bytes that begin no frame, or begin one in vain."""
+    """Noise between frames: bytes that do not begin a frame, or begin one without completing it."""
     envelope, strategy = plan.frame.envelopes[plan.heard[0]], plan.frame.receiver
     match strategy:
         case Hunt() | Rescan():
@@ -56,10 +56,10 @@ def noise(plan: Plan) -> tuple[bytes, ...]:
 
 
 def stream(plan: Plan, message: MessagePlan, rows: Sequence[Row]) -> Stream | None:
-    """The stream of a message, with as much noise and as many broken frames as its frames stand out of.
+    """The stream of a message, with noise and wrong frames as far as its frames remain detectable.
 
-    Where nothing but an id tells a frame from noise, they can become one with it. None where nothing receives
-    the message, or where not even frame after frame is heard as they were sent.
+    If only an id distinguishes frames from noise, noise can become part of a frame. Returns None for a
+    message that is not received, or if not even consecutive frames are received as sent.
     """
     if not message.decoded or (plan.frame.needs_request and message.direction == "response"):
         return None
@@ -71,7 +71,7 @@ def stream(plan: Plan, message: MessagePlan, rows: Sequence[Row]) -> Stream | No
 
 
 def fed(plan: Plan, direction: Direction, wire: bytes) -> bool:
-    """A wrong frame can be part of a stream: no right one is in it, and a receiver gets over it."""
+    """Whether a wrong frame can be part of a stream: it contains no valid frame, and receivers recover."""
     alone = receiver(plan, direction)
     heard = [event for byte in wire for event in alone.feed(byte)]
     left = list(alone.finish())

@@ -1,4 +1,4 @@
-"""What an encoder has to refuse: a value or an address one step out of its range, as far as C can hold it."""
+"""Values that an encoder must reject: one step out of range, as far as the C type can hold them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from qlinkgen.plan.payload import Member, ValueStep
 
 @dataclass(frozen=True, slots=True)
 class Unsent:
-    """Values that are not sent, and what is wrong with them."""
+    """Values that must be rejected, and the error."""
 
     what: str
     address: int
@@ -23,7 +23,7 @@ class Unsent:
 
 
 def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsent]:
-    """Each number of a message, and its address, out of range by one; all else is as in a right vector."""
+    """A valid vector with each number, and the address, out of range by one in turn."""
     at = 0
     for step, size in zip(message.payload.settable, value_sizes(header, message, right), strict=True):
         if isinstance(step, ValueStep | Member):
@@ -36,7 +36,7 @@ def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsen
 
 
 def _outside(scalar: Scalar, size: int) -> Iterator[int]:
-    """The nearest numbers out of range that the struct can hold; a bool holds none."""
+    """The nearest numbers out of range that the struct can hold; none for a bool."""
     if scalar.meaning == "bool":
         return
     least, most = (
