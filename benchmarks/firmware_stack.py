@@ -97,7 +97,7 @@ class CallGraph:
 
     def _through_pointers(self, function: Function) -> set[str]:
         if self.pointed_to is None:
-            raise UnknownDepth(f"{function.name} calls through a pointer, and nobody says where to")
+            raise UnknownDepth(f"{function.name} calls through a pointer to an unknown function")
         return set(self.pointed_to)
 
     def callers(self) -> Mapping[str, set[str]]:
@@ -139,8 +139,8 @@ def _functions(listing: str) -> dict[str, Function]:
                 place = _PLACE.search(match["operands"] or "")
                 at = int(place["address"], 16) if place else -1
                 to = names[bisect_right(starts, at) - 1] if place else ""
-                # A place inside the function is no call, even where the instruction is one: ARM goes far so,
-                # and AVR makes room on the stack, which the compiler has counted.
+                # A target inside the function is not a call, even with a call instruction: ARM uses it for
+                # far jumps, AVR to allocate stack, which the compiler has counted.
                 inside = to == function.name and at != int(head["start"], 16)
                 open_end = _take(function, match["mnemonic"], match["operands"] or "", "" if inside else to)
         if open_end and index + 1 < len(heads):

@@ -133,7 +133,7 @@ def test_everything_that_is_not_as_usual() -> None:
         "node 3 > master motor_position.response position=-7 [late, after N ms]",
         "node 3 > master motor_position.response position=-7 [second answer]",
         "node 9 > master motor_position.response position=1 [answers nothing]",
-        f"? damaged (crc) checksum 15 e9 was received, 15 e8 is right (crc-16/ibm-3740): {bad.hex(' ')}",
+        f"? damaged (crc) received checksum 15 e9, expected 15 e8 (crc-16/ibm-3740): {bad.hex(' ')}",
         "master > node 3 motor_position.request",
         "node 3 > master motor_position.response position=-7 [after N ms]",
     ]
@@ -151,7 +151,7 @@ def test_the_same_as_json() -> None:
         "kind": "crc",
         "offset": 0,
         "raw": bad.hex(),
-        "message": "checksum 15 e9 was received, 15 e8 is right (crc-16/ibm-3740)",
+        "message": "received checksum 15 e9, expected 15 e8 (crc-16/ibm-3740)",
     }
     assert (damaged["asked"], "message" in damaged) == (None, False)
     assert records([answer], "from", "to", "stray", "late", "fields") == [

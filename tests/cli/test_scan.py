@@ -70,7 +70,7 @@ def test_progress_on_a_terminal() -> None:
         (("x", "--nodes", "0-3"), 2, "nodes are 1..16"),
         (("x", "--slack", "-1"), 2, "--slack -1: no number of seconds"),
         (("x", "--slack", "nan"), 2, "--slack nan: no number of seconds"),
-        (("x", "--set", "crc=nope"), 2, "no 16-bit CRC is called 'nope'"),
+        (("x", "--set", "crc=nope"), 2, "unknown 16-bit CRC 'nope'"),
     ],
 )
 def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str) -> None:

@@ -166,7 +166,7 @@ def test_an_error_says_what_was_seen_the_rule_and_the_unit() -> None:
     with pytest.raises(qlink.EncodeError, match=r"segments: .* give a list of 0\.\.12 items"):
         qlink.MotionRequest(node=1, segments=[0] * 13).to_frame()
     with pytest.raises(
-        qlink.DecodeError, match=r"node_number: 17 was received; legal is a whole number, 1\.\.16"
+        qlink.DecodeError, match=r"node_number: received 17, expected a whole number, 1\.\.16"
     ) as caught:
         qlink.NodeSetupRequest.from_bytes(bytes((17, 0, 0, 0)))
     assert (caught.value.kind, caught.value.field, caught.value.offset) == ("range", "node_number", 0)

@@ -1,17 +1,17 @@
-"""What the generated protocol modules share: errors, messages, checksums, receivers.
+"""Common parts of generated modules: errors, rules, messages, checksums.
 
-Copied beside them as it is. Needs the standard library alone, and of it only what is cheap to import: `enum`
-would cost 6 ms, `dataclasses` 30.
+Copied next to them unchanged. Imports only modules of the standard library that load quickly: `enum` would
+cost 6 ms, `dataclasses` 30.
 """
 
 from __future__ import annotations
 
-from _operator import index  # built in; `operator` would be read from a file
+from _operator import index  # built in; `operator` is loaded from a file
 from binascii import crc_hqx
 from struct import error as struct_error
 
 TYPE_CHECKING = (
-    False  # the name is enough for type checkers; importing `typing` costs 5 ms
+    False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 )
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -19,14 +19,13 @@ if TYPE_CHECKING:
 
     AnyMessage = TypeVar("AnyMessage", bound="BaseMessage")
 
-    #: What a field may be given, or holds. Any: each rule asks of it what it needs, and the TypeError that
-    #: other values raise is how they are refused.
+    #: A value of a field. Any: a rule rejects values of the wrong type by the TypeError that they raise.
     Value = Any
-    #: Class of a message. Any: each has a constructor and rules of its own.
+    #: Class of a message. Any: each has its own constructor.
     MessageClass = type[Any]
-    #: Checksum of some bytes, beginning with a register.
+    #: Checksum of data, beginning with a register.
     Crc = Callable[[bytes, int], int]
-    #: What a decoder takes.
+    #: Input of a decoder.
     BytesLike = bytes | bytearray | memoryview
 
 
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
 
 
 class CodecError(ValueError):
-    """Something that cannot be encoded or decoded."""
+    """A value or a frame cannot be encoded or decoded."""
 
 
 class EncodeError(CodecError):
@@ -42,7 +41,7 @@ class EncodeError(CodecError):
 
     Attributes:
         field: name of the field.
-        value: what it holds.
+        value: its value.
     """
 
     def __init__(self, text: str, field: str = "", value: object = None) -> None:
@@ -56,13 +55,13 @@ class EncodeError(CodecError):
 
 
 class DecodeError(CodecError):
-    """Bytes that are no valid message or frame.
+    """Received bytes are not a valid message or frame.
 
     Attributes:
         kind: crc, stuffing, length, range, unknown, truncated, frame or illegal.
-        field: name of the field that is wrong, "" where it is none.
-        offset: place in `data`.
-        data: the bytes looked at: the payload where a field is wrong, else the frame.
+        field: name of the wrong field, "" for other errors.
+        offset: offset of the error in `data`.
+        data: the payload if a field is wrong, otherwise the frame.
     """
 
     def __init__(
@@ -80,14 +79,14 @@ class DecodeError(CodecError):
 
 
 class OutOfRange(ValueError):
-    """Raised inside an encoder; the caller sees an EncodeError that names the field."""
+    """Raised inside an encoder, which converts it to an EncodeError with the name of the field."""
 
 
 class LayoutError(LookupError):
-    """Raised inside a decoder: the bytes do not have the layout of the message."""
+    """Raised inside a decoder if the bytes do not have the layout of the message."""
 
 
-#: Raised inside an encoder by a value of the wrong type or out of range.
+#: Exceptions inside an encoder for a value of the wrong type or out of range.
 REFUSALS = (
     struct_error,
     TypeError,
@@ -96,20 +95,20 @@ REFUSALS = (
     AttributeError,
     LookupError,
 )
-#: Raised inside a decoder by bytes that are not the message that they seem to be.
+#: Exceptions inside a decoder for an invalid message.
 UNREAD = (struct_error, LookupError, CodecError)
-#: Raised besides where the argument may be anything.
+#: Exceptions inside a decoder for arguments of any type.
 UNREADABLE = (*UNREAD, TypeError, BufferError, NotImplementedError)
 
 
 class Fault:
-    """A bad stretch of a stream.
+    """Invalid bytes in a stream.
 
     Attributes:
         kind: as in DecodeError.
-        offset: place of its first byte in the stream.
-        raw: its bytes as they came.
-        message: what is wrong, for people.
+        offset: offset of its first byte in the stream.
+        raw: its bytes as received.
+        message: error text.
     """
 
     __slots__ = ("kind", "message", "offset", "raw")
@@ -121,7 +120,7 @@ class Fault:
         self.message = message
 
     def __eq__(self, other: object) -> bool:
-        """Same kind, place and bytes; the wording does not count."""
+        """Compare kind, offset and bytes, not the text."""
         if not isinstance(other, Fault):
             return NotImplemented
         return (self.kind, self.offset, self.raw) == (
@@ -135,12 +134,12 @@ class Fault:
 
 
 class Counters:
-    """What a stream decoder has seen.
+    """Counters of a stream decoder.
 
     Attributes:
-        frames: messages handed out.
-        faults: faults handed out, by kind.
-        skipped: bytes in no frame and no fault.
+        frames: number of messages.
+        faults: number of faults by kind.
+        skipped: number of bytes outside of frames and faults.
     """
 
     __slots__ = ("faults", "frames", "skipped")
@@ -154,11 +153,11 @@ class Counters:
         return f"Counters(frames={self.frames}, faults={self.faults}, skipped={self.skipped})"
 
 
-# What a value may be: the cold side of the encoders and decoders --------------------------------------------
+# Rules for values, used after an encoder or decoder has failed ----------------------------------------------
 
 
 def shown(value: object) -> str:
-    """A value for an error text, whatever it is."""
+    """A value for an error text."""
     try:
         text = repr(value)
     except ValueError:  # an int of thousands of digits
@@ -167,12 +166,12 @@ def shown(value: object) -> str:
 
 
 class Rule:
-    """What one field may hold, in words and as a check.
+    """The legal values of a field, as text and as a check.
 
     Attributes:
         name: name of the field.
-        legal: the rule, for error texts.
-        settable: the field is an attribute of the message.
+        legal: description of legal values, for error texts.
+        settable: whether the field is an attribute of the message.
     """
 
     __slots__ = ("legal", "name")
@@ -184,15 +183,15 @@ class Rule:
         self.legal = legal
 
     def allows(self, value: Value) -> bool:
-        """The value can be sent. May raise any of REFUSALS instead."""
+        """Whether the value can be sent. May raise any of REFUSALS instead."""
         raise NotImplementedError
 
     def plain(self, value: Value) -> Value:
-        """The value as encoders take it: an int for what only has the value of one."""
+        """The value converted to the types that encoders accept, such as int."""
         return value
 
     def complaint(self, value: object) -> str:
-        """What is wrong with a value, "" where nothing is."""
+        """The error text for a value, "" if it is legal."""
         try:
             allowed = self.allows(value)
         except REFUSALS:
@@ -205,7 +204,7 @@ class Rule:
 
 
 class IntRule(Rule):
-    """A whole number between two bounds, in several ranges if more bounds follow."""
+    """A whole number in a range, or in one of several if more bounds are given."""
 
     __slots__ = ("ranges",)
 
@@ -221,12 +220,12 @@ class IntRule(Rule):
         super().__init__(name, f"a whole number, {words}{unit and ' '}{unit}")
 
     def allows(self, value: Value) -> bool:
-        """The value is an integer (or has the value of one) in range."""
+        """Whether the value is or converts to an integer in range."""
         number = index(value)
         return any(first <= number <= last for first, last in self.ranges)
 
     def plain(self, value: Value) -> int:
-        """An int."""
+        """The value as an int."""
         return index(value)
 
 
@@ -240,16 +239,16 @@ class MaskRule(Rule):
         super().__init__(name, f"bits of {mask:#x} only")
 
     def allows(self, value: Value) -> bool:
-        """The value has no other bits."""
+        """Whether all other bits are zero."""
         return index(value) & ~self.mask == 0
 
     def plain(self, value: Value) -> int:
-        """An int."""
+        """The value as an int."""
         return index(value)
 
 
 class ConstantRule(Rule):
-    """A number that is always sent, and must be received as it is."""
+    """A constant number; other received numbers are illegal."""
 
     __slots__ = ()
 
@@ -262,7 +261,7 @@ class ConstantRule(Rule):
 
 
 class CountRule(Rule):
-    """A number that says how long another field is."""
+    """The size of another field."""
 
     __slots__ = ()
 
@@ -288,13 +287,13 @@ class ArrayRule(Rule):
         )
 
     def allows(self, value: Value) -> bool:
-        """The value has so many items, all in range."""
+        """Whether the number of items is legal, and all items are in range."""
         return self.fewest <= len(value) <= self.most and all(
             self.item.allows(item) for item in value
         )
 
     def plain(self, value: Value) -> Value:
-        """A list of ints."""
+        """The value as a list of ints."""
         numbers = [index(item) for item in value]
         same = all(new is old for new, old in zip(numbers, value, strict=True))
         return value if same and value.__class__ is list else numbers
@@ -311,7 +310,7 @@ class BytesRule(Rule):
         super().__init__(name, f"{_span(fewest, most)} bytes")
 
     def allows(self, value: Value) -> bool:
-        """The value is bytes-like and has so many bytes."""
+        """Whether the value is bytes-like and has a legal size."""
         return self.fewest <= memoryview(value).nbytes <= self.most
 
 
@@ -325,7 +324,7 @@ class TextRule(BytesRule):
         self.legal = f"text of {_span(fewest, most)} seven-bit characters"
 
     def allows(self, value: Value) -> bool:
-        """The value is text and has so many characters."""
+        """Whether the value is seven-bit text of a legal length."""
         return (
             isinstance(value, str)
             and value.isascii()
@@ -338,7 +337,7 @@ def _span(fewest: int, most: int) -> str:
 
 
 class Scale:
-    """Steps of a scaled value: value = (raw * factor + bias) / divisor, raw in low..high."""
+    """Conversion of a scaled value: value = (raw * factor + bias) / divisor, raw in low..high."""
 
     __slots__ = ("bias", "ceiling", "divisor", "factor", "floor", "high", "low")
 
@@ -348,18 +347,18 @@ class Scale:
         self.low, self.high = low, high
         self.factor, self.bias, self.divisor = factor, bias, divisor
         first, last = sorted((low * factor + bias, high * factor + bias))
-        # Whole numbers outside of all that rounds to a legal step.
+        # Whole numbers outside of all values that round to a legal step.
         self.floor = (first - abs(factor)) // divisor
         self.ceiling = -((-last - abs(factor)) // divisor)
 
     def value(self, raw: int) -> Value:
-        """The value that a number on the wire stands for, correctly rounded."""
+        """The value of a raw number, correctly rounded."""
         value = raw * self.factor + self.bias
         return value if self.divisor == 1 else value / self.divisor
 
     def raw(self, value: Value) -> int:
-        """The nearest step, computed exactly; a tie goes to the even one."""
-        # The bounds come first: they keep infinity, NaN and 1E+999999 from being spelt out.
+        """The nearest raw number, computed exactly, ties to even. Raises OutOfRange."""
+        # Checked first, because infinity and NaN have no ratio, and that of 1E+999999 is too large.
         if not self.floor <= value <= self.ceiling or _too_fine(value):
             raise OutOfRange
         top, bottom = value.as_integer_ratio()
@@ -370,13 +369,13 @@ class Scale:
 
 
 class DecimalScale(Scale):
-    """Steps of a value that a float cannot hold: a Decimal loses nothing."""
+    """Conversion to an exact Decimal, for values that a float cannot represent."""
 
     __slots__ = ()
 
     def value(self, raw: int) -> Value:
-        """The value that a number on the wire stands for, exactly."""
-        # Only protocols with such values pay for the import.
+        """The exact value of a raw number."""
+        # Imported here, so that only protocols with such values pay for it.
         from decimal import Context, Decimal
 
         number = Decimal(raw * self.factor + self.bias)
@@ -384,7 +383,7 @@ class DecimalScale(Scale):
 
 
 class ScaledRule(Rule):
-    """A value that is sent in whole steps."""
+    """A scaled value, rounded to whole steps."""
 
     __slots__ = ("scale",)
 
@@ -394,17 +393,17 @@ class ScaledRule(Rule):
         super().__init__(name, f"a number, {low}..{high}{unit and ' '}{unit}")
 
     def allows(self, value: Value) -> bool:
-        """The value has a nearest step, and that is in range."""
+        """Whether the nearest step is in range."""
         self.scale.raw(self.plain(value))
         return True
 
     def plain(self, value: Value) -> Value:
-        """A number with an exact ratio."""
+        """The value as a number with an exact ratio."""
         return value if hasattr(value, "as_integer_ratio") else index(value)
 
 
 def _too_fine(value: Value) -> bool:
-    """A Decimal like 1E-999999, whose exact ratio would fill the memory."""
+    """Whether a value is a Decimal like 1E-999999, whose exact ratio would exhaust memory."""
     return hasattr(value, "as_tuple") and bool(value.as_tuple().exponent < -400)
 
 
@@ -421,16 +420,16 @@ def _nearest(dividend: int, divisor: int) -> int:
 
 
 class BaseMessage:
-    """A message of any protocol.
+    """Base class of messages.
 
     Attributes:
         NAME: name in the schema, like motion.request.
         ID: number of the message in the frame.
-        MIN_SIZE: fewest payload bytes.
-        MAX_SIZE: most payload bytes.
-        MAX_WIRE_SIZE: most bytes on the wire, frame and stuffing included.
+        MIN_SIZE: minimum size of the payload.
+        MAX_SIZE: maximum size of the payload.
+        MAX_WIRE_SIZE: maximum size on the wire, including frame and stuffing.
         FIELDS: names of the fields, in wire order.
-        RULES: what each field may hold.
+        RULES: legal values of each field.
     """
 
     __slots__ = ()
@@ -442,20 +441,20 @@ class BaseMessage:
     MAX_WIRE_SIZE: ClassVar[int] = 0
     FIELDS: ClassVar[tuple[str, ...]] = ()
     RULES: ClassVar[tuple[Rule, ...]] = ()
-    #: Name of the address, "" where the frame has none.
+    #: Name of the address, "" if the frame has none.
     ADDRESS: ClassVar[str] = ""
-    #: A payload of no bytes stands for every default.
+    #: Whether an empty payload means that every field has its default.
     EMPTY: ClassVar[bool] = False
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         raise NotImplementedError
 
     def _attributes(self) -> tuple[str, ...]:
         return (self.ADDRESS, *self.FIELDS) if self.ADDRESS else self.FIELDS
 
     def __eq__(self, other: object) -> bool:
-        """Same message, same values."""
+        """Compare class and values."""
         if type(other) is not type(self):
             return NotImplemented
         return all(
@@ -470,7 +469,7 @@ class BaseMessage:
 
 
 def refused(message: BaseMessage) -> EncodeError:
-    """The error that names the field which cannot be sent; asked for only after an encoder has failed."""
+    """The error for a message that could not be encoded, with the name of the wrong field."""
     for rule in message.RULES:
         if rule.settable:
             value = getattr(message, rule.name, None)
@@ -480,9 +479,9 @@ def refused(message: BaseMessage) -> EncodeError:
 
 
 def settled(message: AnyMessage) -> AnyMessage:
-    """A copy of a message that an encoder has failed on, with plain ints in it.
+    """A copy of a message that could not be encoded, with values converted to plain types.
 
-    Raises EncodeError where a value cannot be sent, and where nothing can be made plain.
+    Raises EncodeError if a value is illegal, or if the conversion changes nothing.
     """
     same, plain = True, object.__new__(type(message))
     for rule in message.RULES:
@@ -498,49 +497,49 @@ def settled(message: AnyMessage) -> AnyMessage:
 
 
 def wrong_size(message: type[BaseMessage], payload: bytes) -> DecodeError:
-    """The error for a payload of a size that the message cannot have."""
+    """The error for a payload of the wrong size."""
     legal = _span(message.MIN_SIZE, message.MAX_SIZE)
     if message.MIN_SIZE <= len(payload) <= message.MAX_SIZE:
-        text = f"{message.NAME}: {len(payload)} data bytes do not agree with its counts or items"
+        text = f"{message.NAME}: {len(payload)} data bytes do not match its counts or items"
     else:
-        text = f"{message.NAME}: {len(payload)} data bytes; it has {legal}"
+        text = f"{message.NAME}: {len(payload)} data bytes, expected {legal}"
     return DecodeError(text, "length", data=payload)
 
 
 def illegal(
     message: type[BaseMessage], name: str, seen: object, offset: int, payload: bytes
 ) -> DecodeError:
-    """The error for a field that holds what it must not; a negative offset counts from the end."""
+    """The error for an illegal value of a field; a negative offset counts from the end."""
     legal = next(
-        (rule.legal for rule in message.RULES if rule.name == name), "something else"
+        (rule.legal for rule in message.RULES if rule.name == name), "another value"
     )
-    text = f"{message.NAME}: {name}: {shown(seen)} was received; legal is {legal}"
+    text = f"{message.NAME}: {name}: received {shown(seen)}, expected {legal}"
     return DecodeError(
         text, "range", name, offset if offset >= 0 else len(payload) + offset, payload
     )
 
 
 def short_of(message: type[BaseMessage], packet: bytes, size: int) -> DecodeError:
-    """The error for a packet that ends too early."""
-    text = f"{message.NAME}: {len(packet)} bytes of at least {size}"
+    """The error for a packet that is too short."""
+    text = f"{message.NAME}: {len(packet)} bytes, expected at least {size}"
     return DecodeError(text, "truncated", offset=len(packet), data=packet)
 
 
 def wrong_check(
     seen: bytes, right: bytes, checksum: Checksum, frame: bytes
 ) -> DecodeError:
-    """The error for a check value that is another one."""
-    text = f"checksum {seen.hex(' ')} was received, {right.hex(' ')} is right ({checksum.name})"
+    """The error for a wrong check value."""
+    text = f"received checksum {seen.hex(' ')}, expected {right.hex(' ')} ({checksum.name})"
     return DecodeError(text, "crc", data=frame)
 
 
 def as_bytes(data: BytesLike) -> bytes:
-    """Any bytes-like object as bytes. Raises TypeError for everything else (numbers and text too)."""
+    """A bytes-like object as bytes. Raises TypeError for other objects, including numbers and text."""
     return data if type(data) is bytes else bytes(memoryview(data))
 
 
 class OpenEnum(int):
-    """A named number. Decoding keeps a number without a name as a plain int."""
+    """A named number. Numbers without a name are decoded as plain ints."""
 
     #: Members by number.
     members: ClassVar[dict[int, OpenEnum]]
@@ -555,7 +554,7 @@ class OpenEnum(int):
 
     @property
     def name(self) -> str:
-        """Name of the member as it stands in the class, "" where it has none."""
+        """Name of the member in the class, "" if it has none."""
         return next(
             (
                 name
@@ -574,21 +573,21 @@ class OpenEnum(int):
 
 
 def named(number: int) -> Any:
-    """A number in the body of an OpenEnum: the class makes a member of it."""
-    # Any: what it becomes is annotated where it stands.
+    """Declare a member in the body of an OpenEnum."""
+    # Any: the class replaces it by a member, as annotated there.
     return number
 
 
 class Bus:
-    """The line and who is on it, as the schema says.
+    """The line and its nodes, according to the schema.
 
     Attributes:
         kind: master_slave, ring or host.
-        first_node: least address of a node, None where frames have no address.
-        last_node: greatest address of a node, None where frames have no address.
-        broadcast: address of all nodes at once, None where there is none.
-        baud: usual speed of the line in bits a second, None where the document names none.
-        bits_per_byte: bits on the line for one byte: start, data, parity and stop bits.
+        first_node: lowest address of a node, None if frames have no address.
+        last_node: highest address of a node, None if frames have no address.
+        broadcast: address of all nodes at once, None if there is none.
+        baud: usual speed of the line in bit/s, None if the document does not state it.
+        bits_per_byte: bits on the line per byte: start, data, parity and stop bits.
     """
 
     __slots__ = (
@@ -623,16 +622,16 @@ class Bus:
 
 
 class Marking:
-    """Where a header and an end byte hold what, for nodes that send a message on while it still comes.
+    """The layout of header and end byte, for nodes that forward a message while receiving it.
 
     Attributes:
-        marker: set in the header and the end byte of a message, and in no other.
-        address_shift: place of the address in both.
-        address_mask: its bits, in their lowest place.
-        id_shift: place of the number of the message.
-        id_mask: its bits, in their lowest place.
-        end: the number that makes an end byte.
-        most: most bytes between header and end.
+        marker: bit that is set only in the header and the end byte.
+        address_shift: position of the address in both.
+        address_mask: mask of the address after the shift.
+        id_shift: position of the message number.
+        id_mask: mask of the message number after the shift.
+        end: the message number of an end byte.
+        most: maximum number of bytes between header and end.
     """
 
     __slots__ = (
@@ -666,23 +665,23 @@ class Marking:
 
 
 class Command:
-    """A transaction: who is asked what, what answers and when, and what may be repeated.
+    """A transaction: request, response, timing and repetition.
 
     Attributes:
         name: name in the schema.
         id: number of request and response in the frame.
         request: class of the request.
-        response: class of the response, None where nothing answers.
+        response: class of the response, None if it is not answered.
         addressing: node, broadcast, either, answered_broadcast or none.
-        response_byte_times: time that the slave may take, in times of one byte on the line ...
+        response_byte_times: response time limit, in byte times on the line ...
         response_seconds: ... plus seconds.
-        repeat_safe: the request may be sent again when no answer came.
-        repeat_counter: field that tells the slave a repeat from a new request, "" where there is none.
-        echoes: fields of the response that repeat the field of the same name of the request.
-        in_flight: requests that may be under way at once.
+        repeat_safe: whether the request may be repeated after a missing response.
+        repeat_counter: field that distinguishes a repeat from a new request, "" if there is none.
+        echoes: fields of the response that repeat the field of the same name in the request.
+        in_flight: maximum number of outstanding requests.
         section: section of the source document.
-        confirmed: False where the source is weak: check at the device before trusting it.
-        attributes: what this protocol alone says of its commands.
+        confirmed: False if the source is weak: check it on the device.
+        attributes: protocol-specific attributes.
     """
 
     __slots__ = (
@@ -729,7 +728,7 @@ class Command:
 
 # Checksums --------------------------------------------------------------------------------------------------
 
-#: The 16-bit algorithms of the CRC catalogue: names, then poly, init, refin, refout, xorout.
+#: The 16-bit algorithms of the CRC catalogue: names, poly, init, refin, refout, xorout.
 CATALOGUE: tuple[tuple[str, int, int, bool, bool, int], ...] = (
     ("crc-16/arc arc crc-16 crc-16/lha crc-ibm", 0x8005, 0x0000, True, True, 0x0000),
     ("crc-16/cdma2000", 0xC867, 0xFFFF, False, False, 0x0000),
@@ -808,12 +807,12 @@ CATALOGUE: tuple[tuple[str, int, int, bool, bool, int], ...] = (
 
 
 class Checksum:
-    """A checksum algorithm, ready for use.
+    """A checksum algorithm.
 
     Attributes:
         name: name in the catalogue.
-        start: what the register begins with, in the form in which `compute` takes it.
-        compute: checksum of the bytes, beginning with a register.
+        start: initial register for `compute`.
+        compute: function of data and initial register.
     """
 
     __slots__ = ("compute", "name", "start")
@@ -824,10 +823,10 @@ class Checksum:
         self.start = start
 
     def verifier(self, size: int, order: Literal["big", "little"] = "big") -> Crc:
-        """A function over data and its checksum (its last bytes) that gives 0 where the checksum is right."""
+        """A function of data with its checksum at the end, and of a register; it returns 0 if they match."""
         compute = self.compute
         if compute is crc_hqx and order == "big":
-            return crc_hqx  # a CRC over itself is 0
+            return crc_hqx  # the CRC of data and its CRC is 0
         return lambda data, start: (
             compute(data[:-size], start) ^ int.from_bytes(data[-size:], order)
         )
@@ -843,18 +842,18 @@ def crc(
     refout: bool,
     xorout: int,
 ) -> Checksum:
-    """A CRC by the parameters of the catalogue."""
+    """A CRC with the parameters of the catalogue."""
     if (width, poly, refin, refout, xorout) == (16, 0x1021, False, False, 0):
         return Checksum(
             name, crc_hqx, init
-        )  # the one that the standard library computes, 20 times faster
+        )  # in the standard library, 20 times faster
     if refin:
         return Checksum(
             name, _reflected_crc(width, poly, refout, xorout), _reflect(init, width)
         )
     spare = max(
         0, 8 - width
-    )  # a register of less than 8 bits stands at the high end of a byte
+    )  # a register of less than 8 bits is left-aligned in a byte
     return Checksum(
         name,
         _plain_crc(width + spare, poly << spare, spare, refout, xorout),
@@ -892,7 +891,7 @@ def _reflected_crc(width: int, poly: int, refout: bool, xorout: int) -> Crc:
 
 
 def _table(seed: int, clock: Callable[[int], int], *, up: bool = True) -> list[int]:
-    """What each byte changes in the register; the step is linear, so eight steps give all 256 entries."""
+    """The change of the register by each byte; it is linear, so eight entries give all 256."""
     table = [0] * 256
     value, bits = seed, range(8) if up else range(7, -1, -1)
     for bit in bits:
@@ -909,10 +908,10 @@ def _reflect(value: int, width: int) -> int:
 
 
 def find_crc(name: str) -> Checksum:
-    """A 16-bit algorithm of the catalogue by name or alias; case and punctuation do not matter.
+    """The 16-bit algorithm with a name or alias of the catalogue; case and punctuation are ignored.
 
     Raises:
-        ValueError: there is none of that name.
+        ValueError: the name is unknown.
     """
     key = _key(name)
     for names, *parameters in CATALOGUE:
@@ -933,7 +932,7 @@ def find_crc(name: str) -> Checksum:
                 xorout=xorout,
             )
     choices = ", ".join(row[0].split()[0].partition("/")[2] for row in CATALOGUE)
-    raise ValueError(f"no 16-bit CRC is called {name!r}; there are {choices}")
+    raise ValueError(f"unknown 16-bit CRC {name!r}; use one of {choices}")
 
 
 def _key(name: str) -> str:
