@@ -7,9 +7,9 @@
  * check word that the host may read. Most commands act on the current axis, which stays until it is
  * changed.
  *
- * C99, C11 and C++17; no library beyond the headers included below, no allocation, no static data but a CRC table
- * where one is chosen. Sizes and errors: a function that writes returns the number of bytes, or a negative
- * mc1231a_status_t. Macros to define in front of the include, all optional:
+ * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
+ * table if selected. Functions that write return the number of bytes, or a negative mc1231a_status_t. Optional
+ * macros, to be defined before the include:
  *   MC1231A_ENABLE_FLOAT=1  conversions between raw and physical values, in double
  *   MC1231A_ENABLE_NAMES=1  names of enum values as text
  *
@@ -67,31 +67,31 @@ extern "C" {
 #define MC1231A_ENABLE_NAMES 0
 #endif
 
-/* What the code relies on: bytes of eight bits, and two's complement where an unsigned number becomes a signed one. */
+/* Requirements: bytes of eight bits, and two's complement in conversions from unsigned to signed. */
 typedef char mc1231a_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
 typedef char mc1231a_needs_twos_complement_[(((int8_t)0xFFU == -1) && ((int16_t)0xFFFFU == -1)) ? 1 : -1];
 typedef char mc1231a_needs_sizes_in_int_[(INT_MAX >= 6) ? 1 : -1];
 
-/* What went wrong; functions return it as an int, which may also be a number of bytes. */
+/* Errors; functions return them as an int, which may also be a number of bytes. */
 enum {
     MC1231A_OK = 0,
     MC1231A_ERROR_CAPACITY = -1,  /* the buffer is too small */
-    MC1231A_ERROR_LENGTH = -2,    /* a size or count that the message cannot have */
-    MC1231A_ERROR_RANGE = -3,     /* a value outside its range, an address not allowed, a constant that is wrong */
-    MC1231A_ERROR_UNKNOWN = -4,   /* no message of this direction has the id */
-    MC1231A_ERROR_CRC = -5,       /* the check value is wrong */
-    MC1231A_ERROR_STUFFING = -6,  /* a byte that must be followed by an inserted one is not */
-    MC1231A_ERROR_TRUNCATED = -7, /* the frame is not complete */
-    MC1231A_ERROR_FRAME = -8,     /* preamble, header or end is wrong */
-    MC1231A_ERROR_ILLEGAL = -9    /* the slave does not know the command */
+    MC1231A_ERROR_LENGTH = -2,    /* wrong size or count */
+    MC1231A_ERROR_RANGE = -3,     /* value out of range, illegal address, wrong constant */
+    MC1231A_ERROR_UNKNOWN = -4,   /* unknown message id in this direction */
+    MC1231A_ERROR_CRC = -5,       /* wrong check value */
+    MC1231A_ERROR_STUFFING = -6,  /* missing inserted byte */
+    MC1231A_ERROR_TRUNCATED = -7, /* incomplete frame */
+    MC1231A_ERROR_FRAME = -8,     /* wrong preamble, header or end */
+    MC1231A_ERROR_ILLEGAL = -9    /* command rejected by the slave as unknown */
 };
 typedef int mc1231a_status_t;
 
-/* What a received byte completed. */
+/* The event that a received byte completed. */
 typedef enum mc1231a_event {
     MC1231A_EVENT_NONE,
     MC1231A_EVENT_FRAME,     /* an intact frame */
-    MC1231A_EVENT_CRC,       /* a fault each: */
+    MC1231A_EVENT_CRC,       /* errors: */
     MC1231A_EVENT_STUFFING,
     MC1231A_EVENT_LENGTH,
     MC1231A_EVENT_UNKNOWN,
@@ -212,7 +212,7 @@ static inline uint32_t mc1231a_get_u32_be_(const uint8_t *at)
 }
 
 #if MC1231A_ENABLE_FLOAT
-/* The whole number of steps that is nearest, a tie to the even one. What is not exact in a double is not exact here. */
+/* The nearest whole number of steps, ties to even, with the precision of a double. */
 static inline int mc1231a_nearest_uint32_(double steps, uint32_t least, uint32_t most, uint32_t *raw)
 {
     uint32_t whole;
@@ -235,7 +235,7 @@ static inline int mc1231a_nearest_uint32_(double steps, uint32_t least, uint32_t
     } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
-        /* already the nearest */
+        /* already rounded */
     }
     *raw = whole;
     return MC1231A_OK;
@@ -262,7 +262,7 @@ static inline int mc1231a_nearest_int32_(double steps, int32_t least, int32_t mo
     } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1) != 0))) {
         --whole;
     } else {
-        /* already the nearest */
+        /* already rounded */
     }
     *raw = whole;
     return MC1231A_OK;
@@ -289,7 +289,7 @@ static inline int mc1231a_nearest_uint16_(double steps, uint16_t least, uint16_t
     } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
-        /* already the nearest */
+        /* already rounded */
     }
     *raw = whole;
     return MC1231A_OK;
@@ -469,7 +469,7 @@ typedef uint16_t mc1231a_sample_times_t;
 
 /* ---- Frame ---- */
 
-/* A frame that was received. */
+/* A received frame. */
 typedef struct mc1231a_frame {
     uint8_t id;
     size_t size;
@@ -679,7 +679,7 @@ typedef struct mc1231a_frame {
 #define MC1231A_GET_PHASE_OFFSET_REQUEST_ID 0x7B
 #define MC1231A_GET_PHASE_OFFSET_RESPONSE_ID 0x7B
 
-/* Whether a request with this id exists, and how many bytes of payload it has. */
+/* Whether the id is that of a request, and the size of its payload. */
 static inline bool mc1231a_request_size_(uint8_t id, size_t *size)
 {
     switch (id) {
@@ -796,7 +796,7 @@ static inline bool mc1231a_request_size_(uint8_t id, size_t *size)
     }
 }
 
-/* The sum of words, the first byte of each the most significant. */
+/* The sum of big-endian words. */
 static inline uint16_t mc1231a_sum_(uint16_t start, const uint8_t *bytes, size_t size)
 {
     uint16_t sum = start;
@@ -814,7 +814,7 @@ static inline uint16_t mc1231a_sum_(uint16_t start, const uint8_t *bytes, size_t
     return (uint16_t)(sum + word);
 }
 
-/* The part of an answer's check value that comes from its request: of one received, and of one made by _to_frame. */
+/* The sum of a request, part of the check value of its response: of a received one, and of one made by _to_frame. */
 static inline uint16_t mc1231a_frame_sum(const mc1231a_frame_t *frame)
 {
     return mc1231a_sum_(frame->id, frame->payload, frame->size);
@@ -830,7 +830,7 @@ static inline uint16_t mc1231a_finish_sum_(uint16_t sum)
     return sum;
 }
 
-/* Puts the check value behind the words of an answer. */
+/* Appends the check value to the words of a response. */
 static inline int mc1231a_close_(uint16_t request_sum, size_t size, uint8_t *wire, size_t capacity)
 {
     uint8_t *const end = &wire[size];
@@ -844,7 +844,7 @@ static inline int mc1231a_close_(uint16_t request_sum, size_t size, uint8_t *wir
     return (int)total;
 }
 
-/* The answer to a command that the slave does not support. */
+/* The response to a command that the slave does not support. */
 static inline int mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
 {
     const uint16_t value = 0U;
@@ -861,7 +861,7 @@ static inline int mc1231a_reject_(size_t size, uint8_t *wire, size_t capacity)
     return (int)total;
 }
 
-/* Whether an answer has all bytes of its payload and no more, and the right check value. */
+/* Checks the size and the check value of a response. */
 static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_t size, size_t payload)
 {
     const uint8_t *end;
@@ -877,14 +877,14 @@ static inline int mc1231a_open_(uint16_t request_sum, const uint8_t *wire, size_
     end = &wire[payload];
     value = mc1231a_finish_sum_(mc1231a_sum_(request_sum, wire, payload));
     if ((end[0] != (uint8_t)(value >> 8)) || (end[1] != (uint8_t)(value))) {
-        /* The value of a refusal, where it is not the right one by chance. */
+        /* A rejection, unless its value happens to be the right one. */
         return ((end[0] != (uint8_t)(refused >> 8)) || (end[1] != (uint8_t)(refused))) ? MC1231A_ERROR_CRC :
             MC1231A_ERROR_ILLEGAL;
     }
     return MC1231A_OK;
 }
 
-/* Takes exactly one whole request apart. Its values are checked by mc1231a_request_check or by decoding it. */
+/* Decodes exactly one whole request. Its values are checked by mc1231a_request_check or by decoding them. */
 static inline int mc1231a_frame_decode(mc1231a_frame_t *frame, const uint8_t *wire, size_t size)
 {
     size_t expected;
@@ -6194,7 +6194,7 @@ static inline int mc1231a_get_phase_offset_response_from_frame(
     return mc1231a_get_phase_offset_response_decode(message, wire, size - 2U);
 }
 
-/* What a request carries is right: id, address, size, ranges. */
+/* Validates id, address, payload size and ranges of a request. */
 static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
 {
     bool allowed = true;
@@ -6640,7 +6640,7 @@ static inline int mc1231a_request_check(const mc1231a_frame_t *frame)
     return ((status == MC1231A_OK) && !allowed) ? MC1231A_ERROR_RANGE : status;
 }
 
-/* What a response carries is right: id, address, size, ranges. */
+/* Validates id, address, payload size and ranges of a response. */
 static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
 {
     bool allowed = true;
@@ -7098,10 +7098,10 @@ static inline int mc1231a_response_check(const mc1231a_frame_t *frame)
     return ((status == MC1231A_OK) && !allowed) ? MC1231A_ERROR_RANGE : status;
 }
 
-/* ---- Receiver of requests: one byte at a time, each in constant time, so that it can run in an interrupt ----
- * A command byte tells how many bytes follow; one that is unknown is a fault, and the next byte begins a packet. A
- * frame stays valid until the next byte is received; handle it before, or copy it. Its values are checked when it is
- * dispatched or decoded. */
+/* ---- Receiver of requests: one byte at a time, each in constant time, suitable for an interrupt ----
+ * The command byte determines the number of bytes that follow; an unknown one is an error, and the next byte begins a
+ * packet. A frame is valid until the next byte is received; handle or copy it before. Its values are checked when it
+ * is dispatched or decoded. */
 typedef struct mc1231a_receiver {
     uint8_t id;
     uint8_t count;
@@ -7118,7 +7118,7 @@ static inline void mc1231a_receiver_init(mc1231a_receiver_t *receiver)
     receiver->inside = false;
 }
 
-/* The frame that mc1231a_receive has just announced. */
+/* The frame of the last MC1231A_EVENT_FRAME. */
 static inline mc1231a_frame_t mc1231a_receiver_frame(const mc1231a_receiver_t *receiver)
 {
     mc1231a_frame_t frame;
@@ -7128,7 +7128,7 @@ static inline mc1231a_frame_t mc1231a_receiver_frame(const mc1231a_receiver_t *r
     return frame;
 }
 
-/* Takes the next byte; tells what it completed. */
+/* Processes the next byte; returns the event that it completed. */
 static inline mc1231a_event_t mc1231a_receive(mc1231a_receiver_t *receiver, uint8_t byte)
 {
     if (receiver->inside) {
@@ -7148,15 +7148,15 @@ static inline mc1231a_event_t mc1231a_receive(mc1231a_receiver_t *receiver, uint
 }
 
 /* ---- Transactions ----
- * _ANSWERED: 1 where the slave answers. _IN_FLIGHT: requests that may be under way at once. */
+ * _ANSWERED: 1 if the slave responds. _IN_FLIGHT: maximum number of outstanding requests. */
 
-/* _REPEAT: whether a request may be sent again when no answer came. */
+/* _REPEAT: whether a request may be repeated after a missing response. */
 #define MC1231A_REPEAT_UNSAFE 0 /* no: the slave may act twice */
-#define MC1231A_REPEAT_SAFE 1 /* yes: doing it twice does no harm */
-#define MC1231A_REPEAT_BY_COUNTER 2 /* yes, with the same number in the field that is named */
+#define MC1231A_REPEAT_SAFE 1 /* yes: repeating is harmless */
+#define MC1231A_REPEAT_BY_COUNTER 2 /* yes, with the same number in the named field */
 
-/* The slave may take _RESPONSE_BITS bit times and _RESPONSE_US microseconds to answer; this is the sum in microseconds,
- * such as MC1231A_RESPONSE_US(SET_1, 115200UL). A command that is not answered has neither. */
+/* The response time limit is _RESPONSE_BITS bit times plus _RESPONSE_US microseconds; this is the sum in microseconds,
+ * such as MC1231A_RESPONSE_US(SET_1, 115200UL). Commands without a response have neither. */
 #define MC1231A_RESPONSE_US(command, baud) \
     (MC1231A_##command##_RESPONSE_US + (MC1231A_##command##_RESPONSE_BITS * 1000000UL + (baud) - 1UL) / (baud))
 
@@ -7767,13 +7767,13 @@ static inline mc1231a_event_t mc1231a_receive(mc1231a_receiver_t *receiver, uint
 #define MC1231A_GET_PHASE_OFFSET_RESPONSE_US 0UL
 
 /* ---- Slave ----
- * One function for each command. A command without one is not answered, nor is one whose function returns false; a
- * wrong request never reaches its function. The response comes with its defaults. Of a broadcast, `broadcast` is set
- * while the function runs. */
+ * One function for each command. A command without a function, or whose function returns false, gets no response.
+ * Only valid requests are passed to functions. The response is initialised with its defaults. During a broadcast,
+ * `broadcast` is set. */
 typedef struct mc1231a_slave mc1231a_slave_t;
 
 struct mc1231a_slave {
-    void *context; /* yours */
+    void *context; /* for the application */
     bool (*set_1)(mc1231a_slave_t *slave, mc1231a_set_1_response_t *response);
     bool (*set_2)(mc1231a_slave_t *slave, mc1231a_set_2_response_t *response);
     bool (*set_i)(mc1231a_slave_t *slave, mc1231a_set_i_response_t *response);
@@ -9874,8 +9874,8 @@ static inline int mc1231a_handle_any_(
     }
 }
 
-/* Handles a request; returns the bytes of the answer in `wire`, 0 where there is nothing to send. `wire` may take
- * MC1231A_MAX_WIRE_SIZE bytes, and must not be the memory that the frame lies in. */
+/* Handles a request; returns the size of the response in `wire`, 0 if there is none. `wire` needs up to
+ * MC1231A_MAX_WIRE_SIZE bytes, and must not overlap the frame. */
 static inline size_t mc1231a_slave_dispatch(
     mc1231a_slave_t *slave, const mc1231a_frame_t *frame, uint8_t *wire, size_t capacity)
 {

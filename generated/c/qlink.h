@@ -6,12 +6,12 @@
  * RS485 motion bus with one master and up to 16 slaves. The master asks, the addressed slave answers
  * with its own number and the same command; nothing in a frame tells a request from a response.
  *
- * C99, C11 and C++17; no library beyond the headers included below, no allocation, no static data but a CRC table
- * where one is chosen. Sizes and errors: a function that writes returns the number of bytes, or a negative
- * qlink_status_t. Macros to define in front of the include, all optional:
+ * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
+ * table if selected. Functions that write return the number of bytes, or a negative qlink_status_t. Optional
+ * macros, to be defined before the include:
  *   QLINK_ENABLE_FLOAT=1  conversions between raw and physical values, in double
  *   QLINK_ENABLE_NAMES=1  names of enum values as text
- *   QLINK_CRC_FORM=FORM   QLINK_CRC_FORM_LOOP (as it is), _NIBBLE or _TABLE
+ *   QLINK_CRC_FORM=FORM   QLINK_CRC_FORM_LOOP (default), _NIBBLE or _TABLE
  *   QLINK_CRC=NAME        another 16-bit algorithm, such as QLINK_CRC_16_XMODEM
  *
  * Example:
@@ -73,31 +73,31 @@ extern "C" {
 #define QLINK_ENABLE_NAMES 0
 #endif
 
-/* What the code relies on: bytes of eight bits, and two's complement where an unsigned number becomes a signed one. */
+/* Requirements: bytes of eight bits, and two's complement in conversions from unsigned to signed. */
 typedef char qlink_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
 typedef char qlink_needs_twos_complement_[(((int8_t)0xFFU == -1) && ((int16_t)0xFFFFU == -1)) ? 1 : -1];
 typedef char qlink_needs_sizes_in_int_[(INT_MAX >= 64) ? 1 : -1];
 
-/* What went wrong; functions return it as an int, which may also be a number of bytes. */
+/* Errors; functions return them as an int, which may also be a number of bytes. */
 enum {
     QLINK_OK = 0,
     QLINK_ERROR_CAPACITY = -1,  /* the buffer is too small */
-    QLINK_ERROR_LENGTH = -2,    /* a size or count that the message cannot have */
-    QLINK_ERROR_RANGE = -3,     /* a value outside its range, an address not allowed, a constant that is wrong */
-    QLINK_ERROR_UNKNOWN = -4,   /* no message of this direction has the id */
-    QLINK_ERROR_CRC = -5,       /* the check value is wrong */
-    QLINK_ERROR_STUFFING = -6,  /* a byte that must be followed by an inserted one is not */
-    QLINK_ERROR_TRUNCATED = -7, /* the frame is not complete */
-    QLINK_ERROR_FRAME = -8,     /* preamble, header or end is wrong */
-    QLINK_ERROR_ILLEGAL = -9    /* the slave does not know the command */
+    QLINK_ERROR_LENGTH = -2,    /* wrong size or count */
+    QLINK_ERROR_RANGE = -3,     /* value out of range, illegal address, wrong constant */
+    QLINK_ERROR_UNKNOWN = -4,   /* unknown message id in this direction */
+    QLINK_ERROR_CRC = -5,       /* wrong check value */
+    QLINK_ERROR_STUFFING = -6,  /* missing inserted byte */
+    QLINK_ERROR_TRUNCATED = -7, /* incomplete frame */
+    QLINK_ERROR_FRAME = -8,     /* wrong preamble, header or end */
+    QLINK_ERROR_ILLEGAL = -9    /* command rejected by the slave as unknown */
 };
 typedef int qlink_status_t;
 
-/* What a received byte completed. */
+/* The event that a received byte completed. */
 typedef enum qlink_event {
     QLINK_EVENT_NONE,
     QLINK_EVENT_FRAME,     /* an intact frame */
-    QLINK_EVENT_CRC,       /* a fault each: */
+    QLINK_EVENT_CRC,       /* errors: */
     QLINK_EVENT_STUFFING,
     QLINK_EVENT_LENGTH,
     QLINK_EVENT_UNKNOWN,
@@ -210,7 +210,7 @@ static inline void qlink_copy_(uint8_t *to, const uint8_t *from, size_t count)
 }
 
 #if QLINK_ENABLE_FLOAT
-/* The whole number of steps that is nearest, a tie to the even one. What is not exact in a double is not exact here. */
+/* The nearest whole number of steps, ties to even, with the precision of a double. */
 static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most, uint8_t *raw)
 {
     uint8_t whole;
@@ -233,7 +233,7 @@ static inline int qlink_nearest_uint8_(double steps, uint8_t least, uint8_t most
     } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1U) != 0U))) {
         --whole;
     } else {
-        /* already the nearest */
+        /* already rounded */
     }
     *raw = whole;
     return QLINK_OK;
@@ -269,8 +269,8 @@ typedef uint32_t qlink_io24_t;
 /* ---- Check value: crc-16/ibm-3740 ---- */
 
 /* Any 16-bit algorithm of the CRC catalogue: (polynomial, start value, reflected, final XOR).
- * Choose one with -DQLINK_CRC=QLINK_CRC_16_XMODEM, or write a tuple of your own. The check value is the CRC of
- * the nine characters 123456789. */
+ * Select one with -DQLINK_CRC=QLINK_CRC_16_XMODEM, or define a tuple. The check value is the CRC of the nine
+ * characters 123456789. */
 #define QLINK_CRC_16_ARC (0x8005U, 0x0000U, 1, 0x0000U) /* check value 0xBB3D */
 #define QLINK_CRC_16_CDMA2000 (0xC867U, 0xFFFFU, 0, 0x0000U) /* check value 0x4C06 */
 #define QLINK_CRC_16_CMS (0x8005U, 0xFFFFU, 0, 0x0000U) /* check value 0xAEE7 */
@@ -306,7 +306,7 @@ typedef uint32_t qlink_io24_t;
 #define QLINK_CRC QLINK_CRC_16_IBM_3740
 #endif
 
-/* 1 for what stands in parentheses, 0 for a name that no macro replaces. */
+/* Expands to 1 for a parenthesised tuple, 0 for an undefined name. */
 #define QLINK_CRC_PROBE_(...) 0, 1
 #define QLINK_CRC_PICK_(first, second, ...) second
 #define QLINK_CRC_SECOND_(...) QLINK_CRC_PICK_(__VA_ARGS__)
@@ -314,7 +314,7 @@ typedef uint32_t qlink_io24_t;
 #if !QLINK_CRC_KNOWN_(QLINK_CRC_PROBE_ QLINK_CRC)
 #error "QLINK_CRC is neither an algorithm of this header, such as QLINK_CRC_16_IBM_3740, nor a tuple"
 #undef QLINK_CRC
-#define QLINK_CRC QLINK_CRC_16_IBM_3740 /* so that this is the only error */
+#define QLINK_CRC QLINK_CRC_16_IBM_3740 /* avoids further errors */
 #endif
 
 #define QLINK_CRC_TAKE_1_(poly, start, reflected, xorout) poly
@@ -327,7 +327,7 @@ typedef uint32_t qlink_io24_t;
 #define QLINK_CRC_REFLECTED_ QLINK_CRC_EXPAND_(QLINK_CRC_TAKE_3_ QLINK_CRC)
 #define QLINK_CRC_XOROUT_ QLINK_CRC_EXPAND_(QLINK_CRC_TAKE_4_ QLINK_CRC)
 
-/* A reflected CRC keeps its register turned round, so that nothing has to be turned for each byte. */
+/* A reflected CRC keeps its register reflected, which saves reflecting each byte. */
 #define QLINK_SWAP_1_(x) ((((x) & 0x5555U) << 1) | (((x) >> 1) & 0x5555U))
 #define QLINK_SWAP_2_(x) ((((x) & 0x3333U) << 2) | (((x) >> 2) & 0x3333U))
 #define QLINK_SWAP_4_(x) ((((x) & 0x0F0FU) << 4) | (((x) >> 4) & 0x0F0FU))
@@ -341,7 +341,7 @@ typedef uint32_t qlink_io24_t;
 #define QLINK_CRC_START_ QLINK_CRC_INIT_
 #endif
 
-/* Its form: LOOP is smallest; NIBBLE has a table of 16 entries, TABLE one of 256 and is fastest. */
+/* Its form: LOOP is the smallest, NIBBLE has a table of 16 entries, TABLE one of 256 and is the fastest. */
 #define QLINK_CRC_FORM_LOOP 1
 #define QLINK_CRC_FORM_NIBBLE 2
 #define QLINK_CRC_FORM_TABLE 3
@@ -351,7 +351,7 @@ typedef uint32_t qlink_io24_t;
 
 #if QLINK_CRC_FORM == QLINK_CRC_FORM_TABLE && \
     (QLINK_CRC_POLY_ != 0x1021U || QLINK_CRC_REFLECTED_ != 0)
-#error "The 256-entry table is that of crc-16/ibm-3740: choose QLINK_CRC_FORM_NIBBLE, or generate with --set crc=NAME"
+#error "The 256-entry table is for crc-16/ibm-3740: select QLINK_CRC_FORM_NIBBLE, or generate with --set crc=NAME"
 #endif
 
 #if QLINK_CRC_FORM != QLINK_CRC_FORM_LOOP
@@ -362,8 +362,8 @@ typedef uint32_t qlink_io24_t;
 #define QLINK_CRC_STORAGE_
 #define QLINK_CRC_ENTRY_(index) qlink_crc_table[(index)]
 #endif
-/* Each file that includes this header and computes a CRC has the table once. For one table in a program of several
- * such files, define QLINK_CRC_SHARED_TABLE in all of them and QLINK_CRC_DEFINE_TABLE in one. */
+/* Each file that includes this header and computes a CRC contains the table. To share one table among several files,
+ * define QLINK_CRC_SHARED_TABLE in all of them and QLINK_CRC_DEFINE_TABLE in one. */
 #if !defined(QLINK_CRC_SHARED_TABLE)
 #define QLINK_CRC_DECLARE_ static const
 #define QLINK_CRC_HERE_ 1
@@ -378,7 +378,7 @@ extern const uint16_t qlink_crc_table[];
 
 #if QLINK_CRC_FORM == QLINK_CRC_FORM_NIBBLE
 #if QLINK_CRC_HERE_
-/* A step is linear: an entry is the sum of what its four bits do, so the compiler can compute the table. */
+/* A step is linear: an entry is the sum of those of its four bits, so the compiler can compute the table. */
 #if QLINK_CRC_REFLECTED_
 #define QLINK_CRC_CLOCK_(x) (((x) >> 1) ^ (((x) & 1U) * QLINK_CRC_FEEDBACK_))
 #define QLINK_CRC_BIT_3_ QLINK_CRC_FEEDBACK_
@@ -443,7 +443,7 @@ QLINK_CRC_DECLARE_ uint16_t qlink_crc_table[256] QLINK_CRC_STORAGE_ = {
 #error "QLINK_CRC_FORM must be QLINK_CRC_FORM_LOOP, _NIBBLE or _TABLE"
 #endif
 
-/* The register before the first byte, after one more byte, and the check value that it stands for at last. */
+/* The initial register, the register after one more byte, and the check value of the final register. */
 static inline uint16_t qlink_check_start(void)
 {
     return (uint16_t)QLINK_CRC_START_;
@@ -494,7 +494,7 @@ static inline uint16_t qlink_check_finish(uint16_t crc)
 
 /* ---- Frame ---- */
 
-/* A frame that was received. */
+/* A received frame. */
 typedef struct qlink_frame {
     uint8_t id;
     uint8_t node;
@@ -502,21 +502,20 @@ typedef struct qlink_frame {
     const uint8_t *payload;
 } qlink_frame_t;
 
-/* Whether a frame with so many bytes of payload fits, as long as no byte is inserted. */
+/* Whether a frame with a payload of this size fits without inserted bytes. */
 static inline bool qlink_fits_(size_t capacity, size_t size)
 {
     return capacity >= (size + 7U);
 }
 
-/* Where the payload of a frame that fits is written, so that completing the frame only moves bytes to the front. */
+/* Address for the payload of a frame; completing the frame moves it to the front. */
 static inline uint8_t *qlink_place_(uint8_t *wire, size_t capacity, size_t size)
 {
     return &wire[capacity - 2U - size];
 }
 
 /* Completes a frame whose payload ends 2 bytes before the end of the buffer. One pass computes the check value,
- * inserts the stuffing and moves the bytes to the front: the place written to never overtakes the place read from
- * as long as the frame fits. */
+ * inserts the stuffing and moves the bytes to the front; writing never overtakes reading if the frame fits. */
 static inline int qlink_wrap_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
     const size_t size = (size_t)payload_size;
@@ -566,9 +565,9 @@ static inline int qlink_wrap_(uint8_t id, uint8_t node, uint8_t *wire, size_t ca
     return (int)to;
 }
 
-/* Unpacks the frame at the front of received bytes into a body (the frame without preamble and stuffing); or all of
- * them as one `whole` frame. `used` becomes the number of bytes taken, 0 where no frame begins; with
- * QLINK_ERROR_TRUNCATED it is how many are needed at least. */
+/* Unpacks the frame at the beginning of received bytes into a body (the frame without preamble and stuffing), or all of
+ * them as one `whole` frame. `used` is set to the number of bytes of the frame, 0 if none begins there; with
+ * QLINK_ERROR_TRUNCATED to the minimum number needed. */
 static inline int qlink_scan_(
     const uint8_t *wire, size_t size, bool whole, uint8_t *body, qlink_frame_t *frame, size_t *used)
 {
@@ -576,7 +575,7 @@ static inline int qlink_scan_(
     size_t at = 0U;
     size_t total = 5U;
     size_t payload = 0U;
-    bool inserted = false; /* the next byte must be */
+    bool inserted = false; /* the next byte must be an inserted one */
     const uint8_t *end;
     uint16_t value = qlink_check_start();
 
@@ -640,25 +639,25 @@ static inline int qlink_scan_(
     return QLINK_OK;
 }
 
-/* The same for a message that the node 0..16 may have. */
+/* As qlink_wrap_(), for node 0..16. */
 static inline int qlink_wrap_0_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
     return (node <= 16U) ? qlink_wrap_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
-/* The same for a message that the node 1..16 may have. */
+/* As qlink_wrap_(), for node 1..16. */
 static inline int qlink_wrap_1_to_16_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
     return ((node >= 1U) && (node <= 16U)) ? qlink_wrap_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
-/* The same for a message that the node 0 may have. */
+/* As qlink_wrap_(), for node 0. */
 static inline int qlink_wrap_0_(uint8_t id, uint8_t node, uint8_t *wire, size_t capacity, int payload_size)
 {
     return (node == 0U) ? qlink_wrap_(id, node, wire, capacity, payload_size) : QLINK_ERROR_RANGE;
 }
 
-/* Makes a frame of any payload; returns its size on the wire. */
+/* Encodes a frame of any payload; returns its size on the wire. */
 static inline int qlink_frame_encode(
     uint8_t id, uint8_t node, const uint8_t *payload, size_t size, uint8_t *wire, size_t capacity)
 {
@@ -674,11 +673,11 @@ static inline int qlink_frame_encode(
     return qlink_wrap_(id, node, wire, capacity, (int)size);
 }
 
-/* Bytes that qlink_frame_decode needs for what it unpacks. */
+/* Size of the buffer for qlink_frame_decode. */
 #define QLINK_DECODE_BUFFER_SIZE 31U
 
-/* Takes exactly one whole frame apart. Framing and check value are verified; what the frame carries is checked by
- * qlink_request_check or _response_check or by decoding it. */
+/* Decodes exactly one whole frame. Verifies framing and check value; the contents are checked by
+ * qlink_request_check or _response_check or by decoding them. */
 static inline int qlink_frame_decode(qlink_frame_t *frame, uint8_t *buffer, const uint8_t *wire, size_t size)
 {
     size_t used;
@@ -1968,7 +1967,7 @@ static inline int qlink_loop_back_response_to_frame(
     return qlink_wrap_1_to_16_(QLINK_LOOP_BACK_RESPONSE_ID, node, wire, capacity, size);
 }
 
-/* What a request carries is right: id, address, size, ranges. */
+/* Validates id, address, payload size and ranges of a request. */
 static inline int qlink_request_check(const qlink_frame_t *frame)
 {
     bool allowed = true;
@@ -2089,7 +2088,7 @@ static inline int qlink_request_check(const qlink_frame_t *frame)
     return ((status == QLINK_OK) && !allowed) ? QLINK_ERROR_RANGE : status;
 }
 
-/* What a response carries is right: id, address, size, ranges. */
+/* Validates id, address, payload size and ranges of a response. */
 static inline int qlink_response_check(const qlink_frame_t *frame)
 {
     bool allowed = true;
@@ -2190,10 +2189,10 @@ static inline int qlink_response_check(const qlink_frame_t *frame)
     }
     return ((status == QLINK_OK) && !allowed) ? QLINK_ERROR_RANGE : status;
 }
-/* ---- Receiver: one byte at a time, each in constant time, so that it can run in an interrupt ----
- * The preamble is found nowhere else on the wire: nothing is looked at twice, and after any disturbance the next
- * intact frame is delivered. A frame stays valid until the next byte is received; handle it before, or copy it.
- * What the frame carries is checked when it is dispatched or decoded. */
+/* ---- Receiver: one byte at a time, each in constant time, suitable for an interrupt ----
+ * The preamble occurs nowhere else on the wire: each byte is processed once, and after any disturbance the next intact
+ * frame is delivered. A frame is valid until the next byte is received; handle or copy it before. Its contents are
+ * checked when it is dispatched or decoded. */
 typedef struct qlink_receiver {
     uint16_t check;
     uint8_t state;
@@ -2201,11 +2200,11 @@ typedef struct qlink_receiver {
     uint8_t body[31]; /* the frame without preamble and stuffing */
 } qlink_receiver_t;
 
-#define QLINK_HUNTING_ 0U  /* no byte of a preamble */
-#define QLINK_FIRST_ 1U    /* one byte of a preamble */
-#define QLINK_PREAMBLE_ 2U /* a preamble: the length follows, or another byte of a longer run */
+#define QLINK_HUNTING_ 0U  /* outside of a preamble */
+#define QLINK_FIRST_ 1U    /* after the first byte of a preamble */
+#define QLINK_PREAMBLE_ 2U /* after a preamble: the length or another preamble byte follows */
 #define QLINK_BODY_ 3U     /* in the body */
-#define QLINK_ESCAPE_ 4U   /* in the body, behind a byte that is followed by an inserted one */
+#define QLINK_ESCAPE_ 4U   /* in the body, before an inserted byte */
 
 static inline void qlink_receiver_init(qlink_receiver_t *receiver)
 {
@@ -2213,7 +2212,7 @@ static inline void qlink_receiver_init(qlink_receiver_t *receiver)
     receiver->position = 0U;
 }
 
-/* The frame that qlink_receive has just announced. */
+/* The frame of the last QLINK_EVENT_FRAME. */
 static inline qlink_frame_t qlink_receiver_frame(const qlink_receiver_t *receiver)
 {
     qlink_frame_t frame;
@@ -2225,7 +2224,7 @@ static inline qlink_frame_t qlink_receiver_frame(const qlink_receiver_t *receive
     return frame;
 }
 
-/* Takes the next byte; tells what it completed. */
+/* Processes the next byte; returns the event that it completed. */
 static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t byte)
 {
     uint8_t *const body = receiver->body;
@@ -2257,7 +2256,7 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
         }
         return QLINK_EVENT_NONE;
     } else {
-        /* one more byte of the body */
+        /* a byte of the body */
     }
 
     body[position] = byte;
@@ -2281,21 +2280,22 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
 }
 
 /* ---- Transactions ----
- * _ANSWERED: 1 where the slave answers. _IN_FLIGHT: requests that may be under way at once. */
+ * _ANSWERED: 1 if the slave responds. _IN_FLIGHT: maximum number of outstanding requests. */
 
-/* _ADDRESSING: whom a request goes to. */
+/* _ADDRESSING: recipients of a request. */
 #define QLINK_ADDRESSING_NODE 0 /* one node */
-#define QLINK_ADDRESSING_BROADCAST 1 /* all nodes, which do not answer */
-#define QLINK_ADDRESSING_EITHER 2 /* one node, or all, which then do not answer */
-#define QLINK_ADDRESSING_ANSWERED_BROADCAST 3 /* as before, but a broadcast is answered: only one node may be there */
+#define QLINK_ADDRESSING_BROADCAST 1 /* all nodes, which do not respond */
+#define QLINK_ADDRESSING_EITHER 2 /* one node, or all, which then do not respond */
+/* one node, or all; a broadcast is answered, so only one node may be on the bus */
+#define QLINK_ADDRESSING_ANSWERED_BROADCAST 3
 
-/* _REPEAT: whether a request may be sent again when no answer came. */
+/* _REPEAT: whether a request may be repeated after a missing response. */
 #define QLINK_REPEAT_UNSAFE 0 /* no: the slave may act twice */
-#define QLINK_REPEAT_SAFE 1 /* yes: doing it twice does no harm */
-#define QLINK_REPEAT_BY_COUNTER 2 /* yes, with the same number in the field that is named */
+#define QLINK_REPEAT_SAFE 1 /* yes: repeating is harmless */
+#define QLINK_REPEAT_BY_COUNTER 2 /* yes, with the same number in the named field */
 
-/* The slave may take _RESPONSE_BITS bit times and _RESPONSE_US microseconds to answer; this is the sum in microseconds,
- * such as QLINK_RESPONSE_US(NODE_SETUP, 115200UL). A command that is not answered has neither. */
+/* The response time limit is _RESPONSE_BITS bit times plus _RESPONSE_US microseconds; this is the sum in microseconds,
+ * such as QLINK_RESPONSE_US(NODE_SETUP, 115200UL). Commands without a response have neither. */
 #define QLINK_RESPONSE_US(command, baud) \
     (QLINK_##command##_RESPONSE_US + (QLINK_##command##_RESPONSE_BITS * 1000000UL + (baud) - 1UL) / (baud))
 
@@ -2427,15 +2427,15 @@ static inline qlink_event_t qlink_receive(qlink_receiver_t *receiver, uint8_t by
 #define QLINK_LOOP_BACK_RESPONSE_US 0UL
 
 /* ---- Slave ----
- * One function for each command. A command without one is not answered, nor is one whose function returns false; a
- * wrong request never reaches its function. The response comes with its defaults. Of a broadcast, `broadcast` is set
- * while the function runs; the answer carries the slave's node as the function leaves it. */
+ * One function for each command. A command without a function, or whose function returns false, gets no response.
+ * Only valid requests are passed to functions. The response is initialised with its defaults. During a broadcast,
+ * `broadcast` is set; the response has the slave's node as set by the function. */
 typedef struct qlink_slave qlink_slave_t;
 
 struct qlink_slave {
     uint8_t node;
     bool broadcast;
-    void *context; /* yours */
+    void *context; /* for the application */
     bool (*node_setup)(qlink_slave_t *slave, const qlink_node_setup_request_t *request);
     bool (*node_info)(qlink_slave_t *slave, qlink_node_info_response_t *response);
     void (*node_start)(qlink_slave_t *slave);
@@ -2783,7 +2783,7 @@ static inline int qlink_slave_loop_back_(
     return size;
 }
 
-/* Requests that go to one node. */
+/* Requests to one node. */
 static inline int qlink_handle_own_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     switch (frame->id) {
@@ -2820,7 +2820,7 @@ static inline int qlink_handle_own_(qlink_slave_t *slave, const qlink_frame_t *f
     }
 }
 
-/* Requests that all nodes may get; the others must not be broadcast. */
+/* Requests that may be broadcast; the others must not be. */
 static inline int qlink_handle_any_(qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
     switch (frame->id) {
@@ -2839,8 +2839,8 @@ static inline int qlink_handle_any_(qlink_slave_t *slave, const qlink_frame_t *f
     }
 }
 
-/* Handles a request; returns the bytes of the answer in `wire`, 0 where there is nothing to send. `wire` may take
- * QLINK_MAX_WIRE_SIZE bytes, and must not be the memory that the frame lies in. */
+/* Handles a request; returns the size of the response in `wire`, 0 if there is none. `wire` needs up to
+ * QLINK_MAX_WIRE_SIZE bytes, and must not overlap the frame. */
 static inline size_t qlink_slave_dispatch(
     qlink_slave_t *slave, const qlink_frame_t *frame, uint8_t *wire, size_t capacity)
 {
@@ -2853,12 +2853,12 @@ static inline size_t qlink_slave_dispatch(
 }
 
 /* ---- Master ----
- * One function for each message; one without a function is decoded and dropped. Before dispatching an answer compare
- * its id and node with what was asked: a late answer must not pass for the next one. */
+ * One function for each message; messages without a function are decoded and dropped. Before dispatching a response
+ * compare its id and node with the request: it may be a late response to an earlier one. */
 typedef struct qlink_master qlink_master_t;
 
 struct qlink_master {
-    void *context; /* yours */
+    void *context; /* for the application */
     void (*node_setup)(qlink_master_t *master, uint8_t node);
     void (*node_info)(qlink_master_t *master, uint8_t node, const qlink_node_info_response_t *message);
     void (*node_program_load)(qlink_master_t *master, uint8_t node, const qlink_node_program_load_response_t *message);
@@ -2878,8 +2878,7 @@ struct qlink_master {
     void (*loop_back)(qlink_master_t *master, uint8_t node, const qlink_loop_back_response_t *message);
 };
 
-/* Checks a message and the address it comes with, decodes it and hands it over; returns QLINK_OK, or what is wrong
- * with it. */
+/* Checks a message and its address, decodes it and passes it to its function; returns QLINK_OK or an error. */
 static inline int qlink_master_dispatch(qlink_master_t *master, const qlink_frame_t *frame)
 {
     int status;

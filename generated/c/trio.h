@@ -7,12 +7,12 @@
  * counts down to zero and sends every other one on. Bit 7 marks header and end of a message; payload
  * bytes carry seven bits.
  *
- * C99, C11 and C++17; no library beyond the headers included below, no allocation, no static data but a CRC table
- * where one is chosen. Sizes and errors: a function that writes returns the number of bytes, or a negative
- * trio_status_t. Macros to define in front of the include, all optional:
+ * C99, C11 and C++17; no library except the headers included below, no allocation, no static data except a CRC
+ * table if selected. Functions that write return the number of bytes, or a negative trio_status_t. Optional
+ * macros, to be defined before the include:
  *   TRIO_ENABLE_FLOAT=1  conversions between raw and physical values, in double
  *   TRIO_ENABLE_NAMES=1  names of enum values as text
- *   TRIO_CRC_FORM=FORM   TRIO_CRC_FORM_LOOP (as it is), _NIBBLE or _TABLE
+ *   TRIO_CRC_FORM=FORM   TRIO_CRC_FORM_LOOP (default), _NIBBLE or _TABLE
  *   TRIO_CRC=NAME        another 16-bit algorithm, such as TRIO_CRC_16_XMODEM
  *
  * Example:
@@ -65,31 +65,31 @@ extern "C" {
 #define TRIO_ENABLE_NAMES 0
 #endif
 
-/* What the code relies on: bytes of eight bits, and two's complement where an unsigned number becomes a signed one. */
+/* Requirements: bytes of eight bits, and two's complement in conversions from unsigned to signed. */
 typedef char trio_needs_bytes_of_8_bits_[(CHAR_BIT == 8) ? 1 : -1];
 typedef char trio_needs_twos_complement_[(((int8_t)0xFFU == -1) && ((int16_t)0xFFFFU == -1)) ? 1 : -1];
 typedef char trio_needs_sizes_in_int_[(INT_MAX >= 258) ? 1 : -1];
 
-/* What went wrong; functions return it as an int, which may also be a number of bytes. */
+/* Errors; functions return them as an int, which may also be a number of bytes. */
 enum {
     TRIO_OK = 0,
     TRIO_ERROR_CAPACITY = -1,  /* the buffer is too small */
-    TRIO_ERROR_LENGTH = -2,    /* a size or count that the message cannot have */
-    TRIO_ERROR_RANGE = -3,     /* a value outside its range, an address not allowed, a constant that is wrong */
-    TRIO_ERROR_UNKNOWN = -4,   /* no message of this direction has the id */
-    TRIO_ERROR_CRC = -5,       /* the check value is wrong */
-    TRIO_ERROR_STUFFING = -6,  /* a byte that must be followed by an inserted one is not */
-    TRIO_ERROR_TRUNCATED = -7, /* the frame is not complete */
-    TRIO_ERROR_FRAME = -8,     /* preamble, header or end is wrong */
-    TRIO_ERROR_ILLEGAL = -9    /* the slave does not know the command */
+    TRIO_ERROR_LENGTH = -2,    /* wrong size or count */
+    TRIO_ERROR_RANGE = -3,     /* value out of range, illegal address, wrong constant */
+    TRIO_ERROR_UNKNOWN = -4,   /* unknown message id in this direction */
+    TRIO_ERROR_CRC = -5,       /* wrong check value */
+    TRIO_ERROR_STUFFING = -6,  /* missing inserted byte */
+    TRIO_ERROR_TRUNCATED = -7, /* incomplete frame */
+    TRIO_ERROR_FRAME = -8,     /* wrong preamble, header or end */
+    TRIO_ERROR_ILLEGAL = -9    /* command rejected by the slave as unknown */
 };
 typedef int trio_status_t;
 
-/* What a received byte completed. */
+/* The event that a received byte completed. */
 typedef enum trio_event {
     TRIO_EVENT_NONE,
     TRIO_EVENT_FRAME,     /* an intact frame */
-    TRIO_EVENT_CRC,       /* a fault each: */
+    TRIO_EVENT_CRC,       /* errors: */
     TRIO_EVENT_STUFFING,
     TRIO_EVENT_LENGTH,
     TRIO_EVENT_UNKNOWN,
@@ -195,7 +195,7 @@ static inline void trio_copy_(uint8_t *to, const uint8_t *from, size_t count)
     }
 }
 
-/* Characters of seven bits. */
+/* Whether all characters have seven bits. */
 static inline bool trio_is_text_(const uint8_t *bytes, size_t size)
 {
     for (size_t index = 0U; index < size; ++index) {
@@ -207,7 +207,7 @@ static inline bool trio_is_text_(const uint8_t *bytes, size_t size)
 }
 
 #if TRIO_ENABLE_FLOAT
-/* The whole number of steps that is nearest, a tie to the even one. What is not exact in a double is not exact here. */
+/* The nearest whole number of steps, ties to even, with the precision of a double. */
 static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most, int64_t *raw)
 {
     int64_t whole;
@@ -230,7 +230,7 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
     } else if ((rest < -0.5) || ((rest == -0.5) && ((whole & 1) != 0))) {
         --whole;
     } else {
-        /* already the nearest */
+        /* already rounded */
     }
     *raw = whole;
     return TRIO_OK;
@@ -240,8 +240,8 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 /* ---- Check value: crc-16/ibm-3740 ---- */
 
 /* Any 16-bit algorithm of the CRC catalogue: (polynomial, start value, reflected, final XOR).
- * Choose one with -DTRIO_CRC=TRIO_CRC_16_XMODEM, or write a tuple of your own. The check value is the CRC of
- * the nine characters 123456789. */
+ * Select one with -DTRIO_CRC=TRIO_CRC_16_XMODEM, or define a tuple. The check value is the CRC of the nine
+ * characters 123456789. */
 #define TRIO_CRC_16_ARC (0x8005U, 0x0000U, 1, 0x0000U) /* check value 0xBB3D */
 #define TRIO_CRC_16_CDMA2000 (0xC867U, 0xFFFFU, 0, 0x0000U) /* check value 0x4C06 */
 #define TRIO_CRC_16_CMS (0x8005U, 0xFFFFU, 0, 0x0000U) /* check value 0xAEE7 */
@@ -277,7 +277,7 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #define TRIO_CRC TRIO_CRC_16_IBM_3740
 #endif
 
-/* 1 for what stands in parentheses, 0 for a name that no macro replaces. */
+/* Expands to 1 for a parenthesised tuple, 0 for an undefined name. */
 #define TRIO_CRC_PROBE_(...) 0, 1
 #define TRIO_CRC_PICK_(first, second, ...) second
 #define TRIO_CRC_SECOND_(...) TRIO_CRC_PICK_(__VA_ARGS__)
@@ -285,7 +285,7 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #if !TRIO_CRC_KNOWN_(TRIO_CRC_PROBE_ TRIO_CRC)
 #error "TRIO_CRC is neither an algorithm of this header, such as TRIO_CRC_16_IBM_3740, nor a tuple"
 #undef TRIO_CRC
-#define TRIO_CRC TRIO_CRC_16_IBM_3740 /* so that this is the only error */
+#define TRIO_CRC TRIO_CRC_16_IBM_3740 /* avoids further errors */
 #endif
 
 #define TRIO_CRC_TAKE_1_(poly, start, reflected, xorout) poly
@@ -298,7 +298,7 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #define TRIO_CRC_REFLECTED_ TRIO_CRC_EXPAND_(TRIO_CRC_TAKE_3_ TRIO_CRC)
 #define TRIO_CRC_XOROUT_ TRIO_CRC_EXPAND_(TRIO_CRC_TAKE_4_ TRIO_CRC)
 
-/* A reflected CRC keeps its register turned round, so that nothing has to be turned for each byte. */
+/* A reflected CRC keeps its register reflected, which saves reflecting each byte. */
 #define TRIO_SWAP_1_(x) ((((x) & 0x5555U) << 1) | (((x) >> 1) & 0x5555U))
 #define TRIO_SWAP_2_(x) ((((x) & 0x3333U) << 2) | (((x) >> 2) & 0x3333U))
 #define TRIO_SWAP_4_(x) ((((x) & 0x0F0FU) << 4) | (((x) >> 4) & 0x0F0FU))
@@ -312,7 +312,7 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #define TRIO_CRC_START_ TRIO_CRC_INIT_
 #endif
 
-/* Its form: LOOP is smallest; NIBBLE has a table of 16 entries, TABLE one of 256 and is fastest. */
+/* Its form: LOOP is the smallest, NIBBLE has a table of 16 entries, TABLE one of 256 and is the fastest. */
 #define TRIO_CRC_FORM_LOOP 1
 #define TRIO_CRC_FORM_NIBBLE 2
 #define TRIO_CRC_FORM_TABLE 3
@@ -322,7 +322,7 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 
 #if TRIO_CRC_FORM == TRIO_CRC_FORM_TABLE && \
     (TRIO_CRC_POLY_ != 0x1021U || TRIO_CRC_REFLECTED_ != 0)
-#error "The 256-entry table is that of crc-16/ibm-3740: choose TRIO_CRC_FORM_NIBBLE, or generate with --set crc=NAME"
+#error "The 256-entry table is for crc-16/ibm-3740: select TRIO_CRC_FORM_NIBBLE, or generate with --set crc=NAME"
 #endif
 
 #if TRIO_CRC_FORM != TRIO_CRC_FORM_LOOP
@@ -333,8 +333,8 @@ static inline int trio_nearest_int64_(double steps, int64_t least, int64_t most,
 #define TRIO_CRC_STORAGE_
 #define TRIO_CRC_ENTRY_(index) trio_crc_table[(index)]
 #endif
-/* Each file that includes this header and computes a CRC has the table once. For one table in a program of several
- * such files, define TRIO_CRC_SHARED_TABLE in all of them and TRIO_CRC_DEFINE_TABLE in one. */
+/* Each file that includes this header and computes a CRC contains the table. To share one table among several files,
+ * define TRIO_CRC_SHARED_TABLE in all of them and TRIO_CRC_DEFINE_TABLE in one. */
 #if !defined(TRIO_CRC_SHARED_TABLE)
 #define TRIO_CRC_DECLARE_ static const
 #define TRIO_CRC_HERE_ 1
@@ -349,7 +349,7 @@ extern const uint16_t trio_crc_table[];
 
 #if TRIO_CRC_FORM == TRIO_CRC_FORM_NIBBLE
 #if TRIO_CRC_HERE_
-/* A step is linear: an entry is the sum of what its four bits do, so the compiler can compute the table. */
+/* A step is linear: an entry is the sum of those of its four bits, so the compiler can compute the table. */
 #if TRIO_CRC_REFLECTED_
 #define TRIO_CRC_CLOCK_(x) (((x) >> 1) ^ (((x) & 1U) * TRIO_CRC_FEEDBACK_))
 #define TRIO_CRC_BIT_3_ TRIO_CRC_FEEDBACK_
@@ -414,7 +414,7 @@ TRIO_CRC_DECLARE_ uint16_t trio_crc_table[256] TRIO_CRC_STORAGE_ = {
 #error "TRIO_CRC_FORM must be TRIO_CRC_FORM_LOOP, _NIBBLE or _TABLE"
 #endif
 
-/* The register before the first byte, after one more byte, and the check value that it stands for at last. */
+/* The initial register, the register after one more byte, and the check value of the final register. */
 static inline uint16_t trio_check_start(void)
 {
     return (uint16_t)TRIO_CRC_START_;
@@ -465,7 +465,7 @@ static inline uint16_t trio_check_finish(uint16_t crc)
 
 /* ---- Frame ---- */
 
-/* A frame that was received. */
+/* A received frame. */
 typedef struct trio_frame {
     uint8_t id;
     uint8_t address;
@@ -478,13 +478,13 @@ typedef struct trio_frame {
 #define TRIO_KEYPAD_OFFSET_ID 0x03
 #define TRIO_KEYPAD_MODE_MESSAGE_ID 0x04
 
-/* Whether a frame with so many bytes of payload fits. */
+/* Whether a frame with a payload of this size fits. */
 static inline bool trio_fits_(size_t capacity, size_t size)
 {
     return (capacity >= 2U) && ((capacity - 2U) >= size);
 }
 
-/* Where the payload of a frame that fits is written, its place in the frame. */
+/* Address for the payload of a frame. */
 static inline uint8_t *trio_place_(uint8_t *wire, size_t capacity, size_t size)
 {
     (void)capacity;
@@ -492,8 +492,7 @@ static inline uint8_t *trio_place_(uint8_t *wire, size_t capacity, size_t size)
     return &wire[1];
 }
 
-/* Whether a message of an id has so many bytes between header and end, and whether the last of them are a check
- * value. */
+/* Whether a message can have `count` bytes between header and end, and whether they end with a check value. */
 static inline bool trio_shape_(uint8_t id, size_t count, bool *checked)
 {
     switch (id) {
@@ -516,7 +515,7 @@ static inline bool trio_shape_(uint8_t id, size_t count, bool *checked)
     return false;
 }
 
-/* Completes a frame whose payload is in its place already. */
+/* Completes a frame whose payload is already in place. */
 static inline int trio_wrap_(
     uint8_t id, uint8_t address, uint8_t *wire, size_t capacity, int payload_size, bool checked)
 {
@@ -552,8 +551,8 @@ static inline int trio_wrap_(
     return (int)at;
 }
 
-/* Unpacks exactly one whole frame. Framing and check value are verified; what the frame carries is checked by
- * trio_message_check or by decoding it. */
+/* Decodes exactly one whole frame. Verifies framing and check value; the contents are checked by
+ * trio_message_check or by decoding them. */
 static inline int trio_frame_decode(trio_frame_t *frame, const uint8_t *wire, size_t size)
 {
     size_t at = 1U;
@@ -602,7 +601,7 @@ static inline int trio_frame_decode(trio_frame_t *frame, const uint8_t *wire, si
     return TRIO_OK;
 }
 
-/* The same for a message that the address 1..15 may have. */
+/* As trio_wrap_(), for address 1..15. */
 static inline int trio_wrap_1_to_15_(
     uint8_t id, uint8_t address, uint8_t *wire, size_t capacity, int payload_size, bool checked)
 {
@@ -866,7 +865,7 @@ static inline int trio_keypad_mode_message_to_frame(
     return trio_wrap_1_to_15_(TRIO_KEYPAD_MODE_MESSAGE_ID, address, wire, capacity, size, false);
 }
 
-/* What a message carries is right: id, address, size, ranges. */
+/* Validates id, address, payload size and ranges of a message. */
 static inline int trio_message_check(const trio_frame_t *frame)
 {
     bool allowed = true;
@@ -904,12 +903,12 @@ static inline int trio_message_check(const trio_frame_t *frame)
     return ((status == TRIO_OK) && !allowed) ? TRIO_ERROR_RANGE : status;
 }
 
-/* ---- Receiver: one byte at a time, each in constant time, so that it can run in an interrupt ----
- * The marker bit tells header and end from everything else: nothing is looked at twice, and after any disturbance the
- * next intact frame is delivered. A frame stays valid until the next byte is received; handle it before, or copy it.
- * What the frame carries is checked when it is dispatched or decoded. */
+/* ---- Receiver: one byte at a time, each in constant time, suitable for an interrupt ----
+ * The marker bit distinguishes header and end from other bytes: each byte is processed once, and after any disturbance
+ * the next intact frame is delivered. A frame is valid until the next byte is received; handle or copy it before. Its
+ * contents are checked when it is dispatched or decoded. */
 typedef struct trio_receiver {
-    uint16_t check; /* over what is certainly no check byte */
+    uint16_t check; /* over bytes that cannot be check bytes */
     uint16_t count;
     uint8_t state;
     uint8_t header;
@@ -917,7 +916,7 @@ typedef struct trio_receiver {
 } trio_receiver_t;
 
 #define TRIO_IDLE_ 0U
-#define TRIO_HUNTING_ 1U /* behind a fault: only a header is of interest */
+#define TRIO_HUNTING_ 1U /* after an error: skip to the next header */
 #define TRIO_INSIDE_ 2U
 
 static inline void trio_receiver_init(trio_receiver_t *receiver)
@@ -927,7 +926,7 @@ static inline void trio_receiver_init(trio_receiver_t *receiver)
     receiver->count = 0U;
 }
 
-/* The frame that trio_receive has just announced. */
+/* The frame of the last TRIO_EVENT_FRAME. */
 static inline trio_frame_t trio_receiver_frame(const trio_receiver_t *receiver)
 {
     trio_frame_t frame;
@@ -967,7 +966,7 @@ static inline trio_event_t trio_receiver_end_(trio_receiver_t *receiver, uint8_t
     return TRIO_EVENT_FRAME;
 }
 
-/* Takes the next byte; tells what it completed. */
+/* Processes the next byte; returns the event that it completed. */
 static inline trio_event_t trio_receive(trio_receiver_t *receiver, uint8_t byte)
 {
     if ((byte & 0x80U) != 0U) {
@@ -1000,12 +999,12 @@ static inline trio_event_t trio_receive(trio_receiver_t *receiver, uint8_t byte)
 }
 
 /* ---- Listener ----
- * One function for each message; one without a function is decoded and dropped. Before dispatching an answer compare
- * its id and address with what was asked: a late answer must not pass for the next one. */
+ * One function for each message; messages without a function are decoded and dropped. Before dispatching a response
+ * compare its id and address with the request: it may be a late response to an earlier one. */
 typedef struct trio_listener trio_listener_t;
 
 struct trio_listener {
-    void *context; /* yours */
+    void *context; /* for the application */
     void (*character_transfer)(trio_listener_t *listener, uint8_t address, const trio_character_transfer_t *message);
     void (*direct_variable_transfer)(trio_listener_t *listener, uint8_t address,
         const trio_direct_variable_transfer_t *message);
@@ -1013,8 +1012,7 @@ struct trio_listener {
     void (*keypad_mode_message)(trio_listener_t *listener, uint8_t address, const trio_keypad_mode_message_t *message);
 };
 
-/* Checks a message and the address it comes with, decodes it and hands it over; returns TRIO_OK, or what is wrong
- * with it. */
+/* Checks a message and its address, decodes it and passes it to its function; returns TRIO_OK or an error. */
 static inline int trio_listener_dispatch(trio_listener_t *listener, const trio_frame_t *frame)
 {
     int status;

@@ -1,4 +1,4 @@
-"""C headers: one self-contained C99 header for each protocol."""
+"""C headers: a self-contained C99 header for each protocol."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conditions under which a value is refused, and how it gets from a struct to its bits and back."""
+"""Conditions on values, and conversion between struct members and bits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from qlinkgen.plan.payload import conditions, limits
 
 
 def refused_before_sending(number: Scalar, value: str) -> list[str]:
-    """Conditions on a struct member; its C type may hold more than the wire."""
+    """Conditions that reject a struct member, whose C type may have a larger range than the wire."""
     if number.meaning == "bool":
         return []
     width = storage(number.bits)
@@ -22,13 +22,13 @@ def refused_before_sending(number: Scalar, value: str) -> list[str]:
 
 
 def refused_when_received(number: Scalar, value: str) -> list[str]:
-    """Conditions on a value that was read from its bits."""
+    """Conditions that reject a received value."""
     held = Within(number.natural_minimum, number.natural_maximum)
     return broken(conditions(number), value, held, number.bits, signed=number.signed)
 
 
 def broken(rules: Iterable[Limit], value: str, held: Within, bits: int, *, signed: bool = False) -> list[str]:
-    """Conditions of which one holds where a rule is broken; the value has so many bits and is in ``held``."""
+    """Conditions that hold if a rule is violated; the value has ``bits`` bits and is in ``held``."""
     terms: list[str] = []
     for rule in rules:
         match rule:
@@ -43,24 +43,24 @@ def broken(rules: Iterable[Limit], value: str, held: Within, bits: int, *, signe
 
 
 def condition(terms: list[str]) -> str:
-    """Any of the terms."""
+    """The disjunction of the terms."""
     return terms[0] if len(terms) == 1 else " || ".join(f"({term})" for term in terms)
 
 
 def refusal(terms: list[str], error: str) -> list[str]:
-    """The statement that returns an error where a term holds; none where there are no terms."""
+    """The statement that returns an error if a term holds; empty without terms."""
     return [f"if ({condition(terms)}) {{", f"    return {error};", "}"] if terms else []
 
 
 def as_unsigned(number: Scalar, value: str) -> str:
-    """The expression of a struct member for writing it: its bits in an unsigned type."""
+    """The expression that converts a struct member to an unsigned integer of its bits."""
     if number.meaning == "bool":
         return f"({unsigned_type(number.bits)})({value} ? 1U : 0U)"
     return f"({unsigned_type(number.bits)}){value}" if number.signed else value
 
 
 def from_unsigned(number: Scalar, raw: str, layouts: Layouts) -> str:
-    """The expression that turns bits which were read into the struct member."""
+    """The expression that converts received bits to a struct member."""
     if number.meaning == "bool":
         return f"{raw} != 0U"
     if not number.signed:

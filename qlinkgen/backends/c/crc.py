@@ -1,4 +1,4 @@
-"""The check value: forms of a CRC, the catalogue to choose from, tables as literals."""
+"""The check value: forms of a CRC, selectable algorithms, tables as literals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qlinkgen.model.checksum import Algorithm, Sum, catalogue
 
 
 def algorithm_macro(algorithm: Algorithm) -> str:
-    """``crc-16/ibm-3740`` as the tail of a macro's name: ``CRC_16_IBM_3740``."""
+    """``crc-16/ibm-3740`` as part of the name of a macro: ``CRC_16_IBM_3740``."""
     return "".join(c if c.isalnum() else "_" for c in algorithm.name).upper()
 
 
@@ -27,7 +27,7 @@ class SumView:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """An algorithm that a user of the header may choose."""
+    """An algorithm that users of the header may select."""
 
     macro: str
     tuple: str
@@ -36,7 +36,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrcView:
-    """A CRC, and how a byte enters its register."""
+    """A CRC and the code of a step."""
 
     name: str
     macro: str
@@ -69,7 +69,7 @@ def render(algorithm: Algorithm | Sum) -> CheckView:
     """The check value for the template.
 
     Raises:
-        GenerationError: C has no form for the CRC.
+        GenerationError: the CRC is not supported.
     """
     match algorithm:
         case Sum():
@@ -88,9 +88,11 @@ def _render_sum(algorithm: Sum) -> SumView:
 
 def _render_crc(algorithm: Algorithm) -> CrcView:
     if algorithm.refin != algorithm.refout or algorithm.width not in (8, 16, 24, 32, 64):
-        raise GenerationError(f"{algorithm.name}: C has no form for this CRC; use one of whole bytes")
+        raise GenerationError(
+            f"{algorithm.name}: not supported in C; use a CRC of whole bytes with equal refin and refout"
+        )
     width, kind = algorithm.width, unsigned_type(algorithm.width)
-    # 24 bits lie in a wider type, and 8 bits shift out completely.
+    # A CRC of 24 bits needs a mask in its wider type; one of 8 bits is shifted out completely.
     return CrcView(
         name=algorithm.name,
         macro=algorithm_macro(algorithm),

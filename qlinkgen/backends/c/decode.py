@@ -1,4 +1,4 @@
-"""The statements that read a payload: its sizes first, then every step in wire order, each checked."""
+"""Generates the statements that decode a payload: sizes first, then each step in wire order."""
 
 from __future__ import annotations
 
@@ -35,16 +35,16 @@ from qlinkgen.plan.payload import (
 
 @dataclass
 class Decoder(Learner):
-    """Collects the statements for one message; afterwards `known` are all runs of variable size.
+    """Collects the statements for one message; afterwards `known` holds all runs of variable size.
 
-    No count is read before it is sure that its bytes are there.
+    A count is read only after a check that its bytes have been received.
     """
 
-    #: Some byte of the payload is looked at.
+    #: Whether any byte of the payload is read.
     reads: bool = False
 
     def statements(self) -> list[str]:
-        """Lines of the function's body, without the last one."""
+        """Lines of the function body, without the last one."""
         self._check_size()
         for each in self.payload.sizing:
             self._size(each)
@@ -59,7 +59,7 @@ class Decoder(Learner):
         if plan.fixed:
             self.refuse([f"size != {plan.most}U"], "LENGTH")
             return
-        known = 1 if plan.empty_is_default else 0  # no bytes at all have been dealt with before
+        known = 1 if plan.empty_is_default else 0  # an empty payload has been handled before
         terms = [f"size < {plan.least}U"] if plan.least > known else []
         self.refuse([*terms, f"size > {plan.most}U"], "LENGTH")
 
@@ -87,7 +87,7 @@ class Decoder(Learner):
             self.refuse([f"({left} % {run.item_size}U) != 0U"], "LENGTH")
             left = f"{left} / {run.item_size}U"
         self.lines.append(f"const size_t {local(run.name)} = {left};")
-        if self.known:  # else its bounds are those of the size
+        if self.known:  # otherwise implied by the bounds of the size
             self.refuse([f"{local(run.name)} > {length.maximum}U"], "LENGTH")
         self.known.append(run.name)
 
@@ -128,7 +128,7 @@ class Decoder(Learner):
                 assert_never(step)
 
     def _get(self, place: Place, integer: Integer, further: str = "") -> str:
-        """The bits of an integer, once it is checked that they are those of one."""
+        """The bits of an integer; adds the check of its unused bits."""
         index = index_of(place, local, further)
         self.reads = True
         if unused := self.layouts.unused_bits(integer, "payload", index):
@@ -136,7 +136,7 @@ class Decoder(Learner):
         return self.layouts.get(integer, "payload", index)
 
     def _assign(self, target: str, number: Scalar, raw: str) -> None:
-        if number.meaning == "bool":  # the bits are checked: a bool has no wrong value
+        if number.meaning == "bool":  # check the bits, since a C bool is always valid
             self.refuse(checks.refused_when_received(number, raw), "RANGE")
         self.lines.append(f"{target} = {checks.from_unsigned(number, raw, self.layouts)};")
         if number.meaning != "bool":
@@ -149,7 +149,7 @@ class Decoder(Learner):
         self._assign(f"message->{naming.member(member.name)}", member.number, f"{kind}{raw}")
 
     def _number_of(self, run: RunStep) -> str:
-        """How many items there are; where that varies, the message is told."""
+        """The number of items; if it varies, it is stored in the message."""
         self.reads = True
         if run.fixed:
             return f"{run.length.maximum}U"

@@ -1,4 +1,4 @@
-"""Dispatch tables: one function pointer for each command of a slave, for each response of a master."""
+"""Dispatch tables: one function pointer for each command of a slave, or for each response of a master."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from qlinkgen.plan.tree import MessagePlan
 
 
 def told_name(names: Names, message: Message) -> str:
-    """The member for a message that a master or a listener is told of."""
+    """The member for a message that a master or a listener receives."""
     stem = names.stem(message)
     return handler(stem.removesuffix("_response") if message.direction == "response" else stem, names.address)
 
@@ -28,13 +28,13 @@ def handler_name(names: Names, message: Message) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlaveEntry:
-    """What a slave can be asked.
+    """A request to a slave.
 
     Attributes:
         own: it must not be broadcast.
-        unsupported: the answer of a slave that has no function for it.
-        right: condition that holds where its payload is right.
-        unless_silent: the term of a condition that keeps a broadcast from being answered.
+        unsupported: the result if the slave has no function for it.
+        right: condition for a valid payload.
+        unless_silent: term of a condition that prevents a response to a broadcast.
     """
 
     name: str
@@ -54,7 +54,7 @@ class SlaveEntry:
 
 @dataclass(frozen=True, slots=True)
 class SlaveGroup:
-    """Requests by whom they may go to; ``otherwise`` is the answer to all others."""
+    """Requests with the same kind of recipients; ``otherwise`` is the result for all others."""
 
     name: str
     text: str
@@ -65,7 +65,7 @@ class SlaveGroup:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What a master or a listener can be told of."""
+    """A message for a master or a listener."""
 
     name: str
     expected: Expected
@@ -88,7 +88,7 @@ class Transaction:
 def slave_entries(
     names: Names, kept: tuple[Message, ...], *, addressed: bool, reject: str
 ) -> list[SlaveEntry]:
-    """What a slave can be asked, in schema order; ``reject`` is the function that refuses, "" without one."""
+    """Requests to a slave, in schema order; ``reject`` is the function that rejects, "" if there is none."""
     present = {message.name for message in kept}
     entries = []
     for message in kept:
@@ -96,7 +96,7 @@ def slave_entries(
             command = names.command_of(message)
             answer = command.response if command and command.response else None
             answer = answer if answer and answer.name in present else None
-            # A message of no command goes to one node.
+            # A message without a command goes to one node.
             addressing = command.addressing if command else "node"
             entries.append(_entry(names, message, answer, addressing if addressed else "", reject))
     return entries
@@ -127,22 +127,22 @@ def _entry(
 
 
 def slave_groups(entries: list[SlaveEntry], prefix: str) -> list[SlaveGroup]:
-    """The last group passes on what it does not have."""
+    """The groups of requests; the last one calls the others."""
     own = [entry for entry in entries if entry.own]
     writes = any(entry.answered for entry in own or entries)
     if not own:
         return [SlaveGroup("any", "All requests.", entries, "0", writes)]
     others = [entry for entry in entries if not entry.own]
     call = f"{prefix}_handle_own_(slave, frame, wire, capacity)"
-    rest = "Requests that all nodes may get; the others must not be broadcast."
+    rest = "Requests that may be broadcast; the others must not be."
     return [
-        SlaveGroup("own", "Requests that go to one node.", own, "0", writes),
+        SlaveGroup("own", "Requests to one node.", own, "0", writes),
         SlaveGroup("any", rest, others, f"slave->broadcast ? 0 : {call}", writes=True),
     ]
 
 
 def told(names: Names, address: Address, kept: Sequence[MessagePlan]) -> list[Told]:
-    """What a master or a listener can be told of, in schema order."""
+    """Messages for a master or a listener, in schema order."""
     return [
         Told(told_name(names, message.message), expected(names, address, message))
         for message in kept

@@ -1,4 +1,4 @@
-"""The statements that write a payload: sizes are checked, then values; bytes follow in wire order."""
+"""Generates the statements that encode a payload: checks of sizes and values, then bytes in wire order."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Encoder:
     lines: list[str] = field(default_factory=list)
 
     def statements(self) -> list[str]:
-        """Lines of the function's body, without the last one."""
+        """Lines of the function body, without the last one."""
         for run in self.payload.runs:
             kind = count_type(run.length.maximum)
             self.lines.append(f"const {kind} {local(run.name)} = message->{run.name}_{run.quantity};")
@@ -130,7 +130,7 @@ class Encoder:
 
 
 def item_offset(run: ItemsStep) -> str:
-    """Bytes before an item in its run."""
+    """Offset of an item in its run."""
     return "index" if run.item_size == 1 else f"({run.item_size}U * index)"
 
 
@@ -140,7 +140,7 @@ def loop(count: str, body: list[str], kind: str = "size_t") -> list[str]:
 
 
 def _whole(step: BitsStep) -> str:
-    """The integer that is put together from its members."""
+    """The integer composed of its members."""
     bits = step.integer.bits
     terms = [
         _in_place(each.number, each.shift, f"message->{member_of(each.name)}", bits) for each in step.members
@@ -153,6 +153,6 @@ def _in_place(number: Scalar, shift: int, value: str, bits: int) -> str:
     if number.meaning == "bool":
         return f"({value} ? {unsigned(1 << shift, bits, hexadecimal=True)} : {unsigned(0, bits)})"
     if number.signed and kind != unsigned_type(number.bits):
-        value = f"({unsigned_type(number.bits)}){value}"  # no sign is extended
+        value = f"({unsigned_type(number.bits)}){value}"  # prevents sign extension
     taken = f"({kind})(({kind}){value} & {unsigned(number.integer.mask, bits, hexadecimal=True)})"
     return f"({kind})({taken} << {shift})" if shift else taken

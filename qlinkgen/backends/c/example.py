@@ -1,4 +1,4 @@
-"""The head comment's list of options and its example, a program that compiles as it stands."""
+"""Options and example program for the head comment of a header."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     from qlinkgen.backends.c.frames import FrameSection
 
 
-#: Parameters stand one a line: names of messages are long.
+#: One parameter per line, because names of messages are long.
 _BREAK = "\n *     "
 
 
 def option_lines(upper: str, check: CheckView | None) -> list[str]:
-    """Macros that a user may define."""
+    """Macros that users may define."""
     options = [
         (f"{upper}_ENABLE_FLOAT=1", "conversions between raw and physical values, in double"),
         (f"{upper}_ENABLE_NAMES=1", "names of enum values as text"),
     ]
     if isinstance(check, CrcView):
-        options.append((f"{upper}_CRC_FORM=FORM", f"{upper}_CRC_FORM_LOOP (as it is), _NIBBLE or _TABLE"))
+        options.append((f"{upper}_CRC_FORM=FORM", f"{upper}_CRC_FORM_LOOP (default), _NIBBLE or _TABLE"))
     if isinstance(check, CrcView) and check.selectable:
         options.append((f"{upper}_CRC=NAME", f"another 16-bit algorithm, such as {upper}_CRC_16_XMODEM"))
     width = max(len(name) for name, _ in options)
@@ -35,7 +35,7 @@ def option_lines(upper: str, check: CheckView | None) -> list[str]:
 
 
 def example_lines(plan: Plan, names: Names, section: FrameSection) -> list[str]:
-    """A slave where the header has one, else a master or a listener."""
+    """A slave if the header has one, otherwise a master or a listener."""
     if plan.protocol.directions == ("message",):
         return _listener(names, section, plan.messages[0], "listener")
     pairs = [
@@ -136,7 +136,7 @@ def _direction(names: Names, section: FrameSection, direction: str) -> str:
 
 
 def _echo(request: MessagePlan, response: MessagePlan) -> list[str]:
-    """What both have is returned; that shows how fields are reached."""
+    """Statements that copy common fields from request to response, to show access to fields."""
     asked, told = _numbers(request), _numbers(response)
     if same := [name for name in told if name in asked]:
         return [f"    response->{member(name)} = request->{member(name)};" for name in same]
@@ -150,7 +150,7 @@ def _numbers(message: MessagePlan) -> list[str]:
 
 
 def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: str) -> list[str]:
-    """Each byte, as an interrupt or a loop brings it."""
+    """A function that processes a received byte, for an interrupt or a loop."""
     upper, rescans = prefix.upper(), section.rescans
     test = (
         "while (event != {P}_EVENT_NONE) {{"

@@ -1,4 +1,4 @@
-"""The frame of a protocol as one object: templates, values, calls, chosen by its receiver."""
+"""The frame section of a header: templates, views and functions, selected by the kind of receiver."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 Heard = Sequence[tuple[Direction, Sequence[MessagePlan]]]
 
-#: What the templates of one kind of frame place, beside `FrameView`.
+#: Views of the templates of one kind of frame, in addition to `FrameView`.
 View = (
     PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | MarkedView | PacketView | None
 )
@@ -45,7 +45,7 @@ View = (
 
 @dataclass(frozen=True, slots=True)
 class DispatchView:
-    """What the dispatch template needs of the frame."""
+    """Properties of the frame for the dispatch template."""
 
     is_broadcast: str
     slave_arguments: str
@@ -56,7 +56,7 @@ class DispatchView:
 
 @dataclass(frozen=True)
 class FrameSection:
-    """What the header places for its frame; ``views`` are those of its templates, by name."""
+    """The frame section of a header; ``views`` are those of its templates, by name."""
 
     plan: Plan
     view: FrameView
@@ -67,52 +67,52 @@ class FrameSection:
 
     @property
     def rescans(self) -> bool:
-        """One byte can bring several events."""
+        """Whether one byte can produce several events."""
         return self.receiver == "receiver_rescan"
 
     @property
     def slave_only(self) -> bool:
-        """There is a receiver for slaves alone: only its request tells an answer from the next one."""
+        """Whether only slaves have a receiver, because splitting responses needs their requests."""
         return self.plan.frame.needs_request
 
     @property
     def needs_ids(self) -> bool:
-        """Receiving a frame needs to know the messages, so their ids come before it."""
+        """Whether receiving a frame depends on message ids, which are then defined before it."""
         by_message = self.view.bare or self.view.sized_by_message
         return by_message or isinstance(self.plan.frame.receiver, Marks | InStep)
 
     @property
     def request_sum(self) -> str:
-        """The C type of what a request adds to the check value of its answer, "" where it adds nothing."""
+        """C type of the contribution of a request to the check value of its response, "" if there is none."""
         check = self.plan.frame.check
         return sum_type(check) if self.slave_only and check else ""
 
     @property
     def reject(self) -> str:
-        """The function that makes the answer to a request that is not known, "" where there is none."""
+        """The function that makes the response to an unknown request, "" if there is none."""
         check = self.plan.frame.check
         return f"{self.plan.protocol.name}_reject_" if check and check.rejected is not None else ""
 
     def heard(self) -> Heard:
-        """Messages that are decoded, for each direction that a receiver can wait for."""
+        """Decoded messages for each direction of a receiver."""
         directions = (d for d in self.plan.protocol.directions if d in self.plan.heard)
         found = [(direction, self.plan.received(direction)) for direction in directions]
         return [(direction, messages) for direction, messages in found if messages]
 
     @property
     def judgement(self) -> str:
-        """The expression for what is wrong with what the frame received carries."""
+        """The expression that checks the contents of a received frame."""
         return judgement(self.plan, [direction for direction, _ in self.heard()])
 
     def shapes(self, names: Names) -> list[Shapes]:
-        """What a receiver of marked frames knows of the messages."""
+        """Message sizes for a receiver of marked frames."""
         return [
             Shapes(f"{names.upper}_{direction.upper()}", [shape(names, message) for message in messages])
             for direction, messages in self.heard()
         ]
 
     def sizes(self, names: Names) -> list[Sized]:
-        """What a receiver of packets knows of the requests."""
+        """Request sizes for a receiver of packets."""
         requests = [message for d, messages in self.heard() if d == "request" for message in messages]
         return sizes_by_value(names, requests)
 
@@ -123,14 +123,14 @@ class FrameSection:
         return framing.to_frame(self.plan.frame, names, address, message)
 
     def from_frame(self, names: Names, message: MessagePlan) -> framing.Function | None:
-        """The function that takes a whole frame apart, where the frame alone does not tell its message."""
+        """The function that decodes a whole frame, if the frame does not identify its message."""
         if not self.slave_only or message.direction != "response":
             return None
         return packet_from_frame(names, message)
 
     @property
     def dispatch(self) -> DispatchView:
-        """What the dispatch template needs of the frame."""
+        """Properties of the frame for the dispatch template."""
         name, protocol = self.view.address, self.plan.protocol
         broadcast = protocol.bus.broadcast is not None
         summed = f"{protocol.name}_frame_sum(frame), " if self.request_sum else ""

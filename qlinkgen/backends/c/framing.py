@@ -1,4 +1,4 @@
-"""Messages in frames: functions that make a whole frame, and checks of what a received one carries."""
+"""Messages in frames: functions that encode a whole frame, and checks of received frames."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from qlinkgen.plan.tree import MessagePlan
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """The address of a frame in C: its name and type, "" where there is none."""
+    """The address of a frame in C: its name, "" if there is none, and its type."""
 
     name: str
     bits: int
 
     @property
     def parameter(self) -> str:
-        """The parameter of a function."""
+        """The address as a parameter of a function."""
         return f"{unsigned_type(self.bits)} {self.name}, " if self.name else ""
 
     @property
     def argument(self) -> str:
-        """The argument of a call."""
+        """The address as an argument of a call."""
         return f"{self.name}, " if self.name else ""
 
 
 @dataclass(frozen=True, slots=True)
 class AddressGroup:
-    """Addresses that several messages have in common, as part of a name, as text and as a condition."""
+    """Legal addresses shared by several messages, as part of a name, as text and as a condition."""
 
     name: str
     text: str
@@ -42,7 +42,7 @@ class AddressGroup:
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function that makes or takes a whole frame: its own parameters, and its statements."""
+    """A function that encodes or decodes a whole frame: its specific parameters, and its statements."""
 
     parameters: str
     lines: list[str]
@@ -50,11 +50,11 @@ class Function:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What a received frame of a message has to satisfy.
+    """Conditions on a received frame of a message.
 
     Attributes:
-        allowed: condition of the address in ``frame``, "" where it may be any.
-        address_allowed: the same for the address in a parameter.
+        allowed: condition on the address in ``frame``, "" if every address is legal.
+        address_allowed: the condition on the address in a parameter.
     """
 
     constant: str
@@ -66,7 +66,7 @@ class Expected:
 
 
 def allowed(addresses: OneOf | None, value: str, bits: int) -> str:
-    """A condition that holds where the message may carry the address, "" where it may carry any."""
+    """The condition for a legal address, "" if every address is legal."""
     top, terms = (1 << bits) - 1, []
     for each in addresses.ranges if addresses and value else ():
         bounds = [f"{value} >= {unsigned(each.low, bits)}"] if each.low else []
@@ -80,25 +80,25 @@ def allowed(addresses: OneOf | None, value: str, bits: int) -> str:
 
 
 def struct_parameter(names: Names, message: Message, *, const: bool) -> str:
-    """The message as a parameter; one without values has no struct."""
+    """The message as a parameter; "" for a message without values."""
     if not message.values:
         return ""
     return f"{'const ' if const else ''}{names.function(message)}_t *message, "
 
 
 def address_group(message: MessagePlan, address: Address) -> AddressGroup | None:
-    """The set of addresses that a message may have, None where it may have any that its C type holds."""
+    """The legal addresses of a message, None if every value of the C type is legal."""
     condition = allowed(message.allowed, address.name, storage(address.bits))
     if not condition or message.allowed is None:
         return None
     ranges = [(str(each.low), str(each.high)) for each in message.allowed.ranges]
     name = "_".join(first if first == last else f"{first}_to_{last}" for first, last in ranges)
     text = ", ".join(first if first == last else f"{first}..{last}" for first, last in ranges)
-    return AddressGroup(name, f"the {address.name} {text}", condition)
+    return AddressGroup(name, f"{address.name} {text}", condition)
 
 
 def to_frame(frame: FramePlan, names: Names, address: Address, message: MessagePlan) -> Function:
-    """The function that makes the whole frame of a message."""
+    """The function that encodes the whole frame of a message."""
     stated = message.message
     struct = struct_parameter(names, stated, const=True)
     lines, size = _payload_lines(names, stated, bool(struct)) if stated.fields else ([], "0")
@@ -110,14 +110,14 @@ def to_frame(frame: FramePlan, names: Names, address: Address, message: MessageP
 
 
 def _checked(frame: FramePlan, message: MessagePlan) -> str:
-    """Whether a check value follows, where some messages have none."""
+    """The argument for a check value, if only some messages have one."""
     if not isinstance(frame.end, ByMark) or not frame.check:
         return ""
     return ", true" if message.checked else ", false"
 
 
 def _payload_lines(names: Names, message: Message, has_struct: bool) -> tuple[list[str], str]:
-    """Write the payload where there is room; what does not fit is refused when the frame is completed."""
+    """Statements that encode the payload if it fits; otherwise wrapping fails."""
     p, call, constant = names.prefix, "message, " if has_struct else "", names.constant(message)
     size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
     lines = []
@@ -133,12 +133,12 @@ def _payload_lines(names: Names, message: Message, has_struct: bool) -> tuple[li
 
 
 def is_wide(message: Message) -> bool:
-    """A count that is wrong can make a size which no int holds."""
+    """Whether a wrong count can result in a size that exceeds an int."""
     return any(run.length.maximum > 0xFF for run in payload_plan(message).runs)
 
 
 def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
-    """What a received frame of a message has to satisfy."""
+    """The conditions on a received frame of a message."""
     return Expected(
         constant=names.constant(message.message),
         function=names.function(message.message),
@@ -150,6 +150,6 @@ def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
 
 
 def address_of(frame: FramePlan, name: str) -> Address:
-    """The address of a protocol's frames; one that shares a byte has the type of a byte."""
+    """The address of the frames of a protocol; one that shares a byte has the type of a byte."""
     part = frame.envelope.address
     return Address(name, part.integer.bits if part else 8)

@@ -1,4 +1,4 @@
-"""One protocol's header: the render model of every section, in the order in which they stand."""
+"""Renders the header of a protocol: the views of all sections, in their order."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadView:
-    """What stands before the frame: comments, options, enums, helpers, named types."""
+    """The sections before the frame: comments, options, enums, helpers, named types."""
 
     banner: list[str]
     about: list[str]
@@ -50,7 +50,7 @@ class HeadView:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """What is known of the messages of a direction."""
+    """The messages of a direction."""
 
     direction: str
     messages: Sequence[framing.Expected | SizeView]
@@ -60,7 +60,7 @@ class Header:
     """Collects the sections of one header."""
 
     def __init__(self, plan: Plan, templates: jinja2.Environment) -> None:
-        """The plan has what is kept."""
+        """Prepare the parts common to all sections."""
         self._plan = plan
         self._protocol = plan.protocol
         self._templates = templates
@@ -109,7 +109,7 @@ class Header:
         )
 
     def _address_groups(self) -> list[framing.AddressGroup]:
-        """Sets of addresses that the messages which are encoded may have."""
+        """Sets of legal addresses of the encoded messages."""
         groups = (framing.address_group(m, self._address) for m in self._plan.messages if m.encoded)
         return list(dict.fromkeys(group for group in groups if group))
 
@@ -120,7 +120,7 @@ class Header:
         return "\n" + self._place("crc" if isinstance(check, CrcView) else "sum", crc=check)
 
     def _directions(self) -> list[str]:
-        """What a receiver has to know of the messages before it can find the end of a frame."""
+        """Ids and sizes of messages that a receiver needs to find the end of a frame."""
         if not self._section.needs_ids:
             return []
         names, view = self._names, self._section.view
@@ -146,7 +146,7 @@ class Header:
         return [framing.expected(self._names, self._address, message) for message in messages]
 
     def _unheard(self) -> list[str]:
-        """Parameters that tell one message from another, where none is received."""
+        """Parameters that are unused if no message is received."""
         view = self._section.view
         return [] if self._section.heard() else [*(["direction"] if view.needs_direction else []), view.id]
 
@@ -168,7 +168,7 @@ class Header:
         return [self._place("checks", checks=checks, f=self._section.view)]
 
     def _receiver(self) -> list[str]:
-        """Packets have a receiver for slaves alone."""
+        """The receiver; that of packets only for slaves."""
         if self._plan.role == "master" and self._section.slave_only:
             return []
         return [self._frame_part(self._section.receiver)]

@@ -1,4 +1,4 @@
-"""What a program written against a header has to know of it: its names, and the habits of its frame."""
+"""The interface of a header for programs that use it: names and properties of its frame."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ __all__ = ["Interface", "count_member", "interface"]
 
 @dataclass(frozen=True)
 class Interface:
-    """The header of one protocol, as its user sees it.
+    """The interface of the header of one protocol.
 
     Attributes:
-        prefix: what functions and types begin with; ``upper`` is that of macros.
+        prefix: prefix of functions and types; ``upper`` is that of macros.
         id: member of the frame that holds the message id.
-        id_bits: width of the id's C type.
+        id_bits: width of the C type of the id.
         address: member of the frame that holds the address, "" if there is none.
-        address_bits: width of the address's C type, 0 if there is none.
-        directed: taking frames apart and receiving are told which direction is expected.
-        unpacks: taking a frame apart needs a buffer.
-        rescans: one byte can bring several events, and the end of a stream some more.
-        packets: an answer is taken apart by its message's own function, and nothing receives it.
-        listener: what the struct is called that is told of messages, "" where there is none.
-        sum_bits: width of the part of an answer's check value that its request makes, 0 if there is none.
-        check_bits: width of the check value's functions, 0 if there are none.
+        address_bits: width of the C type of the address, 0 if there is none.
+        directed: decoding and receiving frames need the expected direction.
+        unpacks: decoding a frame needs a buffer.
+        rescans: one byte can produce several events, and the end of a stream more.
+        packets: a response is decoded by the function of its message, and has no receiver.
+        listener: name of the struct that receives messages, "" if there is none.
+        sum_bits: width of the sum of a request in the check value of its response, 0 if there is none.
+        check_bits: width of the functions of the check value, 0 if there are none.
     """
 
     names: Names
@@ -61,45 +61,45 @@ class Interface:
         return self.names.upper
 
     def stem(self, message: Message) -> str:
-        """A message's part of a name."""
+        """The part of names that identifies a message."""
         return self.names.stem(message)
 
     def function(self, message: Message) -> str:
-        """What a message's functions and its struct begin with."""
+        """Prefix of the functions and the struct of a message."""
         return self.names.function(message)
 
     def constant(self, message: Message) -> str:
-        """What a message's macros begin with."""
+        """Prefix of the macros of a message."""
         return self.names.constant(message)
 
     def count_member(self, field: Field) -> str:
-        """The struct member that says how much of a field of variable size there is."""
+        """The struct member with the number of items of a field of variable size."""
         return count_member(field)
 
     def conversions(self, message: Message, value: str, number: Scalar) -> str:
-        """What the names of the functions begin with that convert a scaled value."""
+        """Prefix of the conversion functions of a scaled value."""
         kind = self.types.conversions(message, value, number)
         return kind.stem if kind else ""
 
     def slave_member(self, message: Message) -> str:
-        """The member of the slave's struct that handles a request."""
+        """The member of the slave struct that handles a request."""
         return handler_name(self.names, message)
 
     def told_member(self, message: Message) -> str:
-        """The member of the listener's struct that is told of a message."""
+        """The member of the listener struct that handles a message."""
         return told_name(self.names, message)
 
     def width(self, scalar: Scalar) -> int:
-        """Bytes of the struct member of an integer."""
+        """Size of the struct member of an integer."""
         return 1 if scalar_type(scalar) == "bool" else storage(scalar.bits) // 8
 
     def count_width(self, most: int) -> int:
-        """Bytes of the struct member that counts up to ``most``."""
+        """Size of the struct member that counts up to ``most``."""
         return _bits(count_type(most)) // 8
 
 
 def count_member(field: Field) -> str:
-    """The struct member that says how much of a field of variable size there is."""
+    """The struct member with the number of items of a field of variable size."""
     return f"{field.name}_{field.quantity}"
 
 

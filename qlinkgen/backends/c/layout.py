@@ -1,4 +1,4 @@
-"""How integers lie in bytes: one pair of functions for each layout that a protocol uses."""
+"""Wire layouts of integers: a pair of functions for each layout of a protocol."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import Scalar
 
 Chunks = tuple[Chunk, ...]
-#: What lies in bytes: an integer; for parts of a frame an Integer.
+#: An integer with a wire layout: the Integer of a frame part, or the Scalar of a field.
 AnyInteger = Integer | Scalar
 
 
 @dataclass(frozen=True, slots=True)
 class Helper:
-    """Lines of the functions for one layout."""
+    """The functions of one layout."""
 
     comment: str
     lines: tuple[str, ...]
@@ -23,19 +23,19 @@ class Helper:
 
 @dataclass
 class Layouts:
-    """The layouts in use, in order of their first use, and the calls that read and write with them."""
+    """Collects the layouts in use, and prints the calls that read and write."""
 
     prefix: str
     _names: dict[tuple[int, Chunks], str] = field(default_factory=dict)
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
-    #: Widths of the C types of signed integers that the wire has fewer bits for.
+    #: Widths of the C types that need sign extension.
     extended: set[int] = field(default_factory=set)
 
     def put(self, integer: AnyInteger, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
         if integer.size == 1:
-            if integer.signed and integer.bits < 8:  # no sign in bits that the wire does not have
+            if integer.signed and integer.bits < 8:  # clear the sign extension
                 value = f"(uint8_t)({value} & {unsigned(integer.chunks[0].mask, 8, hexadecimal=True)})"
             return f"{place}[{index}] = {value};"
         return f"{self._call('put', integer)}({pointer(place, index)}, {value});"
@@ -65,14 +65,14 @@ class Layouts:
         return f"{self._call('unused_bits', integer)}({pointer(place, index)})"
 
     def extend(self, raw: str, bits: int) -> str:
-        """An expression with the sign of so many bits in all upper bits."""
+        """An expression that sign-extends a number of ``bits`` bits."""
         width = storage(bits)
         self.extended.add(width)
         sign = unsigned(1 << (bits - 1), bits, hexadecimal=True)
         return f"{self.prefix}_extend_{width}_({raw}, {sign})"
 
     def helpers(self) -> list[Helper]:
-        """The functions of every layout in use."""
+        """The functions of all layouts in use."""
         return [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
 
     def _call(self, verb: str, integer: AnyInteger) -> str:

@@ -1,4 +1,4 @@
-"""Frames whose header and end carry a bit that no byte between them has."""
+"""Frames whose header and end have a marker bit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkedView:
-    """What the templates of marked frames place."""
+    """Variables of the templates of marked frames."""
 
     marker: str
     address_mask: str
@@ -32,7 +32,7 @@ class MarkedView:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A message: whether a check value is sent, and whether ``count`` bytes are as many as it has."""
+    """A message: whether it has a check value, and the condition for a legal ``count`` of bytes."""
 
     constant: str
     checked: str
@@ -47,12 +47,12 @@ class Shapes:
     messages: list[Shape]
 
 
-#: A marked frame has one byte before the payload and one after it.
+#: One byte precedes the payload of a marked frame, and one follows it.
 PLACE = PlaceView(tailed=False, tail=1, header=1, overhead=2)
 
 
 def marked_view(plan: Plan) -> MarkedView:
-    """Name the bits and bytes of a marked frame."""
+    """The view of marked frames."""
     end, check = plan.frame.end, plan.frame.check
     assert isinstance(end, ByMark)
     assert end.end.end_id is not None
@@ -89,7 +89,7 @@ def _taken(bits: Chunk) -> str:
 
 
 def shape(names: Names, message: MessagePlan) -> Shape:
-    """What a receiver knows of a message."""
+    """The view of a message for the receiver."""
     checked = "true" if message.checked else "false"
     return Shape(names.constant(message.message), checked, _fits(message))
 

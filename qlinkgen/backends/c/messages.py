@@ -1,4 +1,4 @@
-"""Everything that a header says of one message, as strings."""
+"""Renders the parts of a header for one message."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class StructMember:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageView:
-    """A message, `m` in templates; a function that is left out has no statements."""
+    """A message, `m` in templates; an omitted function is None."""
 
     function: str
     constant: str
@@ -56,20 +56,20 @@ class MessageView:
 
 
 class MessageWriter:
-    """Lowers messages to what the template places.
+    """Converts messages to template views.
 
-    Messages with the same payload have one struct and one body of each function, those of the first of them.
+    Messages with the same payload share the struct and the function bodies of the first of them.
     """
 
     def __init__(self, names: Names, layouts: Layouts, types: Types) -> None:
-        """All of it is shared by the whole header."""
+        """Use the names, layouts and types of the header."""
         self._names = names
         self._layouts = layouts
         self._types = types
         self._first: dict[object, str] = {}
 
     def render(self, plan: MessagePlan) -> MessageView:
-        """The message for the template; only the directions that are kept have statements."""
+        """The view of a message; functions that the role does not need are omitted."""
         message, payload = plan.message, plan.payload
         head = message_head(self._names.command_of(message), message)
         values = zip(message.values, payload.settable, strict=True)
@@ -102,7 +102,7 @@ class MessageWriter:
         )
 
     def _same(self, what: str, shape: object, plan: MessagePlan) -> str:
-        """The first message that has the same, "" where this one is the first."""
+        """The first message with the same shape, "" if this is the first."""
         own = self._names.function(plan.message)
         first = self._first.setdefault((what, shape), own)
         return "" if first == own else first
@@ -125,7 +125,7 @@ class MessageWriter:
         return [*([] if decoder.reads else ["(void)payload;"]), *empty, *lines, ok]
 
     def _defaults(self, plan: MessagePlan) -> list[str]:
-        """Statements that set a message to its defaults; only a list of items is copied as a whole."""
+        """Statements that set a message to its defaults; runs with items are copied from INIT."""
         lines = []
         for each in plan.payload.settable:
             match each:
@@ -142,7 +142,7 @@ class MessageWriter:
         return lines
 
     def _scale(self, plan: MessagePlan, each: Settable) -> Kind | None:
-        """Conversions that no named type has."""
+        """The conversion of a field, None if its named type has it."""
         if isinstance(each, BytesStep | ItemsStep):
             return None
         kind = self._types.conversions(plan.message, each.name, each.number)
@@ -189,7 +189,7 @@ def _size_text(least: int, most: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Rounding:
-    """A C type that physical values are rounded to, and two of its constants."""
+    """A C type that physical values are rounded to, with its zero and one."""
 
     name: str
     type: str

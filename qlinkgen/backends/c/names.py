@@ -12,22 +12,22 @@ _WIDTHS = (8, 16, 32, 64)
 
 
 def storage(bits: int) -> int:
-    """Bits of the smallest C integer that holds so many."""
+    """Bits of the smallest C integer with at least ``bits`` bits."""
     return next(width for width in _WIDTHS if width >= bits)
 
 
 def unsigned_type(bits: int) -> str:
-    """The unsigned C type for so many bits."""
+    """The unsigned C type with at least ``bits`` bits."""
     return f"uint{storage(bits)}_t"
 
 
 def integer_type(bits: int, *, signed: bool) -> str:
-    """The C type for an integer of so many bits."""
+    """The C type of an integer with ``bits`` bits."""
     return f"int{storage(bits)}_t" if signed else unsigned_type(bits)
 
 
 def scalar_type(scalar: Scalar) -> str:
-    """The C type that a struct member has."""
+    """The C type of a struct member."""
     return "bool" if scalar.meaning == "bool" else integer_type(scalar.bits, signed=scalar.signed)
 
 
@@ -43,7 +43,7 @@ def unsigned(value: int, bits: int, *, hexadecimal: bool = False) -> str:
 
 
 def literal(value: int, bits: int, *, signed: bool) -> str:
-    """A constant of any type; the least value of a signed type has no literal of its own."""
+    """A constant of any type; the minimum of a signed type has no literal."""
     if not signed:
         return unsigned(value, bits)
     width = storage(bits)
@@ -60,7 +60,7 @@ def scalar_literal(scalar: Scalar, value: int) -> str:
 
 
 def bracketed(number: str) -> str:
-    """A number as the text of a macro: in parentheses where it has a sign."""
+    """A number as the text of a macro: in parentheses if it has a sign."""
     return f"({number})" if number.startswith("-") else number
 
 
@@ -70,10 +70,10 @@ def grouped(expression: str) -> str:
 
 
 class Names:
-    """Names of everything in one header: each begins with the protocol's."""
+    """Names of one header, which begin with the name of the protocol."""
 
     def __init__(self, protocol: Protocol) -> None:
-        """Note which names are taken by enums and flags."""
+        """Collect the names of enums and flags."""
         self.prefix = protocol.name
         self.upper = protocol.name.upper()
         self.address = address_member(protocol.address_name or "")
@@ -90,7 +90,7 @@ class Names:
         }
 
     def type_stem(self, name: str) -> str:
-        """A named type as part of a name; one called like something else in the header gets a suffix."""
+        """A named type as part of a name; a suffix avoids clashes with other names of the header."""
         name = stem(self.prefix, name, "type")
         taken = {*self._constants.values()}
         for message in self._messages:
@@ -101,22 +101,22 @@ class Names:
         return name
 
     def command_of(self, message: Message) -> Command | None:
-        """The transaction of a message; a look-up, so that cost grows with the number of messages alone."""
+        """The transaction of a message."""
         return self._commands.get(message.name)
 
     def stem(self, message: Message) -> str:
-        """``motion.request`` as part of a name; a message called like an enum gets a suffix."""
+        """``motion.request`` as part of a name; a suffix avoids clashes with enums and flags."""
         name = stem(self.prefix, snake(message.name), "message")
         return f"{name}_message" if name in self._constants else name
 
     def constants(self, each: Enum | Flags) -> str:
-        """An enum or flags as part of a name; one called like something else in the header gets a suffix."""
+        """An enum or flags as part of a name; a suffix avoids clashes with other names of the header."""
         return self._constants[each.name]
 
     def function(self, message: Message) -> str:
-        """What a message's functions and its struct begin with."""
+        """Prefix of the functions and the struct of a message."""
         return f"{self.prefix}_{self.stem(message)}"
 
     def constant(self, message: Message) -> str:
-        """What a message's macros begin with."""
+        """Prefix of the macros of a message."""
         return self.function(message).upper()

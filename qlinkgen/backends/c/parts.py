@@ -1,4 +1,4 @@
-"""Parts of a frame as the statements, conditions and loops that the templates place."""
+"""Prints the statements, conditions and loops for the parts of a frame."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from qlinkgen.plan.transparency import FrameStuffing
 
 @dataclass(frozen=True, slots=True)
 class Sender:
-    """What tells of whom a frame is: message number and address, their C names and types."""
+    """Message number and address of a frame: their C names and types."""
 
     id: str
     id_type: str
@@ -48,7 +48,7 @@ class Sender:
 
 
 def sender_of(frame: FramePlan) -> Sender:
-    """The names are "id", and that of the address; one that is taken gives way."""
+    """The sender of a frame; names are "id" and that of the address, changed if taken."""
     id_part, address_part = frame.envelope.id, frame.envelope.address
     address = address_member(frame.address)
     address_type = unsigned_type(address_part.integer.bits if address_part else 8)
@@ -85,27 +85,27 @@ class PartWriter:
 
     @property
     def lead(self) -> bytes:
-        """The constant in front of a body; a frame that is not stuffed is all body."""
+        """The unstuffed constant before the body; b"" if the body is the whole frame."""
         preamble, stuffing = self.envelope.preamble, self.stuffing
         return preamble if stuffing and len(preamble) <= stuffing.front else b""
 
     @property
     def head(self) -> int:
-        """Bytes of a body before its payload."""
+        """Size of the header of a body."""
         return self.envelope.header_size - len(self.lead)
 
     def parts(self) -> tuple[Part, ...]:
-        """Those of a body."""
+        """The parts of a body."""
         return self.envelope.parts[1:] if self.lead else self.envelope.parts
 
     # To the wire
 
     def put_header(self, place: str, sent: str) -> list[str]:
-        """Statements that write what is before the payload; ``place`` is the body."""
+        """Statements that write the header; ``place`` is the body."""
         return [line for part in self._front() for line in self._put(part, place, self._at(part), sent)]
 
     def put_trailer(self, place: str) -> list[str]:
-        """Statements that write the constants after the payload, which ends at ``place``."""
+        """Statements that write constants after the payload, which ends at ``place``."""
         return [line for part in self.envelope.back for line in self._put(part, place, self._at(part), "")]
 
     def _put(self, part: Part, place: str, at: int, sent: str) -> list[str]:
@@ -132,20 +132,20 @@ class PartWriter:
     # From the wire
 
     def get(self, part: LengthPart | IdPart | AddressPart | None, place: str = "body") -> str:
-        """The expression for a number in a body, 0 where the frame has none."""
+        """The expression for a number in a body, 0 if the frame has none."""
         if part is None:
             return "0U"
         found, mask = self.layouts.get(part.integer, place, str(self._at(part))), part.integer.chunks[0].mask
         return found if part.size > 1 or mask == 0xFF else f"({found} & {in_hex(mask)})"
 
     def payload_size(self, length: LengthPart) -> str:
-        """The payload bytes that a length announces."""
+        """The payload size given by a length."""
         return f"{self.get(length)} - {length.bias}U" if length.bias else self.get(length)
 
     def head_checks(self, counted: str, directed: str, *, all_there: bool) -> Iterator[str]:
-        """Statements that refuse a header, part by part in wire order.
+        """Statements that check a header, part by part in wire order.
 
-        ``counted`` bytes of the body are there: any number of them, or one more at each pass.
+        ``counted`` bytes of the body have been received: any number, or one more in each pass.
         """
         reached = f"{counted} {'>=' if all_there else '=='} "
         bare = isinstance(self.frame.receiver, Rescan) and self.frame.receiver.bare
@@ -179,7 +179,7 @@ class PartWriter:
             yield f"total = payload + {self.head + self.envelope.trailer_size}U;"
 
     def _header_check(self, reached: str, before: set[type[Part]], directed: str) -> Iterator[str]:
-        """Number and address, as far as they are there, must be those of a message."""
+        """Statements that check number and address as far as received."""
         if IdPart not in before:
             return
         found = self.get(self.envelope.id)
@@ -194,7 +194,7 @@ class PartWriter:
         yield "}"
 
     def wrong_tail(self, place: str) -> str:
-        """A condition that holds where a constant after the payload, which ends at ``place``, is another."""
+        """The condition for a wrong constant after the payload, which ends at ``place``."""
         return any_of(
             f"{place}[{self._at(part) + index}] != {in_hex(byte)}"
             for part in self.envelope.back
@@ -203,7 +203,7 @@ class PartWriter:
         )
 
     def check_differs(self, place: str, value: str) -> str:
-        """A condition that holds where another check value than ``value`` was received."""
+        """The condition for a received check value other than ``value``."""
         part = self.envelope.check
         return differs(part.check, place, self._at(part), value) if part else ""
 
@@ -211,19 +211,19 @@ class PartWriter:
 
     @property
     def lead_updates(self) -> list[str]:
-        """Statements that take the lead into the check value, none where it is not covered."""
+        """Statements that update the check value with the lead, none if it is not covered."""
         covered = self.lead and self.envelope.covered(self.envelope.parts[0])
         return [f"value = {self.prefix}_check_update(value, {in_hex(b)});" for b in self.lead if covered]
 
     @property
     def covers_body(self) -> bool:
-        """The check value covers all of a body before itself, so it can be computed byte by byte."""
+        """Whether the check value covers the whole body before it and can be computed byte by byte."""
         check, parts = self.envelope.check, self.parts()
         covered = tuple(part for part in parts if self.envelope.covered(part))
         return check is not None and covered == parts[: parts.index(check)]
 
     def covered_loops(self, array: str, start: str, payload_end: str) -> list[str]:
-        """Loops that take what is covered of the body into the check value; indices of the array."""
+        """Loops that update the check value with the covered bytes of an array."""
         lines: list[str] = []
         for run in self.envelope.coverage:
             parts = [part for part in run if part in self.parts()]
@@ -249,13 +249,13 @@ class PartWriter:
         return self.envelope.front[1:] if self.lead else self.envelope.front
 
     def _at(self, part: Part) -> int:
-        """Bytes before a part: of the body, or after the payload."""
-        behind = part in self.envelope.back
-        return self.envelope.offset(part) - (self.envelope.header_size if behind else len(self.lead))
+        """Offset of a part in the body, or after the payload."""
+        trailing = part in self.envelope.back
+        return self.envelope.offset(part) - (self.envelope.header_size if trailing else len(self.lead))
 
 
 def length_bounds(length: LengthPart, value: str) -> str:
-    """A condition that holds where no frame has such a length."""
+    """The condition for a length out of range."""
     bits = length.integer.bits
     terms = [f"{value} < {unsigned(length.least, bits)}"] if length.least else []
     terms += [f"{value} > {unsigned(length.most, bits)}"] if length.most < length.integer.maximum else []
@@ -263,13 +263,13 @@ def length_bounds(length: LengthPart, value: str) -> str:
 
 
 def any_of(terms: Iterator[str] | list[str]) -> str:
-    """A condition that holds where one of several does, "" where there are none."""
+    """The disjunction of conditions, "" without conditions."""
     found = list(terms)
     return " || ".join(f"({term})" for term in found) if len(found) > 1 else "".join(found)
 
 
 def refusal(test: str, status: str) -> list[str]:
-    """A function ends here where a condition holds."""
+    """A statement that returns a status if a condition holds."""
     return [f"if ({test}) {{", f"    return {status};", "}"]
 
 
@@ -282,7 +282,7 @@ def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
 
 
 def differs(check: Check, place: str, at: int, value: str) -> str:
-    """A condition that holds where received check bytes are not those of ``value``."""
+    """The condition for received check bytes that differ from ``value``."""
     return any_of(
         f"{place}[{at + index}] != (uint8_t)({_piece(value, chunk.shift, chunk.mask)})"
         for index, chunk in enumerate(check.value.chunks)

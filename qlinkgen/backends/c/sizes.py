@@ -1,4 +1,4 @@
-"""Numbers of items and bytes, and how the size of a payload follows from its own bytes."""
+"""Sizes and numbers of items, and the derivation of the size of a payload from its counts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from qlinkgen.plan.tree import MessagePlan
 
 
 def size_text(size: Size, count: Callable[[str], str]) -> str:
-    """A number of bytes; ``count`` spells how many items a run has, as a size_t."""
+    """A size as an expression; ``count`` prints the number of items of a run as a size_t."""
     terms = [f"{size.fixed}U"] if size.fixed or not size.terms else []
     for term in size.terms:
         number = count(term.run)
@@ -24,24 +24,24 @@ def size_text(size: Size, count: Callable[[str], str]) -> str:
 
 
 def size_terms(message: Message, struct: str) -> str:
-    """The size of a payload; ``struct`` is what its counts are members of."""
+    """The size of a payload as an expression; ``struct`` is the prefix of its counts."""
     plan = payload_plan(message)
     members = {run.name: f"(size_t){struct}{run.name}_{run.quantity}" for run in plan.runs}
     return size_text(plan.size, members.__getitem__)
 
 
 def local(run: str) -> str:
-    """The variable that holds how many items a run has."""
+    """The variable with the number of items of a run."""
     return f"{run}_count"
 
 
 def local_size(run: str) -> str:
-    """The same where the variable has a type of its own."""
+    """The variable of `local`, converted to size_t."""
     return f"(size_t){run}_count"
 
 
 def index_of(place: Place, count: Callable[[str], str], further: str = "") -> str:
-    """The place of a step as an index, from the front or, where that varies, from the end."""
+    """The offset of a step as an index, from the beginning or, if that varies, from the end."""
     if place.front.terms and place.back is not None:
         at = f"size - {place.back}U"
     else:
@@ -53,7 +53,7 @@ def index_of(place: Place, count: Callable[[str], str], further: str = "") -> st
 
 @dataclass
 class Learner:
-    """Collects the statements that learn how many items runs have from the counts in a payload."""
+    """Collects the statements that read the numbers of items of runs from counts."""
 
     payload: PayloadPlan
     layouts: Layouts
@@ -62,18 +62,18 @@ class Learner:
     known: list[str] = field(default_factory=list)
 
     def refuse(self, terms: list[str], status: str) -> None:
-        """Return an error where a term holds."""
+        """Add a statement that returns an error if a term holds."""
         self.lines += refusal(terms, f"{self.layouts.prefix.upper()}_ERROR_{status}")
 
     def number(self, count: CountStep) -> str:
-        """What a count says."""
+        """The value of a count."""
         return self.layouts.peek(count.integer, "payload", index_of(count.place, local))
 
     def learn(self, count: CountStep) -> None:
-        """The number of items of the run that is counted, if it is one that it may have."""
+        """Assign the number of items of the run and check it."""
         integer, number, wide = count.integer, self.number(count), count.integer.bits > 16
-        held, bounds = Within(0, integer.mask), count.bounds  # no number that is negative lies in them
-        if wide:  # more than a size_t may hold
+        held, bounds = Within(0, integer.mask), count.bounds  # negative numbers are outside of them
+        if wide:  # may exceed a size_t
             self.refuse(broken([bounds], number, held, integer.bits), "LENGTH")
         if count.scale > 1:
             self.refuse([f"({number} % {count.scale}U) != 0U"], "LENGTH")
@@ -88,7 +88,7 @@ class Learner:
 
     @property
     def least(self) -> str:
-        """Fewest bytes of the payload, as far as counts are known."""
+        """Minimum size of the payload with the known counts."""
         return size_text(self.payload.least_of(self.known), local)
 
 
@@ -101,12 +101,12 @@ class SizeView:
 
 
 def size_view(names: Names, message: MessagePlan, layouts: Layouts) -> SizeView:
-    """How the size of a message is found."""
+    """The view of a message for the template."""
     return SizeView(names.constant(message.message), _statements(Learner(message.payload, layouts)))
 
 
 def _statements(learner: Learner) -> list[str]:
-    """Lines of the case, which return in the end."""
+    """Lines of the case, which end with a return."""
     upper = learner.layouts.prefix.upper()
     ok, truncated = f"{upper}_OK", f"{upper}_ERROR_TRUNCATED"
     learner.lines.append(f"*size = {learner.payload.least}U;")

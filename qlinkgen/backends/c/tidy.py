@@ -1,16 +1,16 @@
-"""The last pass over a header: no blank line where none helps, and no line that has to be scrolled."""
+"""The last pass over a header: removes needless blank lines and folds long lines."""
 
 from __future__ import annotations
 
 import textwrap
 
 _WIDTH = 120
-#: Where code is folded; the operator stays at the end of its line.
+#: Code is folded after these operators.
 _SEPARATORS = (", ", " || ", " && ", " | ", " + ", " - ", " ? ", " : ", " = ")
 
 
 def tidy(text: str) -> str:
-    """Without trailing space and needless blank lines; what is too long is folded."""
+    """Remove trailing spaces and needless blank lines, and fold long lines."""
     lines: list[str] = []
     for line in _folded([line.rstrip() for line in text.split("\n")]):
         if not line and (not lines or not lines[-1] or lines[-1].endswith("{")):
@@ -23,11 +23,11 @@ def tidy(text: str) -> str:
 
 def _folded(lines: list[str]) -> list[str]:
     folded: list[str] = []
-    carried = ""  # words of a comment that its line had no room for
+    carried = ""  # words carried over to the next line of a comment
     for number, line in enumerate(lines):
         following = lines[number + 1] if number + 1 < len(lines) else ""
         if carried:
-            line = f" * {carried} {line[3:]}"  # noqa: PLW2901 - the same line, with what the last one had left
+            line = f" * {carried} {line[3:]}"  # noqa: PLW2901 - the same line with carried words
             carried = ""
         if len(line) <= _WIDTH:
             folded.append(line)
@@ -88,7 +88,7 @@ def _pieces(line: str, indent: str, width: int) -> list[str]:
 
 
 def _best_cut(line: str, least: int, width: int) -> int:
-    """Behind the separator that is nested least, the last of several; 0 where there is none."""
+    """Position after the least nested separator, the last of several; 0 if there is none."""
     best, depth, nested = 0, len(line), 0
     for place, character in enumerate(line[: width + 1]):
         nested += (character in "([{") - (character in ")]}")

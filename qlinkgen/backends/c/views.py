@@ -1,4 +1,4 @@
-"""What the templates place of a frame of parts: every condition and statement ready made."""
+"""Views of delimited frames for the templates: conditions and statements as text."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from qlinkgen.plan.tree import Plan
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameView:
-    """What every frame has, `f` in templates.
+    """The view of every frame, `f` in templates.
 
     Attributes:
-        bare: message id and address alone tell a frame from noise.
+        bare: only message id and address distinguish a frame from noise.
         sized_by_message: the end of a frame follows from its message.
-        body_size: bytes of the buffer that taking a frame apart needs.
-        check_optional: a message says whether a check value follows.
-        max_wire: bytes of a receiver that holds whole frames, 0 for another one.
+        body_size: size of the buffer for decoding a frame.
+        check_optional: only some messages have a check value.
+        max_wire: size of the buffer of a receiver for whole frames, 0 for other receivers.
     """
 
     id: str
@@ -74,7 +74,7 @@ def frame_view(
 
 
 def _directed(plan: Plan) -> bool:
-    """To find the end of a frame, or to prove it, a receiver has to know whose it is."""
+    """Whether a receiver needs the direction to find the end of a frame or to validate it."""
     receiver = plan.frame.receiver
     match receiver:
         case Hunt() | InStep():
@@ -91,7 +91,7 @@ def _directed(plan: Plan) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlaceView:
-    """A payload is written ``header`` bytes from the front, or ``tail`` bytes from the end of a buffer."""
+    """The place of a payload in a buffer: at offset ``header``, or ending ``tail`` bytes before the end."""
 
     tailed: bool
     tail: int
@@ -101,11 +101,11 @@ class PlaceView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartsView:
-    """What every frame of parts has.
+    """The view of every delimited frame.
 
     Attributes:
-        late_insert: an inserted byte may follow the last one.
-        judged: without a check value the contents alone prove a frame.
+        late_insert: an inserted byte may follow the last byte.
+        judged: without a check value, only valid contents confirm a frame.
     """
 
     late_insert: bool
@@ -123,7 +123,7 @@ class PartsView:
 
     @property
     def reads_tail(self) -> bool:
-        """Bytes after the payload are compared."""
+        """Whether bytes after the payload are checked."""
         return bool(self.wrong_tail or self.check_differs)
 
 
@@ -165,7 +165,7 @@ class StuffedView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InsertView:
-    """The rule by which bytes are inserted; each condition holds where one is due."""
+    """The stuffing rule; the conditions hold if an inserted byte is due."""
 
     insert: str
     mark: str
@@ -177,7 +177,7 @@ class InsertView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HuntView:
-    """The receiver that looks at each byte once; the length is the body's first byte."""
+    """The receiver that processes each byte once; the length is the first byte of the body."""
 
     mark: str
     insert: str
@@ -190,7 +190,7 @@ class HuntView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartsViews:
-    """All views of a frame of parts, by their names in templates; None where one has nothing to describe."""
+    """All views of a delimited frame, by name in templates; None if one does not apply."""
 
     f: FrameView
     place: PlaceView
@@ -204,7 +204,7 @@ class PartsViews:
     def others(
         self,
     ) -> Mapping[str, PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | None]:
-        """All but `f`."""
+        """All views except `f`."""
         return {
             "place": self.place,
             "parts": self.parts,
@@ -216,7 +216,7 @@ class PartsViews:
 
 
 def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
-    """The views of a frame of parts, whatever stuffs it."""
+    """The views of a delimited frame."""
     writer = PartWriter(plan.protocol.name, plan.frame, sender_of(plan.frame), layouts)
     envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
     rule, body_size = None, 0
@@ -327,7 +327,7 @@ def _inserted(rule: Insertion) -> InsertView:
 
 
 def _due(rule: Insertion, array: str, end: str, last: str) -> str:
-    """A byte has to be inserted after the last one, which is before ``end``; ``since`` counts bytes."""
+    """The condition for inserting a byte after the one before ``end``; ``since`` counts bytes."""
     size = len(rule.after)
     if size == 1:
         return f"{last} == {in_hex(rule.after[0])}"
@@ -359,7 +359,7 @@ def _plus(value: str, constant: int) -> str:
 
 
 def judgement(plan: Plan, heard: Sequence[str]) -> str:
-    """The expression for what is wrong with the contents of ``receiver->frame``."""
+    """The expression that checks the contents of ``receiver->frame``."""
     prefix, upper = plan.protocol.name, plan.protocol.name.upper()
     calls = [f"{prefix}_{direction}_check(&receiver->frame)" for direction in heard]
     if len(calls) == len(plan.protocol.directions) == 1:
