@@ -173,7 +173,8 @@ class RescanningReceiver(Receiver):
         assert isinstance(plan.frame.receiver, Rescan)
         self._strategy = plan.frame.receiver
         self._reader = FrameReader(plan.frame, self.known, direction)
-        self._longest = plan.frame.envelopes[direction].max_frame
+        envelope = plan.frame.envelopes[direction]
+        self._first, self._longest = envelope.preamble[:1], envelope.max_frame
         self._buffer, self._skipped, self._due = b"", b"", b""
         #: Why the frame that may begin the buffer is not complete.
         self._missing = Missing()
@@ -190,6 +191,11 @@ class RescanningReceiver(Receiver):
             due, self._due = self._due, b""
             if due and self._buffer[:1] == due:
                 self._buffer = self._buffer[1:]
+                continue
+            if self._first and self._buffer[:1] != self._first:
+                # As for Astray below, for a run of bytes at once: most of what is searched begins no frame.
+                at = self._buffer.find(self._first)
+                self._buffer = self._buffer[at:] if at > 0 else b""
                 continue
             try:
                 taken = self._reader.read(self._buffer)
