@@ -13,7 +13,7 @@ import pytest
 
 from tests.support.whole.trial import Effort, Outcome, run
 
-FIXED, NEW = 64, 24
+FIXED, NEW = 28, 16
 #: Added to a seed whose schema lint refuses.
 _NEXT = 1_000_000_000
 

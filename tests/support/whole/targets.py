@@ -14,12 +14,10 @@ from typing import Any
 
 from construct import ConstructError
 
-from qlinkgen.backends import construct, python
-from qlinkgen.backends.base import Options, Outputs
-from qlinkgen.backends.python import bus
+from qlinkgen.backends import construct
+from qlinkgen.backends.base import Outputs
 from qlinkgen.model import naming
 from qlinkgen.model.message import Direction
-from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import Plan
 from qlinkgen.plan import receive as interpreted
 from qlinkgen.plan.codec import Codec, Decoded
@@ -261,16 +259,13 @@ class ConstructTarget(Target):
         return Seen(found["message"], found[naming.record_key(name)] if name else None, values)
 
 
-def printed_structures(protocol: Protocol, folder: Path) -> construct.Live:
+def printed_structures(outputs: Outputs, folder: Path) -> construct.Live:
     """The structures of the printed module."""
-    return construct.Live(
-        vars(_printed(folder / "printed_structures", construct.generate(protocol, Options())))
-    )
+    return construct.Live(vars(_printed(folder / "printed_structures", outputs)))
 
 
-def printed_codec(protocol: Protocol, folder: Path) -> types.ModuleType:
+def printed_codec(outputs: Outputs, folder: Path) -> types.ModuleType:
     """The printed module, imported with that of the calls of its bus."""
-    outputs = {**python.generate(protocol, Options()), **bus.generate(protocol, Options())}
     return _printed(folder / "printed_codecs", outputs)
 
 

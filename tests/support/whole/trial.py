@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import random
 import re
 import signal
@@ -16,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 
 from qlinkgen.backends import c, construct, python
-from qlinkgen.backends.base import Options
+from qlinkgen.backends.base import Options, Outputs
 from qlinkgen.cli.targets import TARGETS
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import file_stem
@@ -55,7 +56,8 @@ _MOST = 3
 #: Targets that need no vectors, which take long.
 _QUICK = ("python", "bus", "c", "construct")
 _PLAIN = ("-O0", "-std=c99")
-_CHECKED = ("-O1", "-g", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+#: The optimiser could remove what a sanitizer is to see, and takes three times as long.
+_CHECKED = ("-O0", "-g1", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 @dataclass(frozen=True)
@@ -189,20 +191,22 @@ class _Trial:
     # Making
 
     def _make(self, protocol: Protocol, programs: contextlib.ExitStack) -> None:
-        texts: dict[str, str] = {}
+        made: dict[str, Outputs] = {}
         for name in _QUICK if self.effort.uncompiled else TARGETS:
-            self.guard("generate", name, partial(_generate, name, protocol, texts))
-        for path, text in texts.items():
+            self.guard("generate", name, partial(_generate, name, protocol, made))
+        for path, text in (each for outputs in made.values() for each in outputs.items()):
             (self.folder / Path(path).name).write_text(text, "utf-8")
             if path.endswith(".py"):
                 self.guard("parse", Path(path).parent.name, partial(_parse, text, path))
         self.targets.append(InterpreterTarget(self.reference, plan_of(protocol)))
         self.guard("load", "python in memory", partial(_load, protocol))
-        codec = partial(printed_codec, protocol, self.folder)
-        self.guard("load", "python", lambda: self.targets.append(PythonTarget(self.reference, codec())))
+        if made.keys() >= {"python", "bus"}:
+            codec = partial(printed_codec, {**made["python"], **made["bus"]}, self.folder)
+            self.guard("load", "python", lambda: self.targets.append(PythonTarget(self.reference, codec())))
         self.guard("load", "construct", lambda: self._construct("construct", construct.live(protocol)))
-        source = partial(printed_structures, protocol, self.folder)
-        self.guard("load", "construct source", lambda: self._construct("construct source", source()))
+        if "construct" in made:
+            source = partial(printed_structures, made["construct"], self.folder)
+            self.guard("load", "construct source", lambda: self._construct("construct source", source()))
         header = self.folder / f"{file_stem(protocol.name)}.h"
         if not self.effort.uncompiled and header.exists() and self._compile(header):
             self._roles(protocol)
@@ -227,20 +231,26 @@ class _Trial:
 
     def _compile(self, header: Path) -> bool:
         """Compile strictly; whether it compiles at all."""
-        unit = self._strict(header, _EVERY if self.effort.every else _STRICT)
+        clean = self._strict(header, _EVERY if self.effort.every else _STRICT)
         kit = self.folder / f"{header.stem}_conformance.c"
         if kit.exists():
             for compiler in ("gcc", "clang") if self.effort.every else ("gcc",):
                 self._kit(kit, compiler)
-        done = subprocess.run(["gcc", *_PLAIN, "-fsyntax-only", str(unit)], capture_output=True, check=False)
+        if clean:
+            return True
+        unit = str(header.with_name("strict.c"))
+        done = subprocess.run(["gcc", *_PLAIN, "-fsyntax-only", unit], capture_output=True, check=False)
         return done.returncode == 0
 
-    def _strict(self, header: Path, compilers: Sequence[tuple[str, ...]]) -> Path:
+    def _strict(self, header: Path, compilers: Sequence[tuple[str, ...]]) -> bool:
+        """Check the syntax strictly; whether every compiler finds it clean."""
         unit = header.with_name("strict.c")
         unit.write_text(f'#include "{header.name}"\nint main(void) {{ return 0; }}\n', "utf-8")
-        for words in compilers:
+        clean = [
             self.guard("compile", " ".join(words), partial(_tool, *words, "-fsyntax-only", *WARNINGS, unit))
-        return unit
+            for words in compilers
+        ]
+        return all(clean)
 
     def _roles(self, protocol: Protocol) -> None:
         """The headers of one side alone."""
@@ -404,8 +414,8 @@ class _Trial:
         self.found(stage, target.name, cause, f"{direction} {least.hex(' ')}: {compare(least)}")
 
 
-def _generate(name: str, protocol: Protocol, texts: dict[str, str]) -> None:
-    texts.update(TARGETS[name].load()(protocol, Options()))
+def _generate(name: str, protocol: Protocol, made: dict[str, Outputs]) -> None:
+    made[name] = TARGETS[name].load()(protocol, Options())
 
 
 def _header_of(protocol: Protocol, role: Role, folder: Path) -> None:
@@ -417,7 +427,9 @@ def _load(protocol: Protocol) -> None:
     python.load(protocol)
 
 
+@functools.cache
 def _parse(text: str, path: str) -> None:
+    """Compile; modules that are the same for all protocols once."""
     compile(text, path, "exec")
 
 
@@ -464,31 +476,50 @@ def _manner(expected: object, found: object) -> str:
     return f"{found} instead of {expected}" if isinstance(expected, str) else "refuses what is right"
 
 
-def _python_stream(target: PythonTarget, direction: Direction, asked: Sequence[bytes], data: bytes) -> str:
-    expected = [Heard.of(event) for event in target.reference.events(direction, data, asked)]
-    found = target.events(direction, [bytes([byte]) for byte in data], asked)
+# Several comparisons of a stream in a row want these two.
+@functools.lru_cache(maxsize=4)
+def _right(
+    reference: Reference, direction: Direction, data: bytes, asked: tuple[bytes, ...]
+) -> Sequence[Heard]:
+    return [Heard.of(event) for event in reference.events(direction, data, asked)]
+
+
+@functools.lru_cache(maxsize=4)
+def _single(
+    target: PythonTarget, direction: Direction, data: bytes, asked: tuple[bytes, ...]
+) -> Sequence[Sequence[Heard]]:
+    """The events of each byte, and of the end."""
+    return target.events(direction, [bytes([byte]) for byte in data], asked)
+
+
+def _python_stream(target: PythonTarget, direction: Direction, asked: tuple[bytes, ...], data: bytes) -> str:
+    found = _single(target, direction, data, asked)
+    expected = _right(target.reference, direction, data, asked)
     return _unlike(expected, [event for events in found for event in events])
 
 
-def _plan_stream(target: InterpreterTarget, direction: Direction, asked: Sequence[bytes], data: bytes) -> str:
-    expected = [Heard.of(event) for event in target.reference.events(direction, data, asked)]
+def _plan_stream(
+    target: InterpreterTarget, direction: Direction, asked: tuple[bytes, ...], data: bytes
+) -> str:
+    expected = _right(target.reference, direction, data, asked)
     return _unlike(expected, target.events(direction, data, asked))
 
 
 def _c_stream(target: CTarget, direction: Direction, data: bytes) -> str:
-    expected = [Heard.of(event) for event in target.reference.events(direction, data)]
-    if not target.finishes:
-        expected = [event for event in expected if event.at < len(data)]
-    bare = [Heard(each.at, each.kind, each.name, each.address, each.values) for each in expected]
+    bare = [
+        Heard(each.at, each.kind, each.name, each.address, each.values)
+        for each in _right(target.reference, direction, data, ())
+        if target.finishes or each.at < len(data)
+    ]
     return _unlike(bare, target.events(direction, data))
 
 
 def _cut_stream(
-    target: PythonTarget, direction: Direction, asked: Sequence[bytes], seed: float, data: bytes
+    target: PythonTarget, direction: Direction, asked: tuple[bytes, ...], seed: float, data: bytes
 ) -> str:
     """What a piece brings is what its bytes bring one by one; the end of the stream is the last piece."""
     cut = chance.pieces(data, random.Random(seed))
-    single = target.events(direction, [bytes([byte]) for byte in data], asked)
+    single = _single(target, direction, data, asked)
     end = 0
     sizes = [*map(len, cut), 1]
     for size, events in zip(sizes, target.events(direction, cut, asked), strict=True):
@@ -504,8 +535,8 @@ def _timeless(event: Heard) -> tuple[object, ...]:
     return event.kind, event.name, event.address, event.values, event.place
 
 
-def _unlike(expected: list[Heard], found: list[Heard]) -> str:
-    """How two lists of events differ; what stands in front of the semicolon names the manner."""
+def _unlike(expected: Sequence[Heard], found: Sequence[Heard]) -> str:
+    """How two lists of events differ; the text before the semicolon names the manner."""
     for right, seen in zip(expected, found, strict=False):
         if right == seen:
             continue
