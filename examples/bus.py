@@ -47,7 +47,7 @@ def main() -> int:
             pass
         while (state := node.motion()).motor_status & qlink.MotorStatus.RUNNING:
             bus.port.sleep(0.01)
-        print(f"  stands at {state.position}")
+        print(f"  position {state.position}")
         shown = recorder.lines()
         counters = bus.engine.total
     print("on the wire, the first and the last frames:")

@@ -47,7 +47,7 @@ def main() -> int:
             host.port.sleep(0.05)
         position = axis.get_actl_pos().value
         counters = host.engine.total
-    print(f"  stands at {position}")
+    print(f"  position {position}")
     print("on the wire, the first and the last packets:")
     print("\n".join([*recorder.lines[:14], "  ...", *recorder.lines[-4:]]))
     print(f"{counters.requests} packets, {counters.answers} answers, {counters.timeouts} timeouts")

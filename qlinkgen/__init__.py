@@ -1,7 +1,7 @@
-"""Describe a serial protocol once, and get its codecs, documentation, test vectors and wire behaviour.
+"""Codecs, documentation, test vectors and a runtime from the schema of a serial protocol.
 
-The package holds two towers. The compiler (`schema`, `model`, `backends`) turns a YAML description into code;
-the runtime drives the wire with it. `cli` stands on top of both.
+The compiler (`schema`, `model`, `plan`, `backends`) generates code from a YAML schema; the runtime (`link`,
+`transport`, `protocols`, `sim`) uses it on the wire. `cli` is the command line of both.
 """
 
 __version__ = "0.1.0"

@@ -1,4 +1,4 @@
-"""The command line. A command's module is imported when it is used, so that ``--help`` is quick."""
+"""The command line. The module of a command is imported on use, so that ``--help`` is fast."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import qlinkgen
 from qlinkgen.cli.boundary import debug_option, run
 from qlinkgen.model.spelling import similar
 
-#: Command to the one line of `qlinkgen --help`; the command itself is `command` in the module of its name.
+#: Command to its line in `qlinkgen --help`; the command itself is `command` in the module of its name.
 COMMANDS = {
     "generate": "Write Python, C, construct and vectors for protocols, or check that they are up to date.",
-    "lint": "Check schema files; every fault with its line, column, rule and fix.",
+    "lint": "Check schema files; report every error with its line, column, rule and fix.",
     "show": "Show a protocol or a message: layout, sizes, transactions.",
-    "encode": "Values to wire bytes.",
-    "decode": "Wire bytes to values: one JSON object a line.",
-    "explain": "Say what every byte of a frame is, and what is wrong with it.",
-    "simulate": "Put simulated nodes, a ring, or a chip set on a port of their own, with faults if wanted.",
+    "encode": "Encode values as wire bytes.",
+    "decode": "Decode wire bytes: one JSON object per line.",
+    "explain": "Describe every byte of a frame, and its errors.",
+    "simulate": "Simulate nodes, a ring or a chip set on a new port, with optional faults.",
     "scan": "Find the nodes of a Q.link bus.",
-    "send": "Send one request on a port and print its answer, or one message into a ring.",
+    "send": "Send one request on a port and print its response, or one message into a ring.",
     "load": "Load an Intel HEX file into a Q.link node.",
-    "monitor": "Listen to a bus or a fibre: who asks, who answers, what is repeated, late or damaged.",
-    "ring": "Be a passive node of a Trio ring: send everything on, and print it.",
-    "doctor": "Say what a serial port can do, what its latency costs, and what to change.",
+    "monitor": "Listen to a bus or a fibre: requests, responses, repeats, late and damaged frames.",
+    "ring": "Join a Trio ring as a passive node: forward and print every message.",
+    "doctor": "Report what a serial port can do, what its latency costs, and what to change.",
 }
 
 
@@ -41,13 +41,13 @@ class LazyGroup(click.Group):
             return None
         command: click.Command = importlib.import_module(f"qlinkgen.cli.{cmd_name}").command
         if not any(each.name == "debug" for each in command.params):
-            command.params.append(debug_option(hidden=True))  # at the end of a line that has failed
+            command.params.append(debug_option(hidden=True))  # to be appended to a failed command line
         return command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command; one that does not exist may be a misspelt one."""
+        """Find the command; suggest the nearest name for an unknown one."""
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
@@ -67,13 +67,12 @@ class LazyGroup(click.Group):
 )
 @click.version_option(qlinkgen.__version__, prog_name="qlinkgen")
 def cli() -> None:
-    """Describe a serial protocol once in YAML: get codecs for Python and C, look at its bytes, drive its bus.
+    """Generate codecs for Python and C from the schema of a serial protocol, inspect frames, drive the bus.
 
-    PROTOCOL is the name of a schema that comes with qlinkgen (qlink, trio, mc1231a) or the path of a .yaml
-    file.
+    PROTOCOL is the name of a shipped schema (qlink, trio, mc1231a) or the path of a .yaml file.
 
-    Exit codes: 0 fine, 1 what was checked is wrong (drift, bad frame, faulty schema, no answer, no such
-    port), 2 wrong usage, 70 a fault of qlinkgen itself (--debug shows where).
+    Exit codes: 0 success, 1 failed check (drift, bad frame, invalid schema, no answer, no such port), 2 usage
+    error, 70 internal error (--debug shows the traceback).
     """
 
 
@@ -81,5 +80,5 @@ cli.params.append(debug_option())
 
 
 def main() -> None:
-    """Run the command line and leave the process with its exit code."""
+    """Run the command line and exit with its exit code."""
     raise SystemExit(run(cli))

@@ -1,4 +1,4 @@
-"""Bit diagrams: which bit of an integer is what."""
+"""Bit diagrams: the meaning of each bit of an integer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from qlinkgen.plan.payload import BitsStep
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Bits ``shift .. shift + bits - 1`` and what they are."""
+    """Bits ``shift .. shift + bits - 1`` and their meaning."""
 
     shift: int
     bits: int
@@ -36,14 +36,14 @@ def runs_of_header(header: MarkPart, end_id: int | None) -> list[Run]:
     """Marker, address and message id of a header."""
     marker = header.marker.bit_length() - 1
     return [
-        Run(marker, 1, "marker: set in header and end alone"),
+        Run(marker, 1, "marker: set only in header and end"),
         Run(header.address.shift, header.address.bits, header.address_name),
         Run(header.id.shift, header.id.bits, f"{header.id_name}; {end_id} marks the end"),
     ]
 
 
 def diagram(width: int, runs: Iterable[Run]) -> list[str]:
-    """Lines of a diagram: bit numbers, brackets below those in use, and a branch to each name.
+    """Return the lines of a diagram: bit numbers, brackets below those in use, and a branch to each name.
 
     ::
 

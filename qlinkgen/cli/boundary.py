@@ -1,4 +1,4 @@
-"""Where every error ends: one line of text on stderr and an exit code, never a traceback."""
+"""Turns every error into one line on stderr and an exit code, never a traceback."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from qlinkgen.errors import QlinkgenError, SchemaError
 from qlinkgen.model.texts import visible
 
 FINE, WRONG, USAGE = 0, 1, 2
-#: A fault of qlinkgen itself; the number is that of EX_SOFTWARE in sysexits.h.
+#: An internal error; EX_SOFTWARE of sysexits.h.
 FAULT = 70
-#: What a shell reports of a program that these signals ended.
+#: Exit codes that a shell reports for a program ended by these signals.
 INTERRUPTED, BROKEN_PIPE = 130, 141
 
 
@@ -31,7 +31,7 @@ class Failure(Exception):
 
 
 def run(cli: click.Command) -> int:
-    """Run the command line; the exit code."""
+    """Run the command line; return the exit code."""
     standard_streams.prepare()
     _debug.wanted = False
     try:
@@ -47,14 +47,14 @@ def run(cli: click.Command) -> int:
     except OSError as error:
         _silence()
         return _complain(_of_system(error), WRONG)
-    except Exception as error:  # noqa: BLE001  # the boundary: nothing passes but a line that asks for a report
+    except Exception as error:  # noqa: BLE001  # the boundary: every error ends in a line that asks for a report
         _silence()
         return _complain(_unforeseen(error), FAULT)
 
 
 def _invoke(cli: click.Command) -> int:
     try:
-        # Not cli.main(): that turns a broken pipe into exit code 1, like a bad frame.
+        # Not cli.main(): it turns a broken pipe into exit code 1, like a bad frame.
         with cli.make_context("qlinkgen", sys.argv[1:]) as context:
             result = cli.invoke(context)
         return result if isinstance(result, int) else FINE
@@ -97,23 +97,23 @@ def debug_option(*, hidden: bool = False) -> click.Option:
         is_eager=True,
         hidden=hidden,
         callback=_want_debug,
-        help="Show the traceback of a fault of qlinkgen itself.",
+        help="Show the traceback of an internal error.",
     )
 
 
 def _unforeseen(error: Exception) -> str:
-    """Show the traceback if it is wanted; return the line that asks for a report."""
+    """Show the traceback if requested; return the line that asks for a report."""
     if _debug.wanted:
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     frame = traceback.extract_tb(error.__traceback__)[-1]
     what = _one_line(f"{type(error).__name__}: {error}".rstrip(": "))
     where = f"{Path(frame.filename).name}:{frame.lineno}"
     report = "the traceback" if _debug.wanted else "the output of the same command with --debug"
-    return f"a fault of qlinkgen itself ({what}; {where}); please report it with {report}"
+    return f"internal error ({what}; {where}); please report it with {report}"
 
 
 def _one_line(text: str) -> str:
-    """Text without line breaks or other control characters, which a terminal would obey."""
+    """Return text without line breaks or other control characters, which a terminal would interpret."""
     return "".join(each if each.isprintable() else repr(each)[1:-1] for each in text)
 
 
@@ -125,14 +125,14 @@ def _complain(text: str, code: int) -> int:
 def _of_system(error: OSError) -> str:
     where = f" {error.filename}" if error.filename else ""
     fix = "check free space, permissions and the path"
-    return f"the system refused{where}: {error.strerror or error}; {fix}"
+    return f"system error{where}: {error.strerror or error}; {fix}"
 
 
 def _silence() -> None:
-    """Point stdout at nothing: what is still in its buffer would fail again while Python shuts down."""
+    """Redirect stdout to nothing: flushing its buffer at exit would fail again."""
     try:
         target = sys.stdout.fileno()
-    except (OSError, ValueError):  # closed, or no real file
+    except (OSError, ValueError):  # closed, or not a real file
         sys.stdout = standard_streams.nothing()
         return
     nothing = os.open(os.devnull, os.O_WRONLY)

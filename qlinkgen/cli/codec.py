@@ -1,4 +1,4 @@
-"""The live codec of a protocol: the generated Python module, made in memory, with values as JSON has them."""
+"""The live codec of a protocol: the generated Python module, compiled in memory, and its values as JSON."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class MessageObject(link.Message, Shape):
 
     @property
     def to_frame(self) -> Callable[..., bytes]:
-        """Function that returns the whole frame; that of a packet's answer takes the request."""
+        """Function that returns the whole frame; for the response of a packet it takes the request."""
         ...
 
 
 def load_codec(protocol: Protocol) -> ModuleType:
     """The generated module of a protocol."""
-    from qlinkgen.backends.python import load  # noqa: PLC0415  # Jinja takes a while
+    from qlinkgen.backends.python import load  # noqa: PLC0415  # Jinja is slow to import
 
     return load(protocol)
 
@@ -34,14 +34,14 @@ def load_codec(protocol: Protocol) -> ModuleType:
 def build(
     codec: ModuleType, message: Message, given: Mapping[str, Json], address: Mapping[str, int]
 ) -> MessageObject:
-    """A message object from values as JSON or a command line has them."""
+    """Make a message object from values of JSON or a command line."""
     values = {value.name: value for value in message.values}
     for name in given:
         if name not in values:
             raise Failure(_no_field(message, name, list(values)))
     if missing := [name for name, value in values.items() if value.required and name not in given]:
         fix = " ".join(f"{name}=VALUE" for name in missing)
-        raise Failure(f"{message.name}: {', '.join(missing)} must be given, there is no default; add {fix}")
+        raise Failure(f"{message.name}: {', '.join(missing)} has no default; add {fix}")
     try:
         natives = {name: from_json(values[name], each) for name, each in given.items()}
         for name, native in natives.items():
@@ -59,13 +59,13 @@ def build(
 
 
 def fields(message: Message, found: link.Message) -> dict[str, Json]:
-    """The values of a message object, for JSON."""
+    """Return the values of a message object, for JSON."""
     return {value.name: to_json(value, getattr(found, attribute(value.name))) for value in message.values}
 
 
 def _no_field(message: Message, name: str, known: list[str]) -> str:
     filled = [field.name for field in message.fields if field.name not in known]
     if name in filled:
-        return f"{message.name}: '{name}' is filled by the encoder; leave it out"
+        return f"{message.name}: '{name}' is filled in by the encoder; omit it"
     listed = f"its fields are {', '.join(known)}" if known else "it has no fields"
     return f"{message.name} has no field '{name}'; {did_you_mean(name, known) or listed}"

@@ -1,4 +1,4 @@
-"""What the commands share: finding protocols and messages, warnings, hex input."""
+"""Helpers of all commands: finding protocols and messages, warnings, hex input."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from qlinkgen.model.texts import visible
 
 
 def find_schema(name: str) -> Path:
-    """The file of a shipped schema's name, or of a path."""
-    from qlinkgen.schema import find  # noqa: PLC0415  # pydantic takes a while
+    """Return the file of a schema, given by shipped name or path."""
+    from qlinkgen.schema import find  # noqa: PLC0415  # pydantic is slow to import
 
     try:
         return find(name)
     except SchemaError as error:
-        raise Failure(f"there is no schema '{name}'; {error.faults[0].hint}") from None
+        raise Failure(f"unknown schema '{name}'; {error.faults[0].hint}") from None
 
 
 def load_protocol(name: str, crc: str | None = None) -> Protocol:
-    """A protocol by shipped name or path. Raises SchemaError."""
-    from qlinkgen.schema import load  # noqa: PLC0415  # pydantic takes a while
+    """Load a protocol by shipped name or path. Raises SchemaError."""
+    from qlinkgen.schema import load  # noqa: PLC0415  # pydantic is slow to import
 
     path = find_schema(name)
     protocol = load(path)
@@ -44,7 +44,7 @@ def load_protocol(name: str, crc: str | None = None) -> Protocol:
             warn(f"--set crc={crc}: several algorithms have this name; write one of {', '.join(names)}")
         return protocol
     except SchemaError as error:
-        # The schema is right without it, so the fault is the option's.
+        # The schema is valid without the option.
         fault = error.faults[0]
         raise Failure(
             f"--set crc={crc}: {fault.message}" + (f"; {fault.hint}" if fault.hint else "")
@@ -52,7 +52,7 @@ def load_protocol(name: str, crc: str | None = None) -> Protocol:
 
 
 def find_message(protocol: Protocol, name: str) -> Message:
-    """A message by name; a command's name alone is its request."""
+    """Find a message by name; the name of a command means its request."""
     try:
         return protocol.message(name)
     except KeyError:
@@ -68,28 +68,28 @@ def find_message(protocol: Protocol, name: str) -> Message:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """A hint naming the closest known words, or ""."""
+    """Return a hint with the closest known words, or ""."""
     close = similar(word, known, most=2)
     return f"did you mean {' or '.join(close)}?" if close else ""
 
 
 def warn(text: str) -> None:
-    """A line on stderr that does not stop anything."""
+    """Print a warning on stderr."""
     click.echo(f"qlinkgen: warning: {visible(text)}", err=True)
 
 
 def warn_unconfirmed(protocol: Protocol, message: Message) -> None:
-    """Say that the source of a message or of its fields is weak."""
+    """Warn if a message or any of its fields is unconfirmed."""
     command = protocol.command_of(message)
     weak = [field.name for field in message.fields if not field.confirmed]
     if message.confirmed and (command is None or command.confirmed) and not weak:
         return
     what = f"{message.name} ({', '.join(weak)})" if weak and message.confirmed else message.name
-    warn(f"{what} is unconfirmed: its source is weak; try it at the device before trusting it")
+    warn(f"{what} is unconfirmed in the source document; verify it on the device")
 
 
 def parse_hex(text: str, what: str = "HEX") -> bytes:
-    """Bytes of hex text, by the rule of `qlinkgen.cli.hex_text`."""
+    """Parse hex text, as defined in `qlinkgen.cli.hex_text`."""
     try:
         return HexReader().feed(f"{text}\n")
     except HexError as error:
@@ -97,14 +97,14 @@ def parse_hex(text: str, what: str = "HEX") -> bytes:
 
 
 def on_terminal(stream: IO[str] | None = None) -> bool:
-    """Colours and fitting to the width are wanted."""
+    """Whether to use colours and fit the width."""
     if os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
         return False
     return bool(os.environ.get("FORCE_COLOR")) or (stream or sys.stdout).isatty()
 
 
 def addressed(protocol: Protocol, message: Message) -> bool:
-    """The message's frame carries an address (the answers of a packet protocol do not)."""
+    """Whether the frame of a message has an address (not so for responses of a packet protocol)."""
     return protocol.address_name is not None and bool(message.addresses)
 
 
@@ -119,5 +119,9 @@ def _crc(context: click.Context, parameter: click.Parameter, value: str | None) 
 
 #: ``--set crc=NAME``; the command gets the algorithm's name as ``crc``.
 crc_option = click.option(
-    "--set", "crc", metavar="crc=NAME", callback=_crc, help="Use another checksum algorithm of the catalogue."
+    "--set",
+    "crc",
+    metavar="crc=NAME",
+    callback=_crc,
+    help="Use another checksum algorithm from the catalogue.",
 )

@@ -1,4 +1,4 @@
-"""Packets, which have no frame: a conversation of requests and responses, or one side of it."""
+"""Decoding of packets, which have no frame: a conversation of requests and responses, or one side of it."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from qlinkgen.plan import Plan, plan_of
 
 @dataclass(frozen=True, slots=True)
 class OutOfRange:
-    """A request with an illegal value: no message object can hold it, but it is answered all the same."""
+    """A request with an illegal value: message objects refuse it, but the device answers it."""
 
     NAME: str
     ID: int
     payload: bytes
 
     def to_bytes(self) -> bytes:
-        """What the check value of the answer covers."""
+        """Return the bytes that the check value of the response covers."""
         return self.payload
 
 
-#: What an answer belongs to.
+#: A request as the decoder of its response takes it.
 Asked = Message | OutOfRange
 
 
@@ -52,7 +52,7 @@ class Conversation:
         yield from self._settle(last=False)
 
     def finish(self) -> Iterator[Event]:
-        """The end of the stream: what waits to become a response may still be requests."""
+        """End the stream: bytes held back as a possible response may be requests."""
         yield from self._settle(last=True)
         yield from self._requests.finish()
 
@@ -88,10 +88,10 @@ class Conversation:
         return OutOfRange(self._names[bad.raw[0]], bad.raw[0], bad.raw[1:])
 
     def _is_answer(self, found: Event, asked: Asked) -> bool:
-        """A check value fits, or nothing else can be meant.
+        """Whether the check value fits, or the bytes can only be a response.
 
-        That is an answer saying that the command is unknown, and whatever follows a request that the device
-        may have refused for its value.
+        The latter are refusals of an unknown command, and bytes after a request that the device may have
+        refused for its value.
         """
         if not isinstance(found, Bad) or found.kind == "range":
             return True
@@ -99,10 +99,10 @@ class Conversation:
 
 
 class Answers:
-    """Responses to one and the same request, one after the other."""
+    """Consecutive responses to the same request."""
 
     def __init__(self, protocol: Protocol, codec: ModuleType, asked: Asked) -> None:
-        """Every response answers ``asked``."""
+        """Take ``asked`` as the request of every response."""
         self._size = answer_size(plan_of(protocol), asked)
         self._codec, self._asked = codec, asked
         self._offset = 0
@@ -125,13 +125,13 @@ class Answers:
 
 
 def answer_size(plan: Plan, asked: Asked) -> int:
-    """Bytes of the response to a request object, check value included; 0 if nothing answers."""
+    """Return the size of the response to a request with its check value; 0 for a request without response."""
     command = plan.protocol.command_of(plan.protocol.by_name[asked.NAME])
     return plan.message(command.response.name).frame_size if command and command.response else 0
 
 
 def decode_answer(codec: ModuleType, raw: bytes, asked: Asked, offset: int) -> Event:
-    """The response in these bytes, or what is wrong with them."""
+    """Decode these bytes as a response; return the message or the fault."""
     try:
         answer: MessageObject = codec.decode_response(raw, asked)
     except codec.DecodeError as error:

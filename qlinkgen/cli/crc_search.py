@@ -1,4 +1,4 @@
-"""Why a check value does not fit: other algorithms, byte orders and coverages, or a single wrong bit."""
+"""Finds the cause of a wrong check value: other algorithms, byte orders and coverages, or a flipped bit."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from qlinkgen.model.checksum import SUMS, Algorithm, Sum, catalogue
 from qlinkgen.plan.check import Check
 
-#: Answers that are shown at most; further ones are as likely to be coincidences.
+#: Most matches to show; further ones are probably coincidences.
 SHOWN = 3
-#: A check of fewer bits fits by chance too often for wide searches to mean anything.
+#: A shorter check value matches by chance too often for a wide search.
 CHANCE_BITS = 16
 
 
@@ -26,7 +26,7 @@ class Coverage:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A reading under which the check value is right."""
+    """An algorithm, byte order and coverage for which the check value is correct."""
 
     text: str
     steps: int
@@ -35,13 +35,13 @@ class Fit:
 def coverages(
     parts: Mapping[str, bytes], over: Sequence[str], others: Mapping[str, bytes], other: str
 ) -> list[Coverage]:
-    """Every subset of the parts, nearest to the schema first.
+    """Return every subset of the parts, nearest to the schema first.
 
     Args:
-        parts: bytes of each part as the schema has them covered, with or without stuffing.
-        over: names of the parts that the schema has covered.
-        others: their bytes the other way.
-        other: says that they are covered the other way.
+        parts: bytes of each part as covered by the schema, with or without stuffing.
+        over: names of the parts that the schema covers.
+        others: their bytes without or with stuffing, respectively.
+        other: text for the latter.
     """
     found: dict[bytes, Coverage] = {}
     forms = [("", parts, 0)] + ([(other, others, 1)] if others != parts else [])
@@ -56,7 +56,7 @@ def coverages(
 
 
 def search(check: Check, received: int, covers: Sequence[Coverage]) -> list[Fit]:
-    """Readings under which the received value fits, the nearest to the schema first."""
+    """Return the matches of the received value, the nearest to the schema first."""
     limit = 2 if check.algorithm.width >= CHANCE_BITS else 1
     fits = [fit for fit in _fits(check, received, covers, limit) if fit.steps]
     nearest = min((fit.steps for fit in fits), default=0)
@@ -67,7 +67,7 @@ def _fits(check: Check, received: int, covers: Sequence[Coverage], limit: int) -
     algorithms = _algorithms(check.algorithm)
     orders = [("", received, 0)]
     if (swapped := _swapped(check, received)) != received:
-        orders.append((" with its bytes the other way round", swapped, 1))
+        orders.append((" with its bytes swapped", swapped, 1))
     for each, algorithm in itertools.product(covers, algorithms):
         steps = each.steps + (algorithm is not algorithms[0])
         if steps > limit:
@@ -87,12 +87,12 @@ def _algorithms(own: Algorithm | Sum) -> list[Algorithm | Sum]:
 
 
 def _swapped(check: Check, value: int) -> int:
-    """The value if its wire bytes had come in the opposite order."""
+    """Return the value with its wire bytes in the opposite order."""
     return check.unpack(check.pack(value)[::-1])
 
 
 def flipped_bit(check: Check, received: int, data: bytes) -> tuple[int, int] | None:
-    """Index of a covered byte, and what it should have been, if one flipped bit explains the difference."""
+    """Return index and correct value of a covered byte, if one flipped bit explains the difference."""
     if check.algorithm.width < CHANCE_BITS:
         return None
     for index, bit in itertools.product(range(len(data)), range(8)):
@@ -106,50 +106,50 @@ def flipped_bit(check: Check, received: int, data: bytes) -> tuple[int, int] | N
 def explain_mismatch(
     check: Check, received: int, covers: Sequence[Coverage], own: Sequence[tuple[int, int]]
 ) -> str:
-    """The likely cause of a check value that does not fit.
+    """Return the likely cause of a wrong check value.
 
     Args:
-        check: What the schema says.
-        received: The value that came.
+        check: Check value of the schema.
+        received: The received value.
         covers: Coverages to try.
-        own: The covered bytes, as the schema has it: wire offset and value.
+        own: The bytes covered by the schema: wire offset and value.
     """
     if fits := search(check, received, covers):
-        return f"it would fit as {', or as '.join(fit.text for fit in fits)}: the sender may compute it so"
+        return f"it matches {', or '.join(fit.text for fit in fits)}: the sender may use that"
     data = bytes(value for _, value in own)
     expected = check.algorithm.compute(data) & check.mask
     if (expected ^ received).bit_count() == 1:
         return "one bit of the check value itself was flipped on the wire"
     if flipped := flipped_bit(check, received, data):
         index, value = flipped
-        return f"one bit was flipped on the wire: {value:02x} at offset {own[index][0]} would fit"
+        return f"one bit was flipped on the wire: {value:02x} at offset {own[index][0]} would match"
     tried = "algorithm of the catalogue, byte order or coverage near the schema's"
-    return f"no {tried} fits: bytes were corrupted on the wire"
+    return f"no {tried} matches: bytes were corrupted on the wire"
 
 
 def explain_sum(check: Check, id_name: str, request: bytes, answer: bytes, received: int) -> str:
-    """The likely cause of a check value over a request and its response that does not fit.
+    """Return the likely cause of a wrong check value over a request and its response.
 
     Args:
-        check: What the schema says.
+        check: Check value of the schema.
         id_name: The name of the first byte of the request.
-        request: The packet that is answered.
+        request: The request packet.
         answer: The payload of the response.
         received: The value that was received.
     """
     start, words = request[0], request[1:]
     expected = check.of(words, answer, start=start) & check.mask
     if check.unpack(check.pack(received)[::-1]) == expected:
-        return "its bytes came the other way round"
+        return "its bytes are swapped"
     readings = {
         f"the sum of the words without {id_name}": check.of(words, answer),
-        "the sum of the response's words alone": check.of(answer),
-        "the sum of the request alone": check.of(words, start=start),
+        "the sum of only the response's words": check.of(answer),
+        "the sum of only the request": check.of(words, start=start),
         "the sum of single bytes": sum(request + answer),
     }
     fitting = [text for text, value in readings.items() if value & check.mask == received]
     if fitting:
-        return f"it would fit as {fitting[0]}: the device may compute it so"
+        return f"it matches {fitting[0]}: the device may use that"
     if (received ^ expected).bit_count() == 1:
         return "one bit was flipped on the wire"
-    return "bytes were corrupted or lost, or these bytes answer another request"
+    return "bytes were corrupted or lost, or the response belongs to another request"

@@ -1,4 +1,4 @@
-"""``qlinkgen decode``: wire bytes to values, one JSON object a line."""
+"""``qlinkgen decode``: decode wire bytes, one JSON object per line."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ _COMMENT = re.compile(rb"#[^\n]*")
 @click.argument("protocol")
 @click.argument("hex_", metavar="[HEX|-]...", nargs=-1)
 @click.option(
-    "--direction", type=click.Choice(["request", "response"]), help="What the frames are; see above."
+    "--direction", type=click.Choice(["request", "response"]), help="Direction of the frames; see above."
 )
-@click.option("--request", "request", metavar="HEX", help="Packets: the request that the responses answer.")
-@click.option("--raw", is_flag=True, help="Standard input is the bytes themselves, not hex text.")
+@click.option("--request", "request", metavar="HEX", help="Packets: the request of the responses.")
+@click.option("--raw", is_flag=True, help="Standard input is binary, not hex text.")
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
@@ -48,17 +48,17 @@ def command(  # noqa: PLR0917  # click passes them by name
     raw: bool,
     crc: str | None,
 ) -> int:
-    """Print every frame of a stream as a JSON object; bytes between frames are passed over.
+    """Print every frame of a stream as a JSON object; bytes between frames are skipped.
 
-    - (or nothing) reads hex text from standard input as it comes; comments go from # to the end of the line.
-    White space separates words of pairs of digits, each with or without 0x; a digit by itself is a byte too.
-    A bad frame is an object {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad
-    frame, or none at all.
+    - (or no HEX) reads hex text from standard input as it arrives; comments go from # to the end of the line.
+    White space separates words of digit pairs, each with or without 0x; a single digit is a byte too. A bad
+    frame is an object {"error": {"kind", "offset", "raw", "message"}}. Exit code 1 if there is a bad frame,
+    or no frame.
 
-    Nothing in most frames says whether it is a request or a response. Without --direction, what fits only one
-    of them is that; what fits both is the response if it directly follows a request of the same command and
-    node, else the request. Packets without --direction are a conversation: behind a request, a response if
-    its check value fits, else the next request; --direction response needs --request for them.
+    Most frames do not state their direction. Without --direction, a frame that is valid in only one direction
+    has that direction; one that is valid in both is the response if it directly follows a request of the same
+    command and node, else the request. Packets without --direction are a conversation: after a request, a
+    response if its check value fits, else the next request; with --direction response they need --request.
 
     \b
     qlinkgen decode qlink a5a504210315e8
@@ -81,12 +81,10 @@ def _stream(
     protocol: Protocol, codec: ModuleType, direction: Direction | None, request: str | None
 ) -> Stream:
     if direction and direction not in protocol.directions:
-        raise Failure(
-            f"{protocol.name} has neither requests nor responses; leave out --direction {direction}"
-        )
+        raise Failure(f"{protocol.name} has neither requests nor responses; omit --direction {direction}")
     packets = frame_plan(protocol.frame).needs_request
     if request is not None and not (packets and direction != "request"):
-        raise Failure("--request goes with the responses of a packet protocol; leave it out")
+        raise Failure("--request requires responses of a packet protocol; omit it")
     if not packets or direction == "request":
         return open_stream(protocol, codec, direction)
     if direction is None and request is None:
@@ -97,7 +95,7 @@ def _stream(
 def _input(words: tuple[str, ...], *, raw: bool) -> Iterable[bytes]:
     if words and words != ("-",):
         if raw:
-            raise Failure("--raw reads bytes from standard input; leave out HEX, or --raw")
+            raise Failure("--raw reads bytes from standard input; omit HEX or --raw")
         return [parse_hex(" ".join(words))]
     if not words and sys.stdin.isatty():
         raise Failure("nothing to decode; give HEX, or - to read it from standard input")
@@ -110,9 +108,9 @@ def _read_raw() -> Iterator[bytes]:
 
 
 def _read_hex() -> Iterator[bytes]:
-    """Bytes as soon as both their digits are there; a chunk may end anywhere.
+    """Yield bytes as soon as both digits are known; a chunk may end anywhere.
 
-    The bytes before a wrong character are handed out before the error.
+    The bytes before a wrong character are yielded before the error is raised.
     """
     reader, comment, line = HexReader(), False, 1
     for chunk in chain(_read_raw(), (b"\n",)):
@@ -128,7 +126,7 @@ def _read_hex() -> Iterator[bytes]:
 
 
 class _Printer:
-    """Prints events as they come, and keeps what the exit code depends on."""
+    """Prints events immediately, and counts them for the exit code."""
 
     def __init__(self, protocol: Protocol) -> None:
         self._protocol = protocol
@@ -136,7 +134,7 @@ class _Printer:
         self._warned: set[str] = set()
 
     def show(self, events: Iterable[Event], size: int = 0) -> None:
-        """Print events; whoever reads along in a pipe sees what has come at once."""
+        """Print events and flush, so that the reader of a pipe sees them at once."""
         self._bytes += size
         for event in events:
             sys.stdout.write(f"{jsonlines.line(self._record(event))}\n")
@@ -145,8 +143,8 @@ class _Printer:
     def result(self) -> int:
         """The exit code."""
         if not self._good and not self._bad:
-            seen = f"no frame in {self._bytes} bytes" if self._bytes else "no bytes came"
-            warn(f"{seen}; `qlinkgen explain {self._protocol.name} HEX` looks for the reason")
+            seen = f"no frame in {self._bytes} bytes" if self._bytes else "no input"
+            warn(f"{seen}; `qlinkgen explain {self._protocol.name} HEX` looks for the cause")
         return FINE if self._good and not self._bad else WRONG
 
     def _record(self, event: Event) -> Mapping[str, Json]:
@@ -161,7 +159,7 @@ class _Printer:
 
 
 def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
-    """A message as decode prints it."""
+    """Return the JSON object of a message."""
     message = protocol.by_name[found.NAME]
     record: dict[str, Json] = {"message": message.name}
     name = protocol.address_name
@@ -172,5 +170,5 @@ def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
 
 
 def error_record(bad: Fault) -> dict[str, Json]:
-    """A bad frame as decode prints it."""
+    """Return the JSON object of a bad frame."""
     return {"error": {"kind": bad.kind, "offset": bad.offset, "raw": bad.raw.hex(), "message": bad.message}}

@@ -1,4 +1,4 @@
-"""What outputs depend on, as a rule of make: make, Ninja and CMake read it to know when to run again."""
+"""Dependencies of the outputs as a make rule, for make, Ninja and CMake."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from qlinkgen.cli import output
 from qlinkgen.cli.boundary import WRONG, Failure
 
-#: What may be overwritten: a rule as it is written here, or nothing.
+#: Contents that may be overwritten: a rule as written here, or nothing.
 _OURS = re.compile(r"(?:[^\n]+ \\\n)*[^\n]+: \\\n(?: [^\n]+ \\\n)* [^\n]+\n|")
 
 
@@ -31,20 +31,20 @@ class Depfile:
             raise Failure(f"--depfile: {what}; nothing was written: choose another name", WRONG)
 
     def write(self) -> None:
-        """Write the file, unless it is as it should be."""
+        """Write the file, unless it is up to date."""
         if self._present != self.text:
             output.replace(self._file.parent, {self._file.name: self.text})
 
 
 def rule(outputs: Sequence[Path], inputs: Sequence[Path]) -> str:
-    """The text of a rule."""
+    """Return the text of a rule."""
     targets, needed = ([_escaped(str(path)) for path in paths] for paths in (outputs, inputs))
     return " \\\n".join(targets) + ": \\\n " + " \\\n ".join(needed) + "\n"
 
 
 def _escaped(path: str) -> str:
-    """A path as make reads it: backslashes are doubled only where one would escape what follows."""
+    """Escape a path for make: backslashes are doubled only before a character that they would escape."""
     if "\n" in path or "\r" in path:
-        raise Failure(f"--depfile: a rule of make cannot hold {path!r}, which has a line break; rename it")
+        raise Failure(f"--depfile: {path!r} has a line break, which a make rule cannot contain; rename it")
     path = re.sub(r"\\+(?=[ #:]|$)", lambda found: found[0] * 2, path)
     return re.sub(r"([ #:])", r"\\\1", path).replace("$", "$$")

@@ -1,4 +1,4 @@
-"""Messages and transactions in words; those for parts and steps are in `plan.describe`."""
+"""Descriptions of messages and transactions; those of parts and steps are in `plan.describe`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ADDRESSING = {
 
 
 def default_text(value: Value) -> str:
-    """The default as the command line takes it, ``required`` where there is none."""
+    """Return the default as written on the command line, ``required`` if there is none."""
     if value.required:
         return "required"
     shown = to_json(value, default_of(value))
@@ -29,12 +29,12 @@ def default_text(value: Value) -> str:
 
 
 def addresses_text(message: Message) -> str:
-    """The addresses that a message may carry."""
+    """Return the addresses that a message may have."""
     return ", ".join(span_text(first, last) for first, last in message.addresses)
 
 
 def time_text(allowance: Allowance) -> str:
-    """How long an answer may take."""
+    """Return the longest response time."""
     parts = []
     if allowance.byte_times:
         parts.append(f"{number_text(allowance.byte_times)} byte times")
@@ -44,7 +44,7 @@ def time_text(allowance: Allowance) -> str:
 
 
 def repeat_text(command: Command) -> str:
-    """Whether a request may be sent again."""
+    """Return whether a request may be repeated."""
     if command.repeat.counter:
         return f"by {command.repeat.counter}"
     return "safe" if command.repeat.safe else "unsafe"

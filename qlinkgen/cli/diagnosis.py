@@ -1,4 +1,4 @@
-"""What ``qlinkgen doctor`` finds out about an open port, and what it advises."""
+"""Findings of ``qlinkgen doctor`` about an open port, and its advice."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from qlinkgen.codecs import qlink
 from qlinkgen.transport.conversation import host_slack, timing_of
 from qlinkgen.transport.port import Ability, Port
 
-#: What is reckoned with: the request that a motion program sends all day long.
+#: The request that costs are computed for: the most frequent one of a motion program.
 COMMAND = qlink.COMMANDS["motion"]
 
-#: A latency above this costs more than most transactions themselves last.
+#: A latency above this takes longer than most transactions.
 TOO_SLOW = 0.002
 
-#: Seconds without a byte after which a line counts as quiet; a master that polls leaves far less.
+#: Seconds without a byte after which a line is idle; a polling master pauses far less.
 QUIET = 0.1
 
-#: Q.link receivers hunt for the preamble A5 A5, so to them this byte is nothing.
+#: Q.link receivers hunt for the preamble A5 A5, so they ignore this byte.
 PROBE = b"\x00"
 
 RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
 RULE_FILE = "/etc/udev/rules.d/99-qlinkgen.rules"
 
-#: Where udev keeps names that belong to an adapter instead of a plug.
+#: Where udev keeps names of adapters that do not depend on the socket.
 BY_ID = Path("/dev/serial/by-id")
 
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """One thing to do, or to know."""
+    """One recommendation or note."""
 
     kind: Literal["fix", "note"]
     text: str
@@ -40,12 +40,12 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """What came back after one byte was sent.
+    """The result of sending one byte.
 
     Attributes:
-        heard: the byte came back; None where others were sending, so nothing can be said.
-        seconds: time until something came.
-        received: what came, as hex.
+        heard: the byte was received; None if other traffic makes this uncertain.
+        seconds: time until the first byte was received.
+        received: the bytes received, as hex.
     """
 
     heard: bool | None
@@ -55,7 +55,7 @@ class Echo:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The terms of one transaction's deadline, in seconds; `longest` is its request and its answer."""
+    """The terms of a transaction's deadline, in seconds; `longest` is the size of request and response."""
 
     command: str
     longest: int
@@ -66,7 +66,7 @@ class Cost:
 
 
 def cost(port: Port) -> Cost:
-    """Reckon what a transaction takes on a port."""
+    """Compute the duration of a transaction on a port."""
     timing = timing_of(qlink, port)
     longest = COMMAND.request.MAX_WIRE_SIZE + (COMMAND.response.MAX_WIRE_SIZE if COMMAND.response else 0)
     terms = timing.on_wire(longest), timing.allowance(COMMAND), timing.host_slack
@@ -74,7 +74,7 @@ def cost(port: Port) -> Cost:
 
 
 def probe(port: Port) -> Echo:
-    """Send one byte on a quiet line and listen for it."""
+    """Send one byte on an idle line and listen for it."""
     if noise := port.read(QUIET):
         return Echo(None, None, noise.hex())
     sent = port.now()
@@ -87,7 +87,7 @@ def probe(port: Port) -> Echo:
 
 
 def advise(port: Port, name: str, echo: Echo | None) -> list[Advice]:
-    """Say what to change, and what to know."""
+    """Return recommendations and notes."""
     return [*_of_latency(port), *_of_line(port), *_of_name(name), *_of_echo(echo)]
 
 
@@ -95,14 +95,14 @@ def _of_latency(port: Port) -> list[Advice]:
     found = port.capabilities
     if found.latency is not None:
         return [_too_slow(found.latency)] if found.latency > TOO_SLOW else []
-    assumed = f"{host_slack(port) * 1000:.0f} ms of host slack are reckoned with"
+    assumed = f"{host_slack(port) * 1000:.0f} ms of host slack are assumed"
     if found.low_latency is Ability.YES or not found.driver:
         return [Advice("note", f"its latency is unknown ({found.latency_source}), so {assumed}")]
     return [
         Advice(
             "note",
             f"the driver {found.driver} refused low latency; try `sudo setserial {port.name} low_latency`: "
-            f"if that is refused too, it has no such mode. Its latency is unknown, so {assumed}",
+            f"if that fails too, it does not support it. Its latency is unknown, so {assumed}",
         )
     ]
 
@@ -111,22 +111,24 @@ def _too_slow(latency: float) -> Advice:
     return Advice(
         "fix",
         f"the adapter holds bytes back for {latency * 1000:.0f} ms; `echo '{RULE}' | sudo tee {RULE_FILE}`, "
-        "then unplug it and plug it in again",
+        "then reconnect it",
     )
 
 
 def _of_line(port: Port) -> list[Advice]:
     if port.capabilities.paced is Ability.NO:
-        return [Advice("note", "this is no real line: its timing says nothing about one")]
+        return [
+            Advice("note", "bytes ignore the baud rate here: the timing differs from that of a serial line")
+        ]
     return []
 
 
 def _of_name(name: str) -> list[Advice]:
-    """A number such as in ttyUSB0 depends on the order of plugging in."""
+    """Recommend a stable name: the number in ttyUSB0 depends on the order of connection."""
     if os.path.realpath(name) != str(Path(name).absolute()) or not BY_ID.is_dir():
         return []
     same = [link for link in sorted(BY_ID.iterdir()) if os.path.realpath(link) == name]
-    return [Advice("note", f"{same[0]} is a name that stays with this adapter")] if same else []
+    return [Advice("note", f"{same[0]} is a stable name of this adapter")] if same else []
 
 
 def _of_echo(echo: Echo | None) -> list[Advice]:
@@ -136,9 +138,9 @@ def _of_echo(echo: Echo | None) -> list[Advice]:
         return [
             Advice(
                 "note",
-                "the port hears what it sends, as on two wires; masters of qlinkgen find that out themselves",
+                "the port receives its own bytes, as on two wires; masters of qlinkgen detect this",
             )
         ]
-    text = f"others are sending on this line ({echo.received[:32]})"
-    fix = "end other masters; if there is none, check baud rate, termination and bias of the line"
+    text = f"unexpected bytes on this line ({echo.received[:32]})"
+    fix = "stop other masters; otherwise check baud rate, termination and bias of the line"
     return [Advice("fix", f"{text}; {fix}")]

@@ -1,4 +1,4 @@
-"""``qlinkgen doctor``: what a port can do, what it costs a transaction, and what to change."""
+"""``qlinkgen doctor``: report the abilities of a port, its latency, and what to change."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from qlinkgen.transport.port import Ability, Capabilities, Port
 
 _MEANINGS = {
     "exclusive": {
-        Ability.YES: "other programs are kept out while it is open here",
-        Ability.NO: "other programs may send in between",
-        Ability.UNKNOWN: "the far end decides whether others may send in between",
+        Ability.YES: "other programs cannot open it meanwhile",
+        Ability.NO: "other programs may open it and send",
+        Ability.UNKNOWN: "depends on the remote end",
     },
     "low_latency": {
-        Ability.YES: "received bytes are handed on at once",
-        Ability.NO: "received bytes are collected first",
-        Ability.UNKNOWN: "nothing tells whether received bytes are collected first",
+        Ability.YES: "received bytes are delivered immediately",
+        Ability.NO: "received bytes are buffered first",
+        Ability.UNKNOWN: "received bytes may be buffered first",
     },
     "rs485": {
         Ability.YES: "the driver switches the transceiver",
-        Ability.NO: "the adapter itself has to switch a transceiver",
-        Ability.UNKNOWN: "the far end has to switch a transceiver",
+        Ability.NO: "the adapter has to switch the transceiver",
+        Ability.UNKNOWN: "the remote end has to switch the transceiver",
     },
     "paced": {
-        Ability.YES: "bytes take their time on a line",
-        Ability.NO: "bytes arrive at once, at any baud rate",
-        Ability.UNKNOWN: "nothing tells whether bytes take their time",
+        Ability.YES: "bytes are transmitted at the baud rate",
+        Ability.NO: "bytes arrive immediately, at any baud rate",
+        Ability.UNKNOWN: "bytes may ignore the baud rate",
     },
 }
 
@@ -50,19 +50,19 @@ _MEANINGS = {
     default=BAUD,
     show_default=True,
     metavar="N",
-    help="Speed to open it with.",
+    help="Baud rate.",
 )
 @click.option(
-    "--probe", "probing", is_flag=True, help="Send one byte 00, nothing to Q.link, and listen for it."
+    "--probe", "probing", is_flag=True, help="Send one byte 00, which Q.link ignores, and listen for it."
 )
-@click.option("--json", "as_json", is_flag=True, help="One object instead of text.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")
 def command(port: str, baud: int, probing: bool, as_json: bool) -> int:
-    """Open PORT and say what it can do, what its latency does to a transaction, and what to change.
+    """Open PORT and report what it can do, how its latency affects a transaction, and what to change.
 
-    PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. Nothing is sent unless
-    --probe asks for it.
+    PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. Nothing is sent
+    without --probe.
 
-    Exit code 1 if a line says fix, or if the port is missing, busy or lost.
+    Exit code 1 if a line begins with fix, or if the port is missing, busy or lost.
     """
     with open_line(port, baud) as opened:
         echo = probe(opened) if probing else None
@@ -103,7 +103,7 @@ def _show_text(port: Port, total: Cost, echo: Echo | None, advice: list[Advice])
 
 def _abilities(port: Port, echo: Echo | None) -> Table:
     found = port.capabilities
-    table = Table(["what", "found", "meaning"], f"{port.name} at {port.baud} baud")
+    table = Table(["ability", "found", "meaning"], f"{port.name} at {port.baud} baud")
     table.add("driver", found.driver or "unknown", "")
     for key, meanings in _MEANINGS.items():
         ability: Ability = getattr(found, key)
@@ -120,29 +120,31 @@ def _latency(found: Capabilities) -> str:
 
 def _echo(echo: Echo) -> tuple[str, str]:
     if echo.heard is None:
-        return "unknown", f"others were sending: {echo.received[:32]}"
+        return "unknown", f"unexpected bytes: {echo.received[:32]}"
     if not echo.heard:
-        return "no", "the port does not hear what it sends"
-    return "yes", f"the port hears what it sends, after {_time(echo.seconds or 0.0)}"
+        return "no", "the port does not receive its own bytes"
+    return "yes", f"the port receives its own bytes, after {_time(echo.seconds or 0.0)}"
 
 
 def _terms(port: Port, total: Cost) -> Table:
     latency = port.capabilities.latency
     held = (
-        f"an unknown latency, taken as {_time(ASSUMED_LATENCY)}"
+        f"an unknown latency, assumed to be {_time(ASSUMED_LATENCY)}"
         if latency is None
         else f"{_time(latency)} of latency"
     )
-    table = Table(["term", "time", "why"], f"One {total.command} of Q.link", right=frozenset({"time"}))
-    size = f"{total.longest} bytes, request and answer at their longest"
+    table = Table(["term", "time", "reason"], f"One {total.command} of Q.link", right=frozenset({"time"}))
+    size = f"{total.longest} bytes, the longest request and response"
     table.add("on the wire", _time(total.on_wire), size)
-    table.add("allowance", _time(total.allowance), "three byte times, in which a node begins to answer")
+    table.add("allowance", _time(total.allowance), "three byte times for the node to begin its response")
     other = f", {_time(OTHER_PROGRAM)} for the program at its other end" * (
         port.capabilities.paced is Ability.NO
     )
     woken = f"{held}{other}, and {_time(WAKE_UP)} to wake this program"
     table.add("host slack", _time(total.host_slack), woken)
-    table.add("deadline", _time(total.deadline), "their sum: no answer until then, and it is asked again")
+    table.add(
+        "deadline", _time(total.deadline), "the sum; without a response until then, the request is repeated"
+    )
     return table
 
 

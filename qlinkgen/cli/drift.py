@@ -1,4 +1,4 @@
-"""The output folder against what it should hold: drift, missing files, orphans; and putting it right."""
+"""Compares an output folder with its expected contents (drift, missing files, orphans), and updates it."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from qlinkgen.cli.output import Found
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One file that is not as it should be.
+    """One difference between folder and expected contents.
 
     Attributes:
-        ours: qlinkgen wrote it, so it may be replaced or removed.
-        obstacle: why no file can be written or removed there.
+        ours: qlinkgen wrote the file, so it may be replaced or removed.
+        obstacle: why a file cannot be written or removed there.
     """
 
     path: str
@@ -33,10 +33,10 @@ class Change:
 
 @dataclass
 class Folder:
-    """An output folder: what is there, what should be, and the difference.
+    """An output folder: actual contents, expected contents, and their difference.
 
-    The folders of the outputs belong to qlinkgen: any other file in them is an orphan, though it is never
-    touched. Without ``listed`` there is neither manifest nor orphan, and every file is qlinkgen's.
+    The folders of the outputs belong to qlinkgen: any other file in them is an orphan, but is never
+    changed. Without ``listed`` there is neither a manifest nor an orphan, and every file is qlinkgen's.
     """
 
     root: Path
@@ -45,30 +45,32 @@ class Folder:
     wanted: dict[str, str] = field(default_factory=dict)
 
     def want(self, protocol: str, schema: str, target: str, outputs: dict[str, str]) -> None:
-        """Add what a target makes of a protocol. Raises Failure if another one makes the same file."""
+        """Add the outputs of a target for a protocol. Raises Failure if another one makes the same file."""
         for path, text in outputs.items():
             if self.wanted.setdefault(path, text) != text:
-                raise Failure(f"{path} would be made twice, for {protocol} and another; rename the protocol")
+                raise Failure(
+                    f"{path} is an output of {protocol} and of another protocol; rename one of them"
+                )
         self.made.add(protocol, schema, target, outputs)
 
     def files(self) -> dict[str, str]:
-        """Path to text of everything that should be there; the manifest, if there is one, is last."""
+        """Return path to text of all expected files; the manifest, if any, is last."""
         return {**self.wanted, manifest.NAME: self._kept.text()} if self.listed else self.wanted
 
     def changes(self) -> list[Change]:
-        """Everything that differs, by path. Raises Failure for a manifest that is not qlinkgen's."""
+        """Return all differences, by path. Raises Failure for a manifest that is not qlinkgen's."""
         found = [change for path, text in self.files().items() if (change := self._compare(path, text))]
         found += self._orphans() if self.listed else []
         return sorted(found, key=lambda change: change.path)
 
     def refusal(self, change: Change) -> str:
-        """Why a change cannot be made, "" if it can: qlinkgen did not write what is there."""
+        """Return why a change cannot be made, "" if it can: qlinkgen did not write the existing file."""
         if change.kind == "changed" and not (change.ours or change.obstacle):
-            return f"{self.root / change.path} was not written by qlinkgen, or its first lines were changed"
+            return f"{self.root / change.path} was not written by qlinkgen, or its banner was changed"
         return change.obstacle
 
     def taken(self) -> Iterator[str]:
-        """Files that are a protocol's of another run, such as `oven_bus` beside the bus module of `oven`."""
+        """Yield files of another protocol of an earlier run, such as `oven_bus` for the bus of `oven`."""
         made = self.made.entries
         for name, entry in self._kept.entries.items() if self.listed else ():
             own = {f"{each}.py" for each in (name, *made)}
@@ -77,17 +79,17 @@ class Folder:
                     yield f"{self.root / path} belongs to the protocol {name}"
 
     def update(self, changes: Sequence[Change]) -> None:
-        """Write what is changed or missing, and remove orphans that an earlier run has made."""
+        """Write changed and missing files, and remove orphans written by an earlier run."""
         files = self.files()
         written = {change.path for change in changes if change.kind != "orphan"}
         gone = [change.path for change in changes if change.kind == "orphan" and change.ours]
         output.clean(self.root, [*files, *gone])
-        # The manifest is last: if the run is killed, the next one still finds the orphans in it.
+        # The manifest is written last: after a killed run, the next one still finds the orphans in it.
         texts = {path: text for path, text in files.items() if path in written}
         output.replace(self.root, texts, gone, last=manifest.NAME)
 
     def diff(self, change: Change) -> list[str]:
-        """How a changed file differs."""
+        """Return the diff of a changed file."""
         if change.kind != "changed" or change.obstacle:
             return []
         present = (self._found(change.path).data or b"").decode("utf-8", "replace")
@@ -100,7 +102,7 @@ class Folder:
     def _before(self) -> Manifest:
         found = self._found(manifest.NAME)
         if found.obstacle:
-            raise Failure(f"{found.obstacle}, where the manifest should be; move or delete it", WRONG)
+            raise Failure(f"{found.obstacle}, in place of the manifest; move or delete it", WRONG)
         if found.data is None:
             return Manifest()
         return Manifest.read(found.data.decode("utf-8", "replace"), self.root / manifest.NAME)
@@ -123,7 +125,7 @@ class Folder:
         return Change(path, "changed", ours=self._is_ours(path, found.data))
 
     def _is_ours(self, path: str, data: bytes) -> bool:
-        """A file has the banner, or is listed and as it was written."""
+        """Whether a file has the banner, or is listed and unchanged."""
         text = data.decode("utf-8", "replace")
         listed = path == manifest.NAME or self._before.hashes.get(path) == hash_of(text)
         return not self.listed or listed or is_generated(text)
@@ -141,7 +143,7 @@ class Folder:
             yield Change(path, "orphan", ours=False)
 
     def _present(self) -> Iterator[str]:
-        """Files in the folders of this run's outputs."""
+        """Yield the files in the folders of this run's outputs."""
         for folder in sorted({str(PurePosixPath(path).parent) for path in self.wanted} - {"."}):
             if (self.root / folder).is_dir():
                 for file in (self.root / folder).iterdir():

@@ -1,4 +1,4 @@
-"""``qlinkgen encode``: values to wire bytes."""
+"""``qlinkgen encode``: encode values as wire bytes."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ address_option = click.option(
     "addresses",
     metavar="N",
     multiple=True,
-    help="Whom the frame is for or from; 0x numbers too.",
+    help="Destination of a request, source of a response; 0x numbers too.",
 )
 json_option = click.option(
     "--json",
     "object_",
     metavar="OBJECT",
-    help='Values as JSON: \'{"counter": 1, "segments": [1, 2]}\', or a whole object that decode printed.',
+    help='Values as JSON: \'{"counter": 1, "segments": [1, 2]}\', or a whole object printed by decode.',
 )
 
 
@@ -48,7 +48,7 @@ json_option = click.option(
 @click.argument("assignments", metavar="[FIELD=VALUE]...", nargs=-1)
 @address_option
 @json_option
-@click.option("--request", "request", metavar="HEX", help="Packets: the request that a response answers.")
+@click.option("--request", "request", metavar="HEX", help="Packets: the request of a response.")
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
@@ -59,13 +59,13 @@ def command(  # noqa: PLR0917  # click passes them by name
     request: str | None,
     crc: str | None,
 ) -> None:
-    """Print the wire bytes of a message as lower-case hex: length, checksum and stuffing are filled in.
+    """Print the wire bytes of a message as lower-case hex, with length, checksum and stuffing.
 
-    A field that is not given has its default, if there is one; FIELD=VALUE wins over --json. An object that
-    decode printed names its message and address too: then MESSAGE may be left out, and --node wins.
+    An omitted field has its default, if there is one; FIELD=VALUE overrides --json. An object printed by
+    decode includes message and address: then MESSAGE may be omitted, and --node overrides the address.
 
-    Bytes are hex, lists have commas, enums are their name or number, flags a number or names with | between
-    them, numbers may be 0x or 0b, scaled values are in the unit.
+    Bytes are hex, lists are separated by commas, enums are a name or number, flags a number or names
+    separated by |, numbers may begin with 0x or 0b, scaled values are in their unit.
 
     \b
     qlinkgen encode qlink motion --node 3 counter=1 outputs=0x0F segments=100,200
@@ -90,9 +90,9 @@ def compose(
     *,
     codec: ModuleType | None = None,
 ) -> tuple[ModuleType, Message, MessageObject]:
-    """The codec, the message that a command line means, and the object with its values.
+    """Return the codec, the message of a command line, and the object with its values.
 
-    The codec is made of the protocol unless one is given.
+    Without ``codec``, the codec is made from the protocol.
     """
     if message and "=" in message:
         assignments, message = (message, *assignments), None
@@ -107,7 +107,7 @@ def compose(
 
 @dataclass(frozen=True, slots=True)
 class _Record:
-    """What --json says: fields alone, or the whole object that decode prints."""
+    """The argument of --json: only fields, or a whole object printed by decode."""
 
     fields: Mapping[str, Json]
     message: str | None = None
@@ -129,9 +129,7 @@ def _message(protocol: Protocol, name: str | None, recorded: str | None) -> Mess
         raise click.UsageError("Missing argument 'MESSAGE'.", click.get_current_context())
     found = find_message(protocol, wanted)
     if recorded is not None and find_message(protocol, recorded) is not found:
-        raise Failure(
-            f"--json: the object is a {recorded}, not a {found.name}; name that, or leave out MESSAGE"
-        )
+        raise Failure(f"--json: the object is a {recorded}, not a {found.name}; change MESSAGE or omit it")
     return found
 
 
@@ -146,7 +144,7 @@ def _assigned(texts: Iterable[str]) -> dict[str, str]:
     for text in texts:
         name, mark, value = text.partition("=")
         if not mark or not name:
-            raise Failure(f"'{text}' is no FIELD=VALUE; write for example counter=1")
+            raise Failure(f"'{text}' is not FIELD=VALUE; write for example counter=1")
         if name in given:
             raise Failure(f"{name} is given twice, {given[name]} and {value}; keep one")
         given[name] = value
@@ -157,25 +155,25 @@ def _address(protocol: Protocol, message: Message, given: str | None) -> dict[st
     name = protocol.address_name
     if name is None or not addressed(protocol, message):
         if given is not None:
-            raise Failure(f"{protocol.name} has no address in its frame; leave out --node {given}")
+            raise Failure(f"{protocol.name} has no address in its frame; omit --node {given}")
         return {}
     if given is None:
         return {name: _only_address(message, name)}
     address = whole_number(given)
     if address is None:
         allowed = addresses_text(message)
-        raise Failure(f"{_option(name)} {given}: not a whole number; {allowed} can be given")
+        raise Failure(f"{_option(name)} {given}: not a whole number; use {allowed}")
     _check_broadcast(protocol, message, address, _option(name))
     return {name: address}
 
 
 def _check_broadcast(protocol: Protocol, message: Message, address: int, option: str) -> None:
-    """Refuse a broadcast that may not be, and an address where there is only the broadcast."""
+    """Refuse a broadcast if the command does not allow it, and a node if the command is only broadcast."""
     broadcast = protocol.bus.broadcast
     if broadcast is None or any(first <= address <= last for first, last in message.addresses):
         return
     if message.addresses == ((broadcast, broadcast),):
-        raise Failure(f"{message.command} can only be broadcast; leave out {option}")
+        raise Failure(f"{message.command} can only be broadcast; omit {option}")
     if address == broadcast:
         raise Failure(f"{message.command} cannot be broadcast; {option} {addresses_text(message)}")
 
@@ -188,8 +186,7 @@ def _only_address(message: Message, name: str) -> int:
     (first, last), *others = message.addresses
     if others or first != last:
         raise Failure(
-            f"{message.name} does not say for whom; "
-            f"give {_option(name)} N with N in {addresses_text(message)}"
+            f"{message.name} needs an address; add {_option(name)} N with N in {addresses_text(message)}"
         )
     return first
 
@@ -200,7 +197,7 @@ def _frame(
     answer = frame_plan(protocol.frame).needs_request and message.direction == "response"
     if not answer:
         if request is not None:
-            raise Failure(f"{message.name} does not depend on a request; leave out --request")
+            raise Failure(f"{message.name} does not depend on a request; omit --request")
         return built.to_frame()
     return built.to_frame(asked(protocol, codec, request, message))
 
@@ -208,11 +205,11 @@ def _frame(
 def asked(
     protocol: Protocol, codec: ModuleType, request: str | None, answer: Message | None = None
 ) -> MessageObject:
-    """The request object behind ``--request``; without one, a request that has no fields to choose."""
+    """Return the request of ``--request``; without the option, the request if it has no fields to choose."""
     if request is None:
         command = protocol.command_of(answer) if answer else None
         if command is None or command.request.fields:
-            raise Failure("the check value of a response covers its request too; give it with --request HEX")
+            raise Failure("the check value of a response covers its request too; pass --request HEX")
         default: MessageObject = codec.MESSAGES[command.request.name]()
         return default
     try:
@@ -220,5 +217,5 @@ def asked(
     except codec.DecodeError as error:
         raise Failure(f"--request {request}: {error}") from None
     if answer is not None and answer.id != found.ID:
-        raise Failure(f"--request {request} is {found.NAME}, which {answer.name} does not answer")
+        raise Failure(f"--request {request} is {found.NAME}, not the request of {answer.name}")
     return found

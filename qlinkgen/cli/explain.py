@@ -1,4 +1,4 @@
-"""``qlinkgen explain``: every byte of one frame, and what is wrong with it."""
+"""``qlinkgen explain``: describe every byte of a frame, and its errors."""
 
 from __future__ import annotations
 
@@ -26,19 +26,21 @@ Line = tuple[int, str, str, str, bool]
 @click.argument("protocol")
 @click.argument("hex_", metavar="HEX...", nargs=-1, required=True)
 @click.option(
-    "--direction", type=click.Choice(["request", "response"]), help="What the frame is; guessed unless given."
+    "--direction",
+    type=click.Choice(["request", "response"]),
+    help="Direction of the frame; guessed by default.",
 )
 @click.option(
-    "--request", "request", metavar="HEX", help="Packets: the request; HEX is then its response alone."
+    "--request", "request", metavar="HEX", help="Packets: the request; HEX is then only its response."
 )
 @crc_option
 def command(
     protocol: str, hex_: tuple[str, ...], direction: Direction | None, request: str | None, crc: str | None
 ) -> int:
-    """Say what every byte of one frame is. If something is wrong: the rule that broke, and the likely cause.
+    """Describe every byte of one frame; for each error, the rule broken and the likely cause.
 
-    For a checksum that does not fit, the other algorithms of the catalogue, byte orders and coverages are
-    tried. Exit code 1 if anything is wrong.
+    For a wrong checksum, the other algorithms of the catalogue, byte orders and coverages are tried. Exit
+    code 1 if there is an error.
 
     \b
     qlinkgen explain qlink a5a50783 01a500ffa500e305
@@ -57,10 +59,10 @@ def command(
 def explained(
     plan: Plan, data: bytes, direction: Direction | None, request: bytes | None
 ) -> tuple[list[Dissection], list[str]]:
-    """The frames in the bytes, one after the other, and notes on them."""
+    """Return the frames in the bytes, in order, and notes on them."""
     if not plan.frame.needs_request:
         if request is not None:
-            raise Failure("--request goes with packet protocols; leave it out")
+            raise Failure("--request requires a packet protocol; omit it")
         found, hint = _guessed(plan, data, [direction] if direction else plan.protocol.directions)
         return [found], [*hint, *notes(found)]
     if request is not None:
@@ -76,18 +78,18 @@ def explained(
 
 
 def _check_request(plan: Plan, request: bytes) -> None:
-    """Refuse a request that cannot be answered; one with a value that is not allowed can be."""
+    """Refuse bytes that are not a request; accept values out of range, which the device answers."""
     kind = dissect(plan, request, "request").kind
     if kind not in ("", "range"):
         raise Failure(f"--request {request.hex()} is not a request ({kind}); give command byte and words")
 
 
 def _guessed(plan: Plan, data: bytes, ways: Sequence[Direction]) -> tuple[Dissection, list[str]]:
-    """The direction under which a decoder comes furthest and the fewest rules are broken."""
+    """Return the dissection in the likelier direction: the later first fault, then fewer faults."""
     found = sorted((dissect(plan, data, way) for way in ways), key=_doubt)
     first, *others = found
     hints = [
-        f"it could be {other.message.name} as well; --direction {other.direction} shows that"
+        f"it may also be {other.message.name}; see --direction {other.direction}"
         for other in others
         if other.message and other.message is not first.message and _doubt(other) == _doubt(first)
     ]
@@ -95,7 +97,7 @@ def _guessed(plan: Plan, data: bytes, ways: Sequence[Direction]) -> tuple[Dissec
 
 
 def _doubt(found: Dissection) -> tuple[int, int, bool]:
-    """How much speaks against the direction: an early fault, many, a payload of another size."""
+    """Return a sort key, larger for a less likely direction: early fault, number of faults, payload size."""
     early = len(PROGRESS) - PROGRESS.index(found.kind) if found.kind else 0
     payload = found.message.payload if found.message else None
     cell = found.cells.get(found.plan.frame.envelope.payload.name)
@@ -123,7 +125,7 @@ def _show(found: Sequence[Dissection], hints: Sequence[str]) -> None:
                 click.echo(f"likely: {one_line(cause)}")
         start += len(each.wire)
     if not any(each.kind for each in found):
-        click.echo("every rule is kept")
+        click.echo("no errors")
 
 
 def _title(found: Dissection) -> str:
@@ -132,7 +134,7 @@ def _title(found: Dissection) -> str:
 
 
 def _lines(found: Dissection) -> list[Line]:
-    """A line for each byte and for each member: offset, hex, part, value, whether it is marked."""
+    """Return a line for each byte and for each member: offset, hex, part, value, whether it is marked."""
     lines = [line for span in found.spans for line in _of_span(found, span)]
     return sorted(lines, key=lambda line: line[0])
 

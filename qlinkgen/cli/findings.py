@@ -1,4 +1,4 @@
-"""Faults in words: the rule that is broken with what was seen, and the likely cause."""
+"""Descriptions of faults: the rule broken, the bytes seen, and the likely cause."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ _LOST = "the capture was cut, or bytes were lost"
 
 
 def notes(found: Dissection) -> list[str]:
-    """What is worth knowing although no rule is broken by it."""
+    """Return remarks on a frame that are not errors."""
     message = found.message
     if message is None:
         return []
     text = []
     payload, check = found.cells[message.envelope.payload.name], message.envelope.check
     if message.payload.empty_is_default and not payload.data:
-        text.append("a payload of no bytes stands for every default")
+        text.append("an empty payload means every field at its default")
     if check and check.check.chained and not found.cells[check.name].data:
-        text.append("reading the check value is optional, but nothing else shows that the response is right")
+        text.append("reading the check value is optional, but without it the response is not verified")
     return text
 
 
 def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: C901, PLR0912  # a case a rule
-    """Rule and cause; ``start`` is the offset of the frame in all bytes."""
+    """Return rule and cause; ``start`` is the offset of the frame in all bytes."""
     of, at, name = fault.of, fault.at + start, found.plan.frame.address
     match fault.rule:
         case Rule.BEGINNING:
             return _beginning(found, fault)
         case Rule.FIRST:
             cause = "the capture begins inside another frame, or the beginning of one was lost"
-            return f"{counted(fault.seen)} before the {_start(found)}, outside of any frame", cause
+            return f"{counted(fault.seen)} before the {_start(found)}, outside a frame", cause
         case Rule.CONSTANT:
             assert isinstance(of, ConstantPart)
             return f"{of.name} is {found.cells[of.name].data.hex(' ')}, must be {of.data.hex(' ')}", ""
@@ -63,17 +63,19 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             return _stuffing(found, fault, at)
         case Rule.LENGTH:
             assert isinstance(of, LengthPart)
-            cause = "a bit of it was flipped, or the bytes before it are not a preamble but data"
+            cause = "a bit was flipped, or the bytes before it are data, not a preamble"
             return f"{of.name} is {fault.seen}, allowed are {span_text(of.least, of.most)}", cause
         case Rule.LAST:
-            cause = "the capture goes on, or bytes were added; `qlinkgen decode` takes whole streams"
+            cause = (
+                "the capture contains more frames, or bytes were added; `qlinkgen decode` reads whole streams"
+            )
             return f"{counted(fault.seen)} after the end of the frame", cause
         case Rule.MESSAGE:
             return _unknown(found, fault)
         case Rule.SIZE:
             return _size(found, fault)
         case Rule.END:
-            cause = "a node counted down one of the two alone, or the end belongs to another frame"
+            cause = "a node decremented only one of the two, or the end belongs to another frame"
             return f"the end has {name} {fault.seen}, the header {found.address}", cause
         case Rule.ADDRESS:
             return _address(found, fault)
@@ -81,7 +83,7 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             return _check(found, fault)
         case Rule.REFUSED:
             assert isinstance(of, CheckPart)
-            cause = "the device does not know the command, or does not take it now"
+            cause = "the device does not know the command, or does not accept it now"
             return f"{of.name} is {fault.seen}: the command was refused as illegal", cause
         case Rule.VALUE:
             return _value(fault)
@@ -99,14 +101,14 @@ def _beginning(found: Dissection, fault: Fault) -> Words:
         end = found.plan.frame.envelope.parts[-1]
         other = end.end_id if isinstance(end, MarkPart) else 0
         rule = f"no byte with 0x{fault.of.marker:02X} set and {fault.of.id_name} other than {other}"
-        return f"there is no header: {rule}", "the capture began late, or the header was lost"
+        return f"header missing: {rule}", "the capture began late, or the header was lost"
     preamble = found.plan.frame.envelope.preamble.hex(" ")
     cause = "the capture began late, or a byte of the preamble was lost"
-    return f"there is no preamble {preamble}", cause
+    return f"preamble {preamble} missing", cause
 
 
 def _start(found: Dissection) -> str:
-    """What a frame begins with."""
+    """Return the name of the first part of a frame."""
     return "header" if isinstance(found.plan.frame.end, ByMark) else "preamble"
 
 
@@ -114,7 +116,7 @@ def _interrupted(found: Dissection, at: int) -> Words:
     if isinstance(found.plan.frame.end, ByMark):
         cause = "the end byte was lost, or two nodes sent at once"
         return f"a header at offset {at}, before the end of the frame", cause
-    cause = "the sender was interrupted or bytes were lost: this frame is cut off"
+    cause = "the sender was interrupted or bytes were lost: this frame is truncated"
     return f"a new preamble begins at offset {at}, inside the frame", cause
 
 
@@ -127,9 +129,9 @@ def _unknown(found: Dissection, fault: Fault) -> Words:
 
 def _address(found: Dissection, fault: Fault) -> Words:
     assert found.message is not None
-    cause = "the sender is set to a wrong address, or the message cannot be addressed so"
+    cause = "the sender has a wrong address, or the message does not allow this address"
     if isinstance(fault.of, MarkPart):
-        cause = "no node has this address; the node that should have taken the frame has sent it on"
+        cause = "no node has this address; the destination node has forwarded the frame"
     allowed = addresses_text(found.message.message)
     return f"{found.plan.frame.address} is {fault.seen}; {found.message.name} has {allowed}", cause
 
@@ -138,13 +140,13 @@ def _missing(found: Dissection, fault: Fault) -> Words:
     end, number = found.plan.frame.end, counted(fault.seen)
     what = "packet" if found.plan.frame.needs_request else "frame"
     if isinstance(end, ByMark):
-        return "there is no end byte", _LOST
+        return "end byte missing", _LOST
     if isinstance(end, ByLength):
         data = found.cells[end.part.name].data
         if len(data) == end.part.size:
             cause = "the capture was cut, bytes were lost, or the length is wrong"
             length = end.part.integer.unpack(data)
-            return f"{end.part.name} {length} announces {number} more than there are", cause
+            return f"{end.part.name} {length} announces {number} more than received", cause
     if found.message is None:
         return f"the {what} ends {number} too early", _LOST
     payload, check = found.message.payload, found.message.envelope.check
@@ -159,7 +161,7 @@ def _stuffing(found: Dissection, fault: Fault, at: int) -> Words:
     seen = "the end of the payload" if fault.seen is None else f"{fault.seen:02x}"
     after = f"{way.rule.after.hex(' ')} at offset {at - len(way.rule.after)}"
     rule = f"{after} is followed by {seen}, not by {way.rule.insert:02x}"
-    return rule, "the sender does not stuff, or a byte was lost or changed"
+    return rule, "the sender does not stuff, or a byte was lost or corrupted"
 
 
 def _size(found: Dissection, fault: Fault) -> Words:
@@ -177,7 +179,7 @@ def _size(found: Dissection, fault: Fault) -> Words:
         return f"{counted(between)} between header and end; {what}", lost
     if payload.least <= size <= payload.most:
         rule = f"payload of {counted(size)}, which does not agree with the counts in it"
-        return rule, "a count was changed, or bytes were lost or added"
+        return rule, "a count was corrupted, or bytes were lost or added"
     cause = f"{lost}, or the other side has another revision of the protocol"
     if envelope.length and payload.fixed:
         bias = envelope.length.bias
@@ -196,7 +198,7 @@ def _check(found: Dissection, fault: Fault) -> Words:
         payload = found.cells[found.plan.frame.envelope.payload.name].data
         return rule, explain_sum(part.check, found.plan.frame.id_name, found.request, payload, received)
     if received == expected:
-        return rule, "bits of its bytes are set that belong to no value"
+        return rule, "unused bits of its bytes are set"
     over = part.check.over
     cells = {name: cell for name, cell in found.cells.items() if name != part.name}
     plain = {name: cell.data for name, cell in cells.items()}
@@ -205,7 +207,7 @@ def _check(found: Dissection, fault: Fault) -> Words:
 
 
 def _coverages(found: Dissection, plain: Mapping[str, bytes], over: Sequence[str]) -> list[Coverage]:
-    """What the check value may have been taken over."""
+    """Return possible coverages of the check value."""
     way = found.plan.frame.transparency
     match way:
         case PayloadStuffing():
@@ -227,17 +229,17 @@ def _value(fault: Fault) -> Words:
     scalar = number_of(fault.of)
     seen = fault.seen or 0
     if scalar is None:
-        return f"{fault.of.name} has a byte 0x{seen:02X} that it cannot have", "bytes were changed on the way"
+        return f"{fault.of.name} has an invalid byte 0x{seen:02X}", "bytes were corrupted on the wire"
     if isinstance(fault.of, ConstantStep):
         always = number_text(scalar.default)
         cause = "another message or revision of the protocol"
         return f"{fault.of.name} is {seen}, but is always {always}", cause
     rule = f"{fault.of.name} is {value_text(scalar, seen)}, allowed are {limits_text(scalar)}"
-    return rule, "the sender does not keep the range"
+    return rule, "the sender does not observe the range"
 
 
 def _nearest(wanted: int, messages: Sequence[MessagePlan]) -> MessagePlan | None:
-    """The known message whose number differs in the fewest bits."""
+    """Return the known message whose number differs in the fewest bits."""
 
     def distance(message: MessagePlan) -> tuple[int, int, int]:
         return (message.id ^ wanted).bit_count(), abs(message.id - wanted), message.id

@@ -34,26 +34,26 @@ Role = Literal["both", "master", "slave"]
     "targets",
     multiple=True,
     type=click.Choice([*TARGETS]),
-    help=f"Repeat for several; default {', '.join(DEFAULT)}.",
+    help=f"Output to generate, repeatable; default {', '.join(DEFAULT)}.",
 )
-@click.option("-o", "--output", default="generated", show_default=True, help="Folder for the output.")
+@click.option("-o", "--output", default="generated", show_default=True, help="Output folder.")
 @click.option(
-    "--check", is_flag=True, help="Write nothing; show what differs and exit with 1 if anything does."
+    "--check", is_flag=True, help="Write nothing; show differences and exit with 1 if there are any."
 )
 @crc_option
 @click.option(
-    "--role", type=click.Choice(["both", "master", "slave"]), default="both", help="Leave out the other side."
+    "--role", type=click.Choice(["both", "master", "slave"]), default="both", help="Generate only this side."
 )
 @click.option(
-    "--only", multiple=True, metavar="NAME", help="Keep these commands or messages; repeat for several."
+    "--only", multiple=True, metavar="NAME", help="Generate only this command or message; repeatable."
 )
 @package_option
 @click.option(
-    "--list-outputs", is_flag=True, help="Print the paths of all outputs, one a line; write nothing."
+    "--list-outputs", is_flag=True, help="Print the paths of all outputs, one per line; write nothing."
 )
 @click.option("--dry-run", is_flag=True, help="Print what would be written and removed; write nothing.")
 @click.option(
-    "--depfile", metavar="FILE", help="Also write a rule of make that says what the outputs depend on."
+    "--depfile", metavar="FILE", help="Also write a make rule with the dependencies of the outputs."
 )
 def command(  # noqa: PLR0917  # click passes them by name
     schemas: tuple[str, ...],
@@ -68,27 +68,26 @@ def command(  # noqa: PLR0917  # click passes them by name
     dry_run: bool,
     depfile: str | None,
 ) -> int:
-    """Write what is made of the SCHEMAs, by default of all that come with qlinkgen.
+    """Generate the outputs of the SCHEMAs, by default of all shipped ones.
 
-    Only files that change are written, and files that nothing makes any more are removed. Files that qlinkgen
-    did not write are neither overwritten nor removed: if one is in the way, nothing is written. The Python
-    package of a schema is python/wire, unless --package says otherwise; that of a shipped one python/codecs.
+    Only changed files are written, and outdated outputs are removed. Files not written by qlinkgen are
+    neither overwritten nor removed: if one is in the way, nothing is written. The Python package of a schema
+    is python/wire, or the one given with --package; that of a shipped schema is python/codecs.
 
-    In the repository of qlinkgen, a run without SCHEMA and -o also writes the parts of docs/ that are made
-    from the code.
+    In the repository of qlinkgen, a run without SCHEMA and -o also writes the generated parts of docs/.
 
     \b
-    qlinkgen generate                        everything that is shipped, to generated/
+    qlinkgen generate                        all shipped schemas, to generated/
     qlinkgen generate bus.yaml --target c    one header
     qlinkgen generate bus.yaml --package my.wire --target python --target bus -o src
     qlinkgen generate --check                for CI: 1 and a diff if anything is out of date
     qlinkgen generate qlink --set crc=crc-16/xmodem --role slave --only motion
     """  # noqa: D301  # click takes the character \b for "do not wrap"
-    from qlinkgen.schema import shipped  # noqa: PLC0415  # pydantic takes a while
+    from qlinkgen.schema import shipped  # noqa: PLC0415  # pydantic is slow to import
 
     protocols = _load(schemas or shipped(), crc)
-    if misfits := _misfits(protocols) if crc is None else []:
-        click.echo("\n".join(misfits), err=True)
+    if mismatches := _mismatches(protocols) if crc is None else []:
+        click.echo("\n".join(mismatches), err=True)
         return WRONG
     options = Options(role=role, only=_kept(only, list(protocols.values())))
     folder = Folder(Path(output))
@@ -111,7 +110,7 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 
 def _load(schemas: Sequence[str], crc: str | None) -> dict[str, Protocol]:
-    """Every protocol by its schema as given; the faults of all files are reported together."""
+    """Load every protocol, by its schema as given; the faults of all files are reported together."""
     protocols: dict[str, Protocol] = {}
     faults: list[Fault] = []
     for schema in schemas:
@@ -128,18 +127,18 @@ def _load(schemas: Sequence[str], crc: str | None) -> dict[str, Protocol]:
     return protocols
 
 
-def _misfits(protocols: Mapping[str, Protocol]) -> list[str]:
-    """Vectors worked out by hand that shipped schemas do not fit, a line each."""
+def _mismatches(protocols: Mapping[str, Protocol]) -> list[str]:
+    """Return the hand-written vectors that shipped schemas no longer match, one line each."""
     return [
-        misfit
+        mismatch
         for schema, protocol in protocols.items()
         if ships(schema)
-        for misfit in hand_vectors.misfits(protocol)
+        for mismatch in hand_vectors.mismatches(protocol)
     ]
 
 
 def _inputs(protocols: Mapping[str, Protocol], targets: Sequence[str]) -> list[Path]:
-    """Files that the outputs depend on: the schemas, and the vectors that a kit holds."""
+    """Return the files that the outputs depend on: the schemas, and the vectors in a kit."""
     files = [find_schema(schema) for schema in protocols]
     if "conformance" in targets:
         files += [hand_vectors.file_of(each) for schema, each in protocols.items() if ships(schema)]
@@ -156,7 +155,7 @@ def _kept(only: Sequence[str], protocols: Sequence[Protocol]) -> tuple[str, ...]
     for name in only:
         if name not in known:
             hint = did_you_mean(name, sorted(known)) or f"{_show_hint(protocols)} lists them"
-            raise Failure(f"--only {name}: no command or message has this name; {hint}")
+            raise Failure(f"--only {name}: unknown command or message; {hint}")
     return tuple(only)
 
 
@@ -184,7 +183,7 @@ def _fill(
 
 
 def _keeps(protocol: Protocol, options: Options) -> bool:
-    """Something is left of a protocol after --only."""
+    """Whether a protocol still has messages after --only."""
     names = {name for message in protocol.messages for name in (message.name, message.command)}
     return not options.only or not names.isdisjoint(options.only)
 
@@ -201,7 +200,7 @@ def _no_step(what: str) -> None:
 
 @contextlib.contextmanager
 def _progress(total: int) -> Iterator[Callable[[str], None]]:
-    """A bar on a terminal, nothing elsewhere; the function takes what is worked on next."""
+    """Show a progress bar on a terminal; the function takes the name of the next step."""
     if not on_terminal(sys.stderr):
         yield _no_step
         return

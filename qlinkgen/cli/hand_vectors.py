@@ -1,4 +1,4 @@
-"""The vectors that people worked out for the shipped protocols: whether a schema still fits them."""
+"""The hand-written vectors of the shipped protocols, and the check whether a schema still matches them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Vector(_Given):
 
 
 class BadVector(_Given):
-    """Bytes that are refused."""
+    """Bytes that must be refused."""
 
     kind: str
 
@@ -52,32 +52,32 @@ class Vectors(TypedDict, total=False):
 
 
 def file_of(protocol: Protocol) -> Path:
-    """Where the vectors of a shipped protocol are, if it has some."""
+    """Return the path of the vectors of a shipped protocol, which may not exist."""
     return schemas_dir() / "vectors" / f"{protocol.name}.yaml"
 
 
 def read(protocol: Protocol) -> Vectors:
-    """The vectors of a shipped protocol."""
+    """Read the vectors of a shipped protocol."""
     found: Vectors = yaml.load(file_of(protocol).read_text("utf-8"), _Loader)
     return found
 
 
-def misfits(protocol: Protocol) -> list[str]:
-    """The vectors that do not fit a shipped protocol, a line each with its place and the reason."""
+def mismatches(protocol: Protocol) -> list[str]:
+    """Return the vectors that do not match a shipped protocol, one line each with place and reason."""
     file = file_of(protocol)
     if not file.is_file():
         return []
     shown = file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file
-    return [f"{shown}:{line}: this vector no longer fits: {why}" for line, why in _misfits(protocol)]
+    return [f"{shown}:{line}: this vector no longer matches: {why}" for line, why in _mismatches(protocol)]
 
 
-def _misfits(protocol: Protocol) -> Iterator[tuple[int, str]]:
+def _mismatches(protocol: Protocol) -> Iterator[tuple[int, str]]:
     codec = load_codec(protocol)
     lines = _lines(yaml.compose(file_of(protocol).read_text("utf-8"), _Loader))
     found = read(protocol)
     checks = [
-        *(partial(_misfit, protocol, codec, row) for row in found.get("vectors", ())),
-        *(partial(_fault_misfit, protocol, codec, row) for row in found.get("faults", ())),
+        *(partial(_mismatch, protocol, codec, row) for row in found.get("vectors", ())),
+        *(partial(_fault_mismatch, protocol, codec, row) for row in found.get("faults", ())),
     ]
     places = (*lines.get("vectors", ()), *lines.get("faults", ()))
     for line, check in zip(places, checks, strict=True):
@@ -92,7 +92,7 @@ def _misfits(protocol: Protocol) -> Iterator[tuple[int, str]]:
 
 
 def _lines(document: yaml.Node | None) -> dict[str, list[int]]:
-    """The line of each item in the lists of the document."""
+    """Return the line of each item in the lists of the document."""
     pairs = document.value if isinstance(document, yaml.MappingNode) else []
     return {
         key.value: [item.start_mark.line + 1 for item in value.value]
@@ -101,8 +101,8 @@ def _lines(document: yaml.Node | None) -> dict[str, list[int]]:
     }
 
 
-def _misfit(protocol: Protocol, codec: ModuleType, row: Vector) -> str:
-    """Why a vector does not fit, "" if it does."""
+def _mismatch(protocol: Protocol, codec: ModuleType, row: Vector) -> str:
+    """Return why a vector does not match, "" if it does."""
     message = find_message(protocol, row["message"])
     name = protocol.address_name
     key = record_key(name) if name else ""
@@ -125,14 +125,14 @@ def _misfit(protocol: Protocol, codec: ModuleType, row: Vector) -> str:
     return ""
 
 
-def _fault_misfit(protocol: Protocol, codec: ModuleType, row: BadVector) -> str:
+def _fault_mismatch(protocol: Protocol, codec: ModuleType, row: BadVector) -> str:
     message = find_message(protocol, row["message"])
     request = [codec.decode_request(bytes.fromhex(row["request"]))] if "request" in row else []
     try:
         _decode(codec, message.direction, bytes.fromhex(row["wire"]), request)
     except codec.DecodeError as error:
-        return "" if error.kind == row["kind"] else f"it is refused as {error.kind} now: {error}"
-    return "it is a right frame now"
+        return "" if error.kind == row["kind"] else f"it is now refused as {error.kind}: {error}"
+    return "it is now a valid frame"
 
 
 def _decode(codec: ModuleType, direction: str, wire: bytes, request: list[MessageObject]) -> MessageObject:

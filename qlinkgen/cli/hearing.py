@@ -1,4 +1,4 @@
-"""What a monitor has heard, as lines of text and as JSON."""
+"""Formats the events of a monitor, as lines of text and as JSON."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from qlinkgen.model.values import Json
 
 MASTER = "master"
 EVERYBODY = "all"
-#: Width of "node 16 > master", and of the longest names that are given room.
+#: Width of "node 16 > master", and of the longest message names that are aligned.
 _WHO, MOST = 16, 32
 
 
 @dataclass(frozen=True, slots=True)
 class Telling:
-    """One thing that was heard, in either form.
+    """One event, as JSON and as text.
 
     Attributes:
-        record: for JSON.
-        who: who spoke to whom, for people.
-        what: name of the message, or what there is instead.
+        record: the JSON object.
+        who: sender and receiver.
+        what: name of the message, or kind of the event.
         values: its fields as text.
-        remarks: what is not as usual.
-        wrong: there is something to look at.
+        remarks: delays and irregularities.
+        wrong: the event is an error.
     """
 
     record: Mapping[str, Json]
@@ -46,7 +46,7 @@ class Telling:
     wrong: bool = False
 
     def line(self, width: int) -> str:
-        """The line of text, without its time; names have `width` columns."""
+        """Return the line of text, without its time; names have `width` columns."""
         parts = [
             f"{self.who:{_WHO}} {self.what:{width}}",
             self.values,
@@ -57,7 +57,7 @@ class Telling:
 
 
 class Teller:
-    """Puts what a monitor has heard into words.
+    """Formats the events of a monitor.
 
     Args:
         protocol: the protocol on the line.
@@ -74,11 +74,11 @@ class Teller:
         self._width = min(max(map(len, protocol.by_name)), MOST)
 
     def line(self, heard: Heard) -> str:
-        """One thing as a line of text."""
+        """Return an event as a line of text."""
         return f"{self.seconds(heard.at):12.6f}  {self.tell(heard).line(self._width)}"
 
     def tell(self, heard: Heard) -> Telling:
-        """Put one thing into words."""
+        """Format an event."""
         match heard:
             case Asked():
                 return self._asked(heard)
@@ -94,7 +94,7 @@ class Teller:
                 assert_never(heard)
 
     def seconds(self, at: float) -> float:
-        """Seconds since the start."""
+        """Return the seconds since the start."""
         return round(at - self._start, 6)
 
     def _asked(self, heard: Asked) -> Telling:
@@ -170,7 +170,7 @@ def _name(who: Json) -> str:
 
 
 def values_text(protocol: Protocol, message: Message) -> str:
-    """The fields of a message as text."""
+    """Return the fields of a message as text."""
     values = fields(protocol.by_name[message.NAME], message)
     return " ".join(f"{name}={_shown(value)}" for name, value in values.items())
 
@@ -178,7 +178,7 @@ def values_text(protocol: Protocol, message: Message) -> str:
 def _shown(value: Json) -> str:
     if isinstance(value, list):
         return ",".join(map(str, value)) or "none"
-    # A text with a blank has to be told from the next field; one with control characters would act.
+    # Quote texts with blanks, which separate fields, and with control characters.
     if value and isinstance(value, str) and value.isprintable() and " " not in value:
         return value
     return jsonlines.line(value)

@@ -1,8 +1,8 @@
-"""Bytes written as hex text: the one rule for arguments, options and standard input.
+"""Parses hex text of arguments, options and standard input.
 
 White space separates words. A word is pairs of digits, with or without 0x before it: ``a5``, ``a5a504``,
 ``0xA5``. A word of a single digit is a byte as well, as many programs print it: ``4`` and ``0x4`` are 04.
-Any other odd number of digits is refused, because nothing says which of them is alone.
+Any other odd number of digits is refused as ambiguous.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class HexError(ValueError):
 
     Attributes:
         message: what was seen, and the rule.
-        at: index of the character in the text that was fed; 0 for what began earlier.
+        at: index of the character in the fed text; 0 if the word began earlier.
         before: the bytes before it.
     """
 
@@ -30,22 +30,22 @@ class HexError(ValueError):
 
 
 class HexReader:
-    """Reads hex text that arrives in pieces; a piece may end anywhere."""
+    """Reads hex text in chunks; a chunk may end anywhere."""
 
     def __init__(self) -> None:
-        #: The rest of a word that may go on in the next piece: at most two characters and a digit.
+        #: The end of a word that may continue in the next chunk: at most two characters and a digit.
         self._rest = ""
         #: Bytes of that word were returned already.
         self._begun = False
 
     def feed(self, text: str) -> bytes:
-        """Return the bytes that are complete. Raises HexError at the first character that is wrong."""
+        """Return the complete bytes. Raises HexError at the first wrong character."""
         carried = len(self._rest)
         text, self._rest = self._rest + text, ""
         found = bytearray()
         end = 0
         for word in _WORD.finditer(text):
-            if word.start() > end:  # white space: the word before is over
+            if word.start() > end:  # white space ends the previous word
                 self._begun = False
             end = word.end()
             try:
@@ -58,11 +58,11 @@ class HexReader:
         return bytes(found)
 
     def _word(self, word: str, *, last: bool) -> bytes:
-        """Return the bytes of a word, or of another piece of it; the last word of a text may go on."""
+        """Return the bytes of a word or of a part of it; the last word of a chunk may continue."""
         prefix = 2 if not self._begun and word[:2].lower() == "0x" else 0
         if wrong := _NO_DIGIT.search(word, prefix):
             raise _Wrong(
-                f"{_shown(wrong[0])} is no hex digit; write bytes as pairs of 0-9 and a-f", wrong.start()
+                f"{_shown(wrong[0])} is not a hex digit; write bytes as pairs of 0-9 and a-f", wrong.start()
             )
         digits = word[prefix:]
         if not last:
@@ -82,13 +82,11 @@ class HexReader:
             raise _Wrong(f"'{word}' has no digit; write bytes as pairs of 0-9 and a-f", 0)
         if len(digits) % 2:
             seen = f"the digit '{digits[-1]}' ends a word" if self._begun else f"'{_cut(word)}' is a word"
-            raise _Wrong(
-                f"{seen} of an odd number of hex digits; a byte has two, and only a digit by itself is one", 0
-            )
+            raise _Wrong(f"{seen} with an odd number of hex digits; write two per byte, or a single digit", 0)
         return bytes.fromhex(digits)
 
     def finish(self) -> bytes:
-        """Return the byte that the end of the text completes. Raises HexError for half a byte."""
+        """Return the byte completed by the end of the text. Raises HexError for half a byte."""
         return self.feed("\n")
 
 

@@ -1,4 +1,4 @@
-"""JSON with every digit: numbers are read as Decimal and written as they are, one object a line."""
+"""JSON without loss of digits: numbers are read as Decimal and written in full, one object per line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qlinkgen.model.values import Json
 
 
 def line(found: Json) -> str:
-    """An object on one line; a Decimal becomes a number with all its digits."""
+    """Return an object as one line; a Decimal becomes a number with all its digits."""
     try:
         return json.dumps(found)
     except TypeError:
@@ -31,24 +31,24 @@ def _exact(found: Json) -> str:
 
 
 def parse_object(text: str, what: str) -> dict[str, Json]:
-    """The object that a text holds."""
+    """Parse a text as a JSON object."""
     try:
         found = json.loads(
             text, parse_float=Decimal, parse_constant=_refuse_constant, object_pairs_hook=_refuse_doubles
         )
     except json.JSONDecodeError as error:
-        raise Failure(f"{what}: no JSON at character {error.pos + 1}: {error.msg}") from None
+        raise Failure(f"{what}: invalid JSON at character {error.pos + 1}: {error.msg}") from None
     except RecursionError:
-        raise Failure(f"{what}: nested too deeply; fields hold numbers, texts and lists of numbers") from None
+        raise Failure(f"{what}: nested too deeply; fields are numbers, texts and lists of numbers") from None
     except ValueError as error:
         raise Failure(f"{what}: {error}") from None
     if not isinstance(found, dict):
-        raise Failure(f'{what}: a JSON object is needed, such as {{"counter": 1}}')
+        raise Failure(f'{what}: not a JSON object; write for example {{"counter": 1}}')
     return found
 
 
 def _refuse_constant(name: str) -> None:
-    raise ValueError(f"{name} is no number that can be sent")
+    raise ValueError(f"{name} is not a finite number")
 
 
 def _refuse_doubles(pairs: list[tuple[str, Json]]) -> dict[str, Json]:
@@ -56,5 +56,5 @@ def _refuse_doubles(pairs: list[tuple[str, Json]]) -> dict[str, Json]:
     if len(found) != len(pairs):
         names = [name for name, _ in pairs]
         double = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"'{double}' stands there twice; keep one")
+        raise ValueError(f"duplicate key '{double}'; keep one")
     return found

@@ -1,4 +1,4 @@
-"""The kinds of bus, and which option of a command on a port goes with which of them."""
+"""The kinds of bus, and the options of port commands that each of them allows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan, frame_plan
 
 
 class Kind(Enum):
-    """What there is to drive."""
+    """Kind of bus that the commands can drive."""
 
     BUS = "master_slave"
     RING = "ring"
@@ -25,7 +25,7 @@ class Kind(Enum):
 
 BUS, RING, HOST = Kind
 
-#: What a protocol of each kind is, and what an option goes with.
+#: Texts for each kind: of a protocol, and of the protocols that an option requires.
 _IS: Mapping[Kind, str] = {
     BUS: "is a bus with a master",
     RING: "is a ring",
@@ -34,22 +34,22 @@ _IS: Mapping[Kind, str] = {
 _WITH: Mapping[Kind, str] = {BUS: "a bus with a master", RING: "a ring", HOST: "a host with one device"}
 _SHIPPED: Mapping[str, Kind] = {"qlink": BUS, "trio": RING, "mc1231a": HOST}
 
-#: Option, as the command's parameter, to the kinds that it goes with; those not listed go with all.
+#: Option, by parameter name, to the kinds that it applies to; options not listed apply to all.
 Belongs = Mapping[str, Collection[Kind]]
 
 
 def is_shipped(name: str, which: str) -> bool:
-    """Whether a PROTOCOL is one that ships, so that what was written for it alone can be used."""
+    """Whether a PROTOCOL is that shipped one, so that its specific code can be used."""
     return name == which or find_schema(name).resolve() == (schemas_dir() / f"{which}.yaml").resolve()
 
 
 def shipped_kind(name: str) -> tuple[str, Kind] | None:
-    """The protocol that a PROTOCOL is, and its kind, if it is one that ships."""
+    """Return name and kind of a PROTOCOL if it is a shipped one."""
     return next(((each, kind) for each, kind in _SHIPPED.items() if is_shipped(name, each)), None)
 
 
 def kind_of(protocol: Protocol) -> Kind:
-    """What kind of bus a protocol is for. Raises Failure where nothing here can drive it."""
+    """Return the kind of bus of a protocol. Raises Failure if it is not supported."""
     match protocol.bus.kind, frame_plan(protocol.frame).receiver:
         case "host", InStep():
             return HOST
@@ -59,17 +59,17 @@ def kind_of(protocol: Protocol) -> Kind:
             return BUS
     raise Failure(
         f"{protocol.name}: frames of this kind on a bus of kind {protocol.bus.kind} can be encoded and "
-        "decoded, not driven; what can be is frames with master_slave, marked ones with ring, packets "
+        "decoded, but not driven; supported are frames of parts with master_slave, marked with ring, packet "
         "with host"
     )
 
 
 def check_options(name: str, kind: Kind, belongs: Belongs) -> None:
-    """Refuse options that were given and do not go with this kind of bus."""
+    """Refuse options that do not apply to this kind of bus."""
     context = click.get_current_context()
     for parameter in context.command.params:
         kinds = belongs.get(parameter.name or "", (kind,))
         given = context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
         if given and kind not in kinds:
             goes_with = " or ".join(_WITH[each] for each in kinds)
-            raise Failure(f"{parameter.opts[-1]} goes with {goes_with}; {name} {_IS[kind]}: leave it out")
+            raise Failure(f"{parameter.opts[-1]} requires {goes_with}; {name} {_IS[kind]}: omit it")

@@ -1,4 +1,4 @@
-"""What conformance kits are made of, gathered from the other back-ends: no back-end knows another."""
+"""Collects the inputs of conformance kits from the other back-ends, which do not import one another."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from qlinkgen.model.protocol import Protocol
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
-    """The kit of a protocol."""
+    """Generate the kit of a protocol."""
     (text,) = vectors.generate(protocol, options).values()
     sources = Sources(interface(protocol), json.loads(text, parse_float=Decimal), by_hand(protocol))
     return conformance.generate(protocol, options, sources)
 
 
 def by_hand(protocol: Protocol) -> hand_vectors.Vectors:
-    """The vectors that people worked out for a shipped protocol.
+    """Return the hand-written vectors of a shipped protocol.
 
-    There are none for another schema that uses its name, or where another checksum was set: their bytes are
-    those of the shipped one.
+    Another schema of the same name, or another checksum, has none: the bytes are those of the shipped
+    protocol.
     """
-    from qlinkgen.schema import find, load  # noqa: PLC0415  # pydantic takes a while
+    from qlinkgen.schema import find, load  # noqa: PLC0415  # pydantic is slow to import
 
     if not hand_vectors.file_of(protocol).is_file() or protocol != load(find(protocol.name)):
         return {}

@@ -1,4 +1,4 @@
-"""One message for people: its facts, its fields by offset, and the bits inside them."""
+"""Prints a message: its properties, its fields by offset, and their bits."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ COLUMNS = [
 
 
 def show_message(plan: Plan, planned: MessagePlan) -> None:
-    """Print a message: facts, layout, bits and names."""
+    """Print a message: properties, layout, bits and names."""
     message = planned.message
     heading(f"{message.name}, id {id_text(plan.frame, message.id)}")
     paragraph([message.doc, *_facts(plan, planned)])
@@ -71,7 +71,7 @@ def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
         answered = answer if command.response else "never answered"
         lines.append(f"{answered}; repeat: {describe.repeat_text(command)}")
     if payload.empty_is_default:
-        lines.append("a payload of no bytes is taken as one with every default")
+        lines.append("an empty payload means every field at its default")
     if message.section:
         lines.append(f"section {message.section}")
     if not message.confirmed:
@@ -111,7 +111,7 @@ def _layout(planned: MessagePlan) -> None:
 
 
 def _about(step: Step | Member, value: Value | None) -> list[str]:
-    """Type, range, unit, step and default."""
+    """Return type, range, unit, step and default."""
     number = number_of(step)
     unit, scale = (number.unit, scale_text(number)) if number else ("", "")
     default = describe.default_text(value) if value else ""

@@ -1,4 +1,4 @@
-"""``qlinkgen lint``: every fault of schema files."""
+"""``qlinkgen lint``: report every error of schema files."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from qlinkgen.cli.common import find_schema, on_terminal
 from qlinkgen.errors import Fault
 from qlinkgen.model.texts import visible
 
-#: The key that every schema has.
+#: The key that identifies a schema.
 _MARK = re.compile(r"""^\{?\s*["']?qlinkgen["']?\s*:""", re.MULTILINE)
 
 
 @click.command("lint")
 @click.argument("schemas", metavar="SCHEMA|DIR...", nargs=-1, required=True)
 @click.option(
-    "--format", "form", type=click.Choice(["text", "json"]), default="text", help="json: a list of objects."
+    "--format", "form", type=click.Choice(["text", "json"]), default="text", help="json: one list of objects."
 )
 def command(schemas: tuple[str, ...], form: str) -> int:
-    """Check schema files and report every fault of each: file:line:col: error[RULE]: what is wrong; hint.
+    """Check schema files and report every error: file:line:col: error[RULE]: description; hint.
 
-    Of a folder, every .yaml and .yml file in it and below that has a key "qlinkgen" is checked, and named.
+    In a folder, every .yaml and .yml file in it and below with a key "qlinkgen" is checked and listed.
 
     Exit code 1 if there is an error, 2 if a file cannot be read; warnings do not count. docs/rules.md
     explains the rules.
@@ -46,7 +46,7 @@ def command(schemas: tuple[str, ...], form: str) -> int:
 
 
 def _files(schema: str) -> list[Path]:
-    """The file that is meant, or those in a folder."""
+    """Return a file, or the schemas in a folder."""
     path = Path(schema)
     if not path.is_dir():
         return [find_schema(schema)]
@@ -59,7 +59,7 @@ def _files(schema: str) -> list[Path]:
                 file = Path(folder, name)
                 (found if _is_schema(file) else others).append(file)
     if not found:
-        raise Failure(f"there is no schema in {schema}: no .yaml or .yml file in it has a key 'qlinkgen'")
+        raise Failure(f"no schema in {schema}: none of its .yaml and .yml files has a key 'qlinkgen'")
     click.echo(f"{schema}: {', '.join(str(each.relative_to(path)) for each in found)}", err=True)
     if others:
         left = ", ".join(str(each.relative_to(path)) for each in others)
@@ -68,8 +68,8 @@ def _files(schema: str) -> list[Path]:
 
 
 def _is_schema(file: Path) -> bool:
-    """Whether a file says that it is one. One that cannot be read is taken for one, and reported."""
-    from qlinkgen.schema.loader import read_regular  # noqa: PLC0415  # pydantic takes a while
+    """Whether a file has the key of a schema, or cannot be read, which is reported later."""
+    from qlinkgen.schema.loader import read_regular  # noqa: PLC0415  # pydantic is slow to import
 
     try:
         return bool(_MARK.search(read_regular(file)))
@@ -78,7 +78,7 @@ def _is_schema(file: Path) -> bool:
 
 
 def _faults(file: Path) -> list[Fault]:
-    from qlinkgen.schema import lint  # noqa: PLC0415  # pydantic takes a while
+    from qlinkgen.schema import lint  # noqa: PLC0415  # pydantic is slow to import
 
     return lint(file)
 

@@ -1,4 +1,4 @@
-"""``qlinkgen load``: a program into a Q.link node."""
+"""``qlinkgen load``: load a program into a Q.link node."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from qlinkgen.protocols.qlink.hexfile import read_hex
 
 Show = Callable[[LoadProgress], None]
 
-#: Lines of progress where there is no terminal for a bar.
+#: Number of progress lines if the output is not a terminal.
 LINES = 10
 
 
@@ -44,7 +44,7 @@ LINES = 10
     show_default=True,
     callback=seconds,
     metavar="SECONDS",
-    help="How long each piece is tried.",
+    help="Time limit for each piece.",
 )
 @baud_option
 @attempts_option
@@ -64,9 +64,9 @@ def command(  # noqa: PLR0917  # click passes them by name
 ) -> None:
     """Load an Intel HEX file into a node of a Q.link bus.
 
-    The file is checked before a byte is sent: records, checksums, overlaps, end. A piece whose answer is lost
-    is sent again, and the node does not store it twice. A load that ends early leaves a part of the program
-    in the node, and begins from the start the next time.
+    The file is checked before anything is sent: records, checksums, overlaps, end. If an acknowledgement is
+    lost, the piece is sent again, and the node does not store it twice. An interrupted load leaves part of
+    the program in the node; the next load starts over.
 
     Exit code 1 if the file is wrong, a piece is not acknowledged, or the port is missing, busy or lost.
 
@@ -94,14 +94,14 @@ def _text(file: str) -> bytes:
 
 @contextlib.contextmanager
 def _told(node: int, total: int) -> Iterator[Show]:
-    """Show how far a load is; where it ends early, say how far it was."""
+    """Show the progress of a load; on failure report how much was acknowledged."""
     last = LoadProgress(0, total)
     bar = _bar if on_terminal(sys.stderr) else _lines
 
     def rest() -> str:
         return (
-            f"node {node} has acknowledged {last.acknowledged} of {total} bytes and holds a part of the "
-            "program; load it again, from the start"
+            f"node {node} has acknowledged {last.acknowledged} of {total} bytes and holds part of the "
+            "program; load it again"
         )
 
     try:

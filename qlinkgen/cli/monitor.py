@@ -1,4 +1,4 @@
-"""``qlinkgen monitor``: what goes over a bus that is only listened to."""
+"""``qlinkgen monitor``: listen passively to a bus."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ BELONGS: Belongs = {"slack": (BUS,)}
 @click.command("monitor")
 @click.argument("port")
 @click.option(
-    "--protocol", default="qlink", show_default=True, metavar="PROTOCOL", help="What is spoken on the line."
+    "--protocol", default="qlink", show_default=True, metavar="PROTOCOL", help="Protocol on the line."
 )
-@click.option("--json", "as_json", is_flag=True, help="One object a line instead of text.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line instead of text.")
 @click.option("--raw", is_flag=True, help="Add the bytes of each frame.")
 @click.option("--count", type=click.IntRange(1), metavar="N", help="End after N frames, damaged ones too.")
 @click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End after this time.")
@@ -54,19 +54,18 @@ def command(  # noqa: PLR0917  # click passes them by name
     stop_bits: str,
     crc: str | None,
 ) -> None:
-    """Listen to a bus and print who asks whom and what is answered, until Ctrl-C. Nothing is ever sent.
+    """Listen to a bus and print requests and responses, until Ctrl-C. Nothing is sent.
 
-    A line has seconds since the start, who spoke to whom, message, fields, and in brackets how long an answer
-    took, or what is not as usual: repeat, late, not answered, a second answer, one to nothing. The times are
-    those at which this computer got the bytes; --slack is what an answer may be late by for that.
+    A line has seconds since the start, sender and receiver, message, fields, and in brackets the delay of a
+    response or irregularities: repeat, late, not answered, second answer, stray response. Times are those
+    at which this computer received the bytes; --slack is the delay that this may add to a response.
 
-    On a ring this is a listener on one fibre: it prints messages with the address that they have there. Of
-    mc1231a, host and chip set have a line each, and an answer makes sense beside its request alone: it
-    cannot be monitored.
+    On a ring, this listens to one fibre and prints messages with their address on that fibre. mc1231a cannot
+    be monitored: host and chip set have separate lines, and a response has a meaning only with its request.
 
-    With --json a frame is an object as decode prints it, with "at", "from" and "to"; requests have "repeat",
-    answers "delay" and "late", frames that answer nothing "stray". {"at", "unanswered": {...}} is a request
-    without an answer, {"at", "asked", "error": {...}} a damaged frame, with the node that was being asked.
+    With --json, a frame is an object as printed by decode, with "at", "from" and "to"; requests have
+    "repeat", responses "delay" and "late", stray frames "stray". {"at", "unanswered": {...}} is a request
+    without a response, {"at", "asked", "error": {...}} a damaged frame, with the node of the pending request.
 
     \b
     qlinkgen monitor /dev/ttyUSB1
@@ -77,8 +76,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     kind = kind_of(loaded)
     if kind is HOST:
         raise Failure(
-            f"{loaded.name} cannot be monitored: host and device have a line each, and an answer makes sense "
-            "beside its request alone; what the host says is shown by "
+            f"{loaded.name} cannot be monitored: host and device have separate lines, and a response has a "
+            "meaning only with its request; to see the requests, use "
             f"`qlinkgen decode {loaded.name} --direction request --raw < {port}`"
         )
     check_options(loaded.name, kind, BELONGS)
@@ -87,9 +86,9 @@ def command(  # noqa: PLR0917  # click passes them by name
     opener = open_free if kind is RING else open_usual
     with StopSignals() as signals, opener(loaded, port, baud, line) as opened:
         end = math.inf if length is None else opened.now() + length
-        click.echo(f"qlinkgen: listening to {loaded.name} on {port}; Ctrl-C ends it", err=True)
+        click.echo(f"qlinkgen: listening to {loaded.name} on {port}; press Ctrl-C to stop", err=True)
         if kind is RING:
-            from qlinkgen.cli.monitor_ring import monitor_ring  # noqa: PLC0415  # each kind loads its own
+            from qlinkgen.cli.monitor_ring import monitor_ring  # noqa: PLC0415  # only for rings
 
             monitor_ring(loaded, codec, opened, signals, as_json=as_json, raw=raw, count=count, end=end)
         else:

@@ -1,4 +1,4 @@
-"""``qlinkgen monitor`` where one master asks and nodes answer."""
+"""``qlinkgen monitor`` for a bus with a master."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.transport.conversation import timing_of
 from qlinkgen.transport.port import Port
 
-#: Most seconds between two looks at whether to stop.
+#: Longest time between two checks of the stop signal, in seconds.
 LOOK = 0.1
 
 
@@ -37,7 +37,7 @@ def monitor_bus(
     slack: float | None,
     accepts: Mapping[str, Accepts] | None,
 ) -> None:
-    """Print what is said, until a time, a number of frames, or a signal; then a summary."""
+    """Print the traffic until a time, a number of frames, or a signal; then a summary."""
     teller = Teller(protocol, codec, port.now(), raw=raw)
     monitor = Monitor(codec, timing_of(codec, port, slack=slack), accepts=accepts)
     session = _Session(monitor, teller, as_json=as_json, count=count)
@@ -48,10 +48,10 @@ def monitor_bus(
 
 
 class _Session:
-    """Feeds a monitor from a port, prints what it hears, and counts."""
+    """Feeds a monitor from a port, prints its events, and counts."""
 
     def __init__(self, monitor: Monitor, teller: Teller, *, as_json: bool, count: int | None) -> None:
-        """`count` frames end it."""
+        """Stop after `count` frames."""
         self._monitor = monitor
         self._teller = teller
         self._as_json = as_json
@@ -61,7 +61,7 @@ class _Session:
     def listen(self, port: Port, end: float, signals: StopSignals) -> None:
         """Listen until a time, a number of frames, or a signal."""
         self._until(port, end, signals)
-        # What was asked before the end has its time to be answered.
+        # Requests sent before the end may still be answered.
         due = self._monitor.next_timer()
         if due is not None:
             self._until(port, due, None)
@@ -101,9 +101,9 @@ class _Session:
         sys.stdout.write(f"{text}\n")
 
     def summary(self) -> str:
-        """What there was, in a line."""
+        """Return the counts as one line."""
         return (
             f"{counted(self._frames, 'frame')}, {self._faults} of them damaged; "
             f"{counted(self._unanswered, 'request')} not answered; "
-            f"{self._monitor.skipped} of {counted(self._monitor.bytes, 'byte')} in no frame"
+            f"{self._monitor.skipped} of {counted(self._monitor.bytes, 'byte')} outside frames"
         )

@@ -14,7 +14,7 @@ from qlinkgen.link.codec import Fault, Framed, is_message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.transport.port import Port
 
-#: Most seconds between two looks at whether to stop.
+#: Longest time between two checks of the stop signal, in seconds.
 LOOK = 0.1
 
 
@@ -29,7 +29,7 @@ def monitor_ring(
     count: int | None,
     end: float,
 ) -> None:
-    """Print what is on the fibre, until a time, a number of messages, or a signal; then a summary."""
+    """Print the traffic of a fibre until a time, a number of messages, or a signal; then a summary."""
     teller = RingTeller(protocol, codec, port.now(), raw=raw)
     session = _Session(codec, teller, RingPrinter(teller, as_json=as_json, count=count))
     try:
@@ -39,7 +39,7 @@ def monitor_ring(
 
 
 class _Session:
-    """Feeds a decoder from a port, and prints what it finds."""
+    """Feeds a decoder from a port, and prints its events."""
 
     def __init__(self, codec: ModuleType, teller: RingTeller, printer: RingPrinter) -> None:
         self._decoder = codec.StreamDecoder()
@@ -66,6 +66,6 @@ class _Session:
             self._printer.flush()
 
     def summary(self) -> str:
-        """What there was, in a line."""
+        """Return the counts as one line."""
         skipped = self._decoder.counters.skipped
-        return f"{self._printer.summary()}; {skipped} of {counted(self._bytes, 'byte')} in no message"
+        return f"{self._printer.summary()}; {skipped} of {counted(self._bytes, 'byte')} outside messages"

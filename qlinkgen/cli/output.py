@@ -1,4 +1,4 @@
-"""Files of an output folder: what is at a path, one run at a time, and writing all of them or none."""
+"""Files of an output folder: looking at paths, locking, and writing all files or none."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from pathlib import Path, PurePosixPath
 
 import click
 
-#: Files under construction; those of a run that was killed are removed by the next one.
+#: Suffix of temporary files; those of a killed run are removed by the next one.
 _PREFIX, _SUFFIX = ".qlinkgen-", ".tmp"
-#: A file system that has no locks, such as some that are on a network.
+#: Errors of a file system without locks, such as some network file systems.
 _NO_LOCKS = (errno.ENOLCK, errno.EBADF, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What is at a path: nothing, a file with its bytes, or what prevents that a file is written there."""
+    """What is at a path: nothing, a file with its bytes, or an obstacle to writing a file there."""
 
     data: bytes | None = None
     obstacle: str = ""
 
 
 def look(root: Path, path: str) -> Found:
-    """What is at a path below a folder. Links to folders are followed, unless they leave the folder."""
+    """Look at a path below a folder. Links to folders are followed, unless they leave the folder."""
     place = root
     for part in PurePosixPath(path).parts[:-1]:
         place /= part
         if not place.exists():
-            return Found(obstacle=f"{place} is a link that leads nowhere" if place.is_symlink() else "")
+            return Found(obstacle=f"{place} is a dangling link" if place.is_symlink() else "")
         if not place.is_dir():
             return Found(obstacle=f"{place} is not a folder")
         if not place.resolve().is_relative_to(root.resolve()):
@@ -55,10 +55,10 @@ def _look_at(file: Path) -> Found:
 
 @contextlib.contextmanager
 def locked(root: Path) -> Iterator[None]:
-    """Hold a folder, so that runs follow one another.
+    """Lock a folder, so that concurrent runs wait for one another.
 
-    The lock is on the folder itself: nothing is left when a run is killed. Where the system has no such lock
-    (Windows, some network file systems), runs at the same time are up to the user.
+    The lock is on the folder itself, so a killed run leaves nothing. On systems without such a lock (Windows,
+    some network file systems), the user must avoid concurrent runs.
     """
     if sys.platform == "win32":
         yield
@@ -79,7 +79,7 @@ if sys.platform != "win32":
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            click.echo(f"qlinkgen: another run writes to {root}; waiting until it is done", err=True)
+            click.echo(f"qlinkgen: another run is writing to {root}; waiting for it", err=True)
             fcntl.flock(handle, fcntl.LOCK_EX)
         except OSError as error:
             if error.errno not in _NO_LOCKS:
@@ -89,8 +89,8 @@ if sys.platform != "win32":
 def replace(root: Path, texts: Mapping[str, str], gone: Iterable[str] = (), last: str = "") -> None:
     """Write files, then remove others, then write the ``last`` one.
 
-    Every text is written beside its place before the first one is moved there: a full disk changes nothing,
-    and a compiler that runs at the same time never sees half of a file.
+    Every text is written to a temporary file before the first one is moved into place: a full disk changes
+    nothing, and a concurrent compiler never reads half a file.
     """
     staged: list[tuple[Path, Path]] = []
     try:
@@ -119,7 +119,7 @@ def _stage(place: Path, text: str, staged: list[tuple[Path, Path]]) -> None:
 
 
 def clean(root: Path, paths: Iterable[str]) -> None:
-    """Remove what a killed run has left beside these paths; nobody else may be writing there."""
+    """Remove temporary files of a killed run at these paths; the folder must be locked."""
     for folder in {(root / path).parent for path in paths}:
         for left in folder.glob(f"{_PREFIX}*{_SUFFIX}"):
             if left.is_file() and not left.is_symlink():

@@ -1,4 +1,4 @@
-"""``--package``: the name of the Python package that is written."""
+"""``--package``: the name of the Python package to write."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def _folder(context: click.Context, parameter: click.Parameter, name: str | None) -> str | None:  # noqa: ARG001
-    """The folder of a package, below the output folder."""
+    """Return the folder of a package, below the output folder."""
     if name is None:
         return None
     parts = name.split(".")
@@ -22,7 +22,7 @@ def _folder(context: click.Context, parameter: click.Parameter, name: str | None
         if why := _refused(part):
             raise Failure(f"--package {name}: {why}; a name is like my.wire")
     if parts[0] in sys.stdlib_module_names:
-        raise Failure(f"--package {name}: Python has a module {parts[0]} itself; choose another name")
+        raise Failure(f"--package {name}: {parts[0]} is a module of Python; choose another name")
     return "/".join(parts)
 
 

@@ -1,4 +1,4 @@
-"""The plan for people: frames part by part, messages step by step."""
+"""Prints the plan: the parts of frames and the steps of messages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 def envelopes(plan: Plan) -> Sequence[tuple[str, Envelope]]:
-    """Envelopes that differ, with their titles."""
+    """Return the distinct envelopes, with their titles."""
     directions = plan.protocol.directions
     if len({plan.frame.envelopes[each] for each in directions}) == 1:
         return [("Frame", plan.frame.envelopes[directions[0]])]
@@ -36,7 +36,7 @@ def envelopes(plan: Plan) -> Sequence[tuple[str, Envelope]]:
 def parts_table(
     frame: FramePlan, envelope: Envelope, title: str, sections: Mapping[str, str], *, coverage: bool = False
 ) -> Table:
-    """The parts of a frame; ``coverage`` adds which of them the check value covers."""
+    """Return the parts of a frame; ``coverage`` adds which of them the check value covers."""
     columns = ["offset", "part", "bytes", "covered", "holds", "section"]
     table = Table(columns, title, frozenset({"offset", "bytes"}))
     for index, part in enumerate(envelope.parts):
@@ -89,7 +89,7 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
     heading(f"Plan of {message.name}, id {id_text(plan.frame, message.id)}")
     lines = [f"payload {bytes_text(payload.least, payload.most)}"]
     if payload.empty_is_default:
-        lines.append("a payload of no bytes stands for every default")
+        lines.append("an empty payload means every field at its default")
     if message.allowed:
         lines.append(f"{plan.frame.address} must be {condition_text(message.allowed)}")
     paragraph(lines)
@@ -113,7 +113,7 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
 
 
 def _bytes(step: Step) -> str:
-    """Bytes of a step."""
+    """Return the size of a step in bytes."""
     if isinstance(step, BytesStep | ItemsStep) and not step.fixed:
         return step.name if step.item_size == 1 else f"{step.item_size}*{step.name}"
     return str(least_size(step))

@@ -1,4 +1,4 @@
-"""Hold output folders against what they should contain: list, check, show, update."""
+"""Operations on output folders: list, check, show, update."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from qlinkgen.model.texts import visible
 
 
 def outputs(folders: Sequence[Folder]) -> list[Path]:
-    """Every file that is made of the schemas; a manifest is made of other runs too."""
+    """Return every file generated from the schemas, without manifests, which depend on other runs too."""
     return sorted(folder.root / path for folder in folders for path in folder.wanted)
 
 
@@ -27,7 +27,7 @@ def list_outputs(folders: Sequence[Folder]) -> int:
 
 
 def check(folders: Sequence[Folder]) -> int:
-    """Print what differs, and how; 1 if anything does."""
+    """Print every difference; return 1 if there are any."""
     with _locked(folders):
         changes = _changes(folders)
         for folder, change in changes:
@@ -45,7 +45,7 @@ def check(folders: Sequence[Folder]) -> int:
 
 
 def show(folders: Sequence[Folder]) -> int:
-    """Print what an update would write and remove. Raises Failure where it would."""
+    """Print what an update would write and remove. Raises Failure like `update`."""
     with _locked(folders):
         changes = _changes(folders)
         _refuse(folders, changes)
@@ -57,7 +57,7 @@ def show(folders: Sequence[Folder]) -> int:
 
 
 def update(folders: Sequence[Folder]) -> None:
-    """Write what differs and remove orphans. Raises Failure, with nothing done, if a file is in the way."""
+    """Write changed files and remove orphans. Raises Failure, without any change, if a file is in the way."""
     for folder in folders:
         folder.root.mkdir(parents=True, exist_ok=True)
     with _locked(folders):
@@ -104,7 +104,7 @@ def _report(folder: Folder, change: Change) -> None:
     explained = {
         "missing": "is missing",
         "changed": "differs",
-        "orphan": "is an orphan: no schema makes it any more",
+        "orphan": "is an orphan: it is not generated from any schema",
     }[change.kind]
     click.echo(
         visible(f"{folder.root / change.path}: {explained}{change.obstacle and ': '}{change.obstacle}")

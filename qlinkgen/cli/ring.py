@@ -1,4 +1,4 @@
-"""``qlinkgen ring``: a passive node of a ring, which sends everything on and prints it."""
+"""``qlinkgen ring``: a passive node of a ring, which forwards and prints every message."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from qlinkgen.link.ring_events import RingEvent
 @click.command("ring")
 @click.argument("port")
 @click.option(
-    "--protocol", default="trio", show_default=True, metavar="PROTOCOL", help="What is spoken on the ring."
+    "--protocol", default="trio", show_default=True, metavar="PROTOCOL", help="Protocol on the ring."
 )
-@click.option("--json", "as_json", is_flag=True, help="One object a line instead of text.")
-@click.option("--raw", is_flag=True, help="Add the bytes of each message, as they came.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line instead of text.")
+@click.option("--raw", is_flag=True, help="Add the bytes of each message, as received.")
 @click.option("--count", type=click.IntRange(1), metavar="N", help="End after N messages, damaged ones too.")
 @click.option("--seconds", "length", callback=seconds, metavar="SECONDS", help="End after this time.")
 @baud_option
@@ -51,14 +51,14 @@ def command(  # noqa: PLR0917  # click passes them by name
     stop_bits: str,
     crc: str | None,
 ) -> None:
-    """Be a passive node of a ring: send everything on, and print it, until Ctrl-C.
+    """Join a ring as a passive node: forward and print every message, until Ctrl-C.
 
-    PORT receives from the node before and transmits to the next one. A message is sent on while it still
-    comes; one that turns out damaged then is ended so that nobody takes it.
+    PORT receives from the previous node and transmits to the next one. A message is forwarded while it is
+    being received; if it turns out to be damaged, it is terminated so that no node accepts it.
 
-    A line has seconds since the start, the address as it came (1 is this place; 2 the next node), message and
-    fields. With --json it is an object as decode prints it, with "at", and "sent_on"; a damaged message is
-    {"at", "error": {...}, "sent_on"}. Behind the end the ring is open at this place.
+    A line has seconds since the start, the address as received (1 is this node, 2 the next one), message and
+    fields. With --json, it is an object as printed by decode, with "at" and "sent_on"; a damaged message is
+    {"at", "error": {...}, "sent_on"}. After the end of the command, the ring is open at this node.
 
     \b
     qlinkgen ring /dev/ttyUSB0 --baud 38400
@@ -66,13 +66,13 @@ def command(  # noqa: PLR0917  # click passes them by name
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     loaded = load_protocol(protocol, crc)
     if kind_of(loaded) is not RING:
-        raise Failure(f"{loaded.name} is no ring; listen with `qlinkgen monitor PORT --protocol {protocol}`")
+        raise Failure(f"{loaded.name} is not a ring; use `qlinkgen monitor PORT --protocol {protocol}`")
     codec = load_codec(loaded)
     opened = open_free(loaded, port, baud, line_of(parity, stop_bits))
     with StopSignals() as signals, RingPlace(opened, codec) as place:
         teller = RingTeller(loaded, codec, place.start, raw=raw)
         session = _Session(place, teller, RingPrinter(teller, as_json=as_json, count=count))
-        click.echo(f"qlinkgen: a node of the ring on {port}; Ctrl-C ends it", err=True)
+        click.echo(f"qlinkgen: joined the ring on {port}; press Ctrl-C to stop", err=True)
         try:
             session.run(math.inf if length is None else place.start + length, signals)
         finally:
@@ -80,7 +80,7 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 
 class _Session:
-    """Prints what a place of the ring sees."""
+    """Prints the events of a place on the ring."""
 
     def __init__(self, place: RingPlace, teller: RingTeller, printer: RingPrinter) -> None:
         self._place = place
@@ -88,7 +88,7 @@ class _Session:
         self._printer = printer
 
     def run(self, end: float, signals: StopSignals) -> None:
-        """Stay until a time, a number of messages, or a signal, and leave between two messages."""
+        """Run until a time, a number of messages, or a signal, and leave between two messages."""
         place = self._place
         while not self._printer.done and place.now() < end and not signals.stopped:
             self._print(place.events(end))
@@ -103,13 +103,13 @@ class _Session:
             self._printer.flush()
 
     def say_summary(self) -> None:
-        """Say what there was, in a line, and whether all of it was shown."""
+        """Print the counts as one line, and warn of messages not shown."""
         counters, printer = self._place.node.counters, self._printer
         missing = counters.taken + counters.passed + counters.total_faults - printer.shown
         if missing > 0 and not printer.done:
-            warn(f"{counted(missing, 'message')} came faster than they could be printed, and are not shown")
+            warn(f"{counted(missing, 'message')} not shown: received faster than printed")
         click.echo(
-            f"qlinkgen: {printer.summary()}; {counters.passed} sent on, {counters.taken} for this place, "
+            f"qlinkgen: {printer.summary()}; {counters.passed} forwarded, {counters.taken} for this node, "
             f"{counters.total_faults} broken on arrival; {netstat_text(self._place.node.netstat)}",
             err=True,
         )

@@ -1,4 +1,4 @@
-"""What is on a ring, as lines of text and as JSON: for a node of it, and for a listener on one fibre."""
+"""Formats the events of a ring node and of a listener on one fibre, as lines of text and as JSON."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from qlinkgen.model.values import Json
 
 
 class RingTeller:
-    """Puts what comes on a ring into words.
+    """Formats the events of a ring.
 
     Args:
         protocol: the protocol on the ring.
@@ -36,11 +36,11 @@ class RingTeller:
         self.width = min(max(map(len, protocol.by_name)), MOST)
 
     def line(self, at: float, telling: Telling) -> str:
-        """One thing as a line of text."""
+        """Return an event as a line of text."""
         return f"{self._seconds(at):12.6f}  {telling.line(self.width)}"
 
     def event(self, event: RingEvent) -> Telling | None:
-        """What a node has seen; None for what is no message that came."""
+        """Format an event of a node; None if it is not a received message."""
         match event:
             case Taken():
                 return self.message(event.at, event.message, event.frame, sent_on=False)
@@ -61,7 +61,7 @@ class RingTeller:
         return self.message(event.at, message, event.frame, sent_on=True)
 
     def message(self, at: float, message: Message, frame: bytes, *, sent_on: bool | None = None) -> Telling:
-        """A message; `sent_on` is None where nobody is there to send anything on."""
+        """Format a message; `sent_on` is None for a listener, which does not forward."""
         name = self._protocol.address_name or "address"
         record: dict[str, Json] = {"at": self._seconds(at), **message_record(self._protocol, message)}
         remarks = []
@@ -83,12 +83,12 @@ class RingTeller:
         offset: int | None = None,
         sent_on: bool | None = None,
     ) -> Telling:
-        """Bytes that are no message."""
+        """Format bytes that are not a message."""
         fault = {"kind": kind, "offset": offset, "raw": raw.hex(), "message": text}
         record: dict[str, Json] = {"at": self._seconds(at), "error": fault}
         if sent_on is not None:
             record["sent_on"] = sent_on
-        remarks = ["sent on"] if sent_on else []
+        remarks = ["forwarded"] if sent_on else []
         return Telling(record, "?", f"damaged ({kind})", f"{text}: {raw.hex(' ')}", remarks, wrong=True)
 
     def _seconds(self, at: float) -> float:
@@ -96,15 +96,15 @@ class RingTeller:
 
 
 class RingPrinter:
-    """Prints what a teller tells, and counts it.
+    """Prints the lines of a teller, and counts them.
 
     Attributes:
-        shown: messages that were printed, broken ones too.
-        damaged: the broken ones among them.
+        shown: messages printed, including damaged ones.
+        damaged: damaged messages among them.
     """
 
     def __init__(self, teller: RingTeller, *, as_json: bool, count: int | None) -> None:
-        """After `count` messages nothing is printed any more."""
+        """Stop printing after `count` messages."""
         self._teller = teller
         self._as_json = as_json
         self._most = math.inf if count is None else count
@@ -112,11 +112,11 @@ class RingPrinter:
 
     @property
     def done(self) -> bool:
-        """As much was printed as was asked for."""
+        """Whether `count` messages were printed."""
         return self.shown >= self._most
 
     def show(self, at: float, telling: Telling) -> None:
-        """Print one thing, unless enough was printed."""
+        """Print an event, unless `count` messages were printed."""
         if self.done:
             return
         self.shown += 1
@@ -125,9 +125,9 @@ class RingPrinter:
         sys.stdout.write(f"{text}\n")
 
     def flush(self) -> None:
-        """Let whoever reads along see what was printed."""
+        """Flush, so that the reader of a pipe sees all lines."""
         sys.stdout.flush()
 
     def summary(self) -> str:
-        """What was printed, in a few words."""
+        """Return the counts as text."""
         return f"{counted(self.shown, 'message')}, {self.damaged} of them damaged"

@@ -1,4 +1,4 @@
-"""The own place on a ring while a command runs: everything that comes is sent on."""
+"""The node that a command forms on a ring while it runs; it forwards every message."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from qlinkgen.protocols.trio.client import paced_baud
 from qlinkgen.transport.port import Port
 from qlinkgen.transport.ring import drive
 
-#: Most seconds between two looks at whether to stop.
+#: Longest time between two checks of the stop signal, in seconds.
 LOOK = 0.1
-#: Most seconds that leaving waits until nothing is being sent on: longer than a whole message takes at any
-#: usual speed, so that a ring which is never idle does not keep the command for ever.
+#: Longest time to wait for the end of forwarding when leaving, in seconds: longer than a message takes at any
+#: usual speed; limited because a ring may never be idle.
 LEAVING = 1.0
 
 
@@ -27,7 +27,7 @@ class RingPlace:
     """
 
     def __init__(self, port: Port, codec: RingCodec) -> None:
-        """Begin to send on; `port` belongs to this from now on."""
+        """Begin forwarding, and take ownership of `port`."""
         self.node = RingNode(codec, baud=paced_baud(port))
         self.node.verbose = True
         self._driver = drive(port, self.node)
@@ -38,7 +38,7 @@ class RingPlace:
         return self._driver.now()
 
     def events(self, until: float) -> list[RingEvent]:
-        """Return what has happened, and wait for it until a time, at most for `LOOK` seconds.
+        """Wait for events until a time, at most for `LOOK` seconds, and return them.
 
         Raises:
             PortLost: the port went away.
@@ -52,11 +52,11 @@ class RingPlace:
         return events
 
     def send(self, message: Message) -> bool:
-        """Put a message into the transmit buffer; False where it has no room."""
+        """Put a message into the transmit buffer; return False if it is full."""
         return self._driver.act(lambda now: self.node.send(message, now))
 
     def leave(self) -> list[RingEvent]:
-        """Wait until nothing is being sent on, or too long; return what happened meanwhile.
+        """Wait until no message is being forwarded, within a time limit; return the events meanwhile.
 
         Raises:
             PortLost: the port went away.
@@ -74,6 +74,6 @@ class RingPlace:
 
 
 def netstat_text(status: NetStat) -> str:
-    """`NETSTAT 12 (rx_crc, rx_frame)`."""
+    """Return a status as `NETSTAT 12 (rx_crc, rx_frame)`."""
     names = ", ".join(str(bit.name).lower() for bit in NetStat if bit & status)
     return f"NETSTAT {int(status)}{names and f' ({names})'}"

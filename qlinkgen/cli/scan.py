@@ -1,4 +1,4 @@
-"""``qlinkgen scan``: who is on a Q.link bus."""
+"""``qlinkgen scan``: find the nodes of a Q.link bus."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from qlinkgen.protocols.qlink.facts import BAUD, NODES
 @click.command("scan")
 @click.argument("port")
 @click.option(
-    "--nodes", default="1-16", show_default=True, metavar="LIST", help="Whom to ask: 3, 1-16 or 1,3,5-7."
+    "--nodes", default="1-16", show_default=True, metavar="LIST", help="Nodes to ask: 3, 1-16 or 1,3,5-7."
 )
-@click.option("--json", "as_json", is_flag=True, help="One object a line instead of a table.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per line instead of a table.")
 @baud_option
 @slack_option
 @echo_option
@@ -48,10 +48,10 @@ def command(  # noqa: PLR0917  # click passes them by name
     echo: EchoMode | None,
     crc: str | None,
 ) -> int:
-    """Ask every node of a Q.link bus who it is, and print those that answer.
+    """Ask every node of a Q.link bus for its identity, and print those that answer.
 
-    Who is silent is asked again after all others, and at last for an echo: not every node supports node_info.
-    The time is that from the question to the answer.
+    Silent nodes are asked again after all others, and finally with loop_back: not every node supports
+    node_info. The time is that from request to response.
 
     Exit code 1 if no node answers, or if the port is missing, busy or lost.
 
@@ -78,7 +78,7 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 @contextlib.contextmanager
 def _progress() -> Iterator[Callable[[int | None], None]]:
-    """Show on a terminal who is being asked."""
+    """Show the current node on a terminal."""
     if not on_terminal(sys.stderr):
         yield lambda _: None
         return

@@ -1,4 +1,4 @@
-"""``qlinkgen send``: one transaction on a port, or one message into a ring."""
+"""``qlinkgen send``: perform one transaction on a port, or send one message into a ring."""
 
 from __future__ import annotations
 
@@ -50,31 +50,29 @@ BELONGS: Belongs = {
 @echo_option
 @parity_option
 @stop_bits_option
-@click.option(
-    "--axis", type=click.IntRange(1, 2), metavar="N", help="mc1231a: the axis to make current before."
-)
+@click.option("--axis", type=click.IntRange(1, 2), metavar="N", help="mc1231a: the axis to select first.")
 @click.option(
     "--checksum",
     type=click.Choice(["always", "never"]),
     default="always",
     show_default=True,
-    help="mc1231a: whether the checksum behind the answer is read.",
+    help="mc1231a: whether to read the checksum after the response.",
 )
 @click.option(
-    "--check", is_flag=True, help="mc1231a: read the status word then, and fail if it tells a command error."
+    "--check", is_flag=True, help="mc1231a: then read the status word, and fail on a command error."
 )
 @click.option(
     "--seconds",
     "stay",
     callback=seconds,
     metavar="SECONDS",
-    help="trio: how long to stay on the ring behind the message.  [default: 0.2]",
+    help="trio: time on the ring after the message.  [default: 0.2]",
 )
 @click.option(
     "--count",
     type=click.IntRange(1),
     metavar="N",
-    help="trio: leave before that when N messages for this place have come.",
+    help="trio: leave earlier, after N messages for this node.",
 )
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
@@ -97,19 +95,19 @@ def command(  # noqa: PLR0917  # click passes them by name
     count: int | None,
     crc: str | None,
 ) -> None:
-    """Send a request on PORT and print the answer as decode does: one JSON object.
+    """Send a request on PORT and print the response like decode: one JSON object.
 
     PORT is a device such as /dev/ttyUSB0 or COM3, or a URL such as socket://HOST:PORT. MESSAGE and values are
-    written as for encode. A request that nobody answers prints nothing. One that must not be repeated is sent
-    once, whatever --attempts says, and so is a message that belongs to no command: no answer is expected. The
-    counter of a motion is the one that is given.
+    written as for encode. For a request without a response, nothing is printed. A request that is unsafe to
+    repeat is sent once, regardless of --attempts; so is a message outside commands, which has no response.
+    The counter of a motion is sent as given.
 
-    On a ring this is one more place for as long as it lasts: it sends on what comes, prints what is for it,
-    and leaves after --seconds, as soon as nothing is under way. Nothing tells whether a message has arrived.
-    Of mc1231a, --axis sends set_1 or set_2 before; without it the axis that is current is meant.
+    On a ring, the command joins as an additional node: it forwards messages, prints those for this node, and
+    leaves after --seconds, as soon as it forwards nothing. Delivery of the message is not confirmed. For
+    mc1231a, --axis sends set_1 or set_2 first; without it, the current axis is used.
 
-    Exit code 1 if no answer or a wrong one came, if the chip set refuses, or if the port is missing, busy or
-    lost; 2 if the request cannot be sent, before a byte is.
+    Exit code 1 if the response is missing or wrong, if the chip set refuses, or if the port is missing,
+    busy or lost; 2 if the request is invalid, and nothing was sent.
 
     \b
     qlinkgen send /dev/ttyUSB0 qlink motor_position --node 3
@@ -131,7 +129,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
     if kind is RING:
-        from qlinkgen.cli.send_ring import send_into_ring  # noqa: PLC0415  # each kind loads its own
+        from qlinkgen.cli.send_ring import send_into_ring  # noqa: PLC0415  # only for rings
 
         send_into_ring(loaded, codec, request, port, seconds=stay, count=count, baud=baud, line=line)
     elif kind is HOST:
@@ -149,14 +147,14 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 
 def _own_codec(name: str, kind: Kind) -> ModuleType | None:
-    """The module that a host is written for; the others work with that of any schema."""
+    """Return the module that the host runtime needs; None for other kinds, which work with any schema."""
     if kind is not HOST:
         return None
     if not is_shipped(name, "mc1231a"):
         raise Failure(
-            f"{name} has one host and one device; of those `qlinkgen send` knows mc1231a alone, "
-            "since no schema says how to get back in step"
+            f"{name} has one host and one device; `qlinkgen send` supports only mc1231a of this kind, "
+            "since schemas do not describe resynchronisation"
         )
-    from qlinkgen.codecs import mc1231a  # noqa: PLC0415  # for a chip set alone
+    from qlinkgen.codecs import mc1231a  # noqa: PLC0415  # only for a chip set
 
     return mc1231a

@@ -1,4 +1,4 @@
-"""``qlinkgen send`` where one master asks: one transaction."""
+"""``qlinkgen send`` on a bus with a master: one transaction."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def send_on_bus(
     echo: str | None,
     accepts: Mapping[str, Accepts] | None,
 ) -> None:
-    """Ask, and print the answer; send a message that belongs to no command, which nothing answers."""
+    """Send a request and print the response; send a message outside commands without waiting."""
     with open_line(port, speed(protocol, baud), line) as opened:
         if request.NAME not in {command.request.name for command in protocol.commands}:
             _tell(opened, request.to_frame(), codec.BUS.bits_per_byte)
-            click.echo(f"qlinkgen: {request.NAME} was sent; no answer is expected", err=True)
+            click.echo(f"qlinkgen: {request.NAME} sent; it has no response", err=True)
             return
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)
         engine = MasterEngine(codec, timing, echo=echo_mode(protocol, echo), accepts=accepts)
@@ -51,21 +51,21 @@ def send_on_bus(
 
 
 def _tell(port: Port, frame: bytes, bits_per_byte: int) -> None:
-    """Send a frame, and stay until it has left."""
+    """Send a frame, and wait until it is transmitted."""
     port.write(frame)
     if port.capabilities.paced is not Ability.NO:
         port.sleep(len(frame) * bits_per_byte / port.baud)
 
 
 def check_request(protocol: Protocol, message: Message) -> None:
-    """Refuse the response of a command. A message that belongs to no command may be sent by anybody."""
+    """Refuse the response of a command. Messages outside commands may be sent by any node."""
     command = protocol.command_of(message)
     if command is not None and message is command.response:
-        raise Failure(f"{message.name} is what a node answers; send its request, {message.command}")
+        raise Failure(f"{message.name} is a response; send its request, {message.command}")
 
 
 def _transact(protocol: Protocol, master: BlockingMaster, request: Framed) -> Reply:
-    """Ask; where that fails, show the good frames that came and were no answer."""
+    """Perform a transaction; if it fails, show valid frames received that are not the response."""
     strays: list[Framed] = []
 
     def note(event: Event) -> None:
@@ -77,5 +77,5 @@ def _transact(protocol: Protocol, master: BlockingMaster, request: Framed) -> Re
         return master.transact(request)
     except LinkError:
         for stray in strays:
-            warn(f"this came, and is no answer: {jsonlines.line(message_record(protocol, stray))}")
+            warn(f"received, but not the response: {jsonlines.line(message_record(protocol, stray))}")
         raise

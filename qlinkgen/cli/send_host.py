@@ -34,7 +34,7 @@ def send_to_chip(
     baud: int | None,
     line: Line,
 ) -> None:
-    """Make the axis current if one is given, send the packet, and print the answer."""
+    """Select the axis if one is given, send the packet, and print the response."""
     _check_axis(message, axis)
     axes = _checked_axes(request, axis) if check else []
     context = None if axis is None else SELECT[axis]
@@ -43,7 +43,7 @@ def send_to_chip(
         Host(opened, checksum=checksum, attempts=attempts, slack=slack) as host,
     ):
         response = host.transact(Packet(request, context)).response
-        if checksum == "always" or response.FIELDS:  # otherwise nobody has waited for anything to come
+        if checksum == "always" or response.FIELDS:  # otherwise the host did not wait for a response
             click.echo(jsonlines.line(message_record(protocol, response)))
         for each in axes:
             host.raise_command_error(each)
@@ -51,13 +51,13 @@ def send_to_chip(
 
 def _check_axis(message: Message, axis: int | None) -> None:
     if axis is not None and not hasattr(AxisCalls, message.command):
-        raise Failure(f"{message.command} does not act on the current axis; leave out --axis {axis}")
+        raise Failure(f"{message.command} does not depend on the current axis; omit --axis {axis}")
 
 
 def _checked_axes(request: Framed, axis: int | None) -> list[int]:
-    """The axes whose status word is read."""
+    """Return the axes whose status word is to be read."""
     if axis is not None:
         return [axis]
     if isinstance(request, mc1231a.MultiUpdateRequest):
         return [each for each in AXES if request.axes >> (each - 1) & 1]
-    raise Failure("--check reads the status word of an axis; say which with --axis 1 or --axis 2")
+    raise Failure("--check reads the status word of an axis; add --axis 1 or --axis 2")

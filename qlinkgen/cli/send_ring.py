@@ -1,4 +1,4 @@
-"""``qlinkgen send`` into a ring: a node for a moment, with one message of its own."""
+"""``qlinkgen send`` into a ring: a temporary node that sends one message."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from qlinkgen.link.ring_events import Broken, Passed, RingEvent, Taken
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.protocols.trio.errors import NoRoom
 
-#: Seconds that the place stays unless told otherwise: a message of full length through 15 nodes takes less
-#: from 57600 baud on, and a short one at any usual speed.
+#: Default time on the ring in seconds: a message of full length passes 15 nodes in less from 57600 baud on, a
+#: short one at any usual speed.
 STAY = 0.2
 
 
@@ -33,14 +33,14 @@ def send_into_ring(
     baud: int | None,
     line: Line,
 ) -> None:
-    """Send the message, stay for so long or until so many have come, and print what comes for this place."""
+    """Send the message, stay for a time or a number of messages, and print the messages for this node."""
     stay = STAY if seconds is None else seconds
     with (
         StopSignals() as signals,
         RingPlace(open_free(protocol, port, baud, line), codec) as place,
     ):
         sender = _Sender(protocol, codec, message)
-        place.send(message)  # a buffer that is empty has room for any message
+        place.send(message)  # an empty buffer has room for any message
         end = place.now() + stay
         while place.now() < end and not signals.stopped and (count is None or sender.taken < count):
             sender.look_at(place.events(end))
@@ -48,23 +48,23 @@ def send_into_ring(
         counters, netstat = place.node.counters, place.node.netstat
     if not counters.sent:
         raise NoRoom(
-            f"{message.NAME}: not sent within {stay:g} s: messages of other nodes come first, and did not "
-            "end; try --seconds with more, or look with `qlinkgen ring` who sends without end"
+            f"{message.NAME}: not sent within {stay:g} s: forwarded messages go first, and left no gap; "
+            "increase --seconds, or find the node that keeps sending with `qlinkgen ring`"
         )
     taken, passed = counted(counters.taken, "message"), counters.passed
     click.echo(
-        f"qlinkgen: sent{sender.round_trip}; meanwhile {taken} for this place, {passed} sent on; "
+        f"qlinkgen: sent{sender.round_trip}; {taken} for this node, {passed} forwarded; "
         f"{netstat_text(netstat)}",
         err=True,
     )
 
 
 class _Sender:
-    """Looks for what comes to this place, and for its own message among what comes round.
+    """Prints the messages for this node, and detects its own message coming back around the ring.
 
     Attributes:
-        taken: messages that have come to this place.
-        round_trip: what is known of the ring by that.
+        taken: number of messages for this node.
+        round_trip: text about the size of the ring, if the own message came back.
     """
 
     def __init__(self, protocol: Protocol, codec: ModuleType, message: Framed) -> None:
@@ -75,7 +75,7 @@ class _Sender:
         self.round_trip = ""
 
     def look_at(self, events: list[RingEvent]) -> None:
-        """Print what came for this place, and warn of what was broken."""
+        """Print the messages for this node, and warn of damaged ones."""
         for event in events:
             if isinstance(event, Taken):
                 self.taken += 1
@@ -86,10 +86,10 @@ class _Sender:
                 warn(f"damaged ({event.kind}): {event.text}: {event.raw.hex(' ')}")
 
     def _compare(self, frame: bytes) -> None:
-        """A message of the same type and payload, with its address lowered at each node, has come round."""
+        """Detect the own message: same type and payload, its address decremented by each node."""
         marking, own = self._marking, self._own
         shift, mask = marking.address_shift, marking.address_mask
         lowered = (own[0] >> shift & mask) - (frame[0] >> shift & mask)
         same = frame[1:-1] == own[1:-1] and not (frame[0] ^ own[0]) & marking.id_mask << marking.id_shift
         if same and lowered >= 0 and not self.round_trip:
-            self.round_trip = f", and it came round: {counted(lowered + 1, 'place')} on this ring"
+            self.round_trip = f", and returned: {counted(lowered + 1, 'node')} on this ring"

@@ -1,4 +1,4 @@
-"""``qlinkgen show``: a protocol or a message, as a person wants to read it."""
+"""``qlinkgen show``: print a protocol or a message."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from qlinkgen.plan.framing import ByMark
 @click.command("show")
 @click.argument("protocol")
 @click.argument("message", required=False)
-@click.option("--plan", "planned", is_flag=True, help="How code builds and decodes it; see docs/plan.md.")
+@click.option("--plan", "planned", is_flag=True, help="Show how it is built and decoded; see docs/plan.md.")
 def command(protocol: str, message: str | None, *, planned: bool) -> None:
     """Show a protocol: its frame, bus and transactions. With MESSAGE: layout, sizes, values.
 
-    With --plan, show what follows from that for code: the parts of a frame, which of them the check value
-    covers, how bytes travel, how a receiver finds frames; with MESSAGE the steps of its payload.
+    With --plan, show how code builds and decodes it: the parts of a frame, the coverage of the check value,
+    stuffing, how a receiver finds frames; with MESSAGE the steps of its payload.
 
     MESSAGE is a message (motion.response), or a command (motion) for request and response together. Sizes
-    are bytes; `on the wire` counts the frame and the worst case of stuffing.
+    are in bytes; `on the wire` is the size of the frame with worst-case stuffing.
     """
     shown = load_protocol(protocol)
     plan = plan_of(shown)
@@ -64,7 +64,7 @@ def _protocol(plan: Plan) -> None:
 def _frame(plan: Plan) -> None:
     frame = plan.frame
     if isinstance(frame.end, ByMark):
-        heading("Header byte; the end byte is the same with the end's number")
+        heading("Header byte; the end byte is alike, with the number of the end")
         paragraph(bitmap.diagram(8, bitmap.runs_of_header(frame.end.header, frame.end.end.end_id)))
     for title, envelope in envelopes(plan):
         parts_table(frame, envelope, title, plan.protocol.part_sections).show()
@@ -72,8 +72,8 @@ def _frame(plan: Plan) -> None:
     if frame.needs_request and frame.check:
         facts.append("The host need not read the check value")
         if frame.check.rejected is not None:
-            facts.append(f"A check value of {frame.check.rejected} says that the command is not known")
-    paragraph([*facts, f"Most bytes on the wire: {plan.max_wire_size}"])
+            facts.append(f"A check value of {frame.check.rejected} means an unknown command")
+    paragraph([*facts, f"Longest frame on the wire: {plan.max_wire_size} bytes"])
 
 
 def _bus(protocol: Protocol) -> None:
@@ -82,7 +82,7 @@ def _bus(protocol: Protocol) -> None:
         bus.kind.replace("_", "/"),
         f"{protocol.address_name or 'nodes'} {span_text(*bus.nodes)}" if bus.nodes else "",
         "" if bus.broadcast is None else f"broadcast {bus.broadcast}",
-        f"{bus.baud} baud, {bus.bits_per_byte} bits a byte" if bus.baud else "",
+        f"{bus.baud} baud, {bus.bits_per_byte} bits per byte" if bus.baud else "",
     ]
     answer = describe.time_text(bus.response_within)
     facts.append(f"answers within {answer}" if answer else "")
@@ -132,7 +132,7 @@ def _note(command: Command) -> str:
 
 
 def _loose_messages(plan: Plan) -> None:
-    """Messages that are no part of a transaction."""
+    """Print the messages outside transactions."""
     protocol = plan.protocol
     loose = [message for message in protocol.messages if protocol.command_of(message) is None]
     table = Table(["id", "message", "payload", "on the wire", "addresses", "section", "note"], "Messages")

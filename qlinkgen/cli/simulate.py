@@ -1,4 +1,4 @@
-"""``qlinkgen simulate``: nodes that are not there, on a port that any program can open."""
+"""``qlinkgen simulate``: simulated nodes on a port that any program can open."""
 
 from __future__ import annotations
 
@@ -14,26 +14,22 @@ BELONGS: Belongs = {"nodes": (BUS,), "echo": (BUS,), "ring": (RING,), "crc": (BU
 
 @click.command("simulate")
 @click.argument("protocol")
-@click.option(
-    "--nodes", metavar="LIST", help="Numbers of nodes on a bus: 3, 1-16 or 1,3,5-7; one node unless given."
-)
+@click.option("--nodes", metavar="LIST", help="Nodes of a bus: 3, 1-16 or 1,3,5-7; one node by default.")
 @click.option(
     "--ring",
     metavar="LIST",
-    help="Nodes of a ring in their order, of coordinator, keypad and passive; one coordinator unless given.",
+    help="Nodes of a ring in order: coordinator, keypad, passive; one coordinator by default.",
 )
-@click.option(
-    "--link", type=click.Path(), metavar="PATH", help="Make a symbolic link to the port, under this name."
-)
-@click.option("--faults", metavar="SPEC", help="What goes wrong: drop=0.01,late=0.02:0.05-0.2 or all=0.05.")
-@click.option("--seed", type=int, metavar="N", help="Seed of the faults; the same one, the same faults.")
+@click.option("--link", type=click.Path(), metavar="PATH", help="Create a symbolic link to the port.")
+@click.option("--faults", metavar="SPEC", help="Faults: drop=0.01,late=0.02:0.05-0.2 or all=0.05.")
+@click.option("--seed", type=int, metavar="N", help="Seed of the faults, for reproducible runs.")
 @click.option(
     "--baud",
     type=click.IntRange(1, 100_000_000),
     metavar="N",
-    help="Let bytes take their time; without it answers come at once.",
+    help="Simulate this baud rate; without it, responses are immediate.",
 )
-@click.option("--echo", is_flag=True, help="Hand back what is sent, as two-wire adapters do.")
+@click.option("--echo", is_flag=True, help="Echo the bytes sent, as two-wire adapters do.")
 @crc_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
@@ -46,22 +42,22 @@ def command(  # noqa: PLR0917  # click passes them by name
     echo: bool,
     crc: str | None,
 ) -> None:
-    """Put simulated nodes on a new port (a pty) until Ctrl-C or SIGTERM.
+    """Simulate nodes on a new port (a pty) until Ctrl-C or SIGTERM.
 
-    The first line on standard output is {"port": "/dev/pts/N"}, when the port can be used. Everything else
-    goes to standard error, at the end a summary of requests, answers and faults.
+    The first line on standard output is {"port": "/dev/pts/N"}, once the port is ready. All other output goes
+    to standard error, including a final summary of requests, responses and faults.
 
-    Nodes of qlink behave as the document says: FIFO, motor, inputs and outputs, program store; they consume
-    path words after a node_start. Nodes of another PROTOCOL where one master asks and nodes answer send the
-    defaults of each response, and repeat what it has to repeat.
+    Nodes of qlink behave as documented: FIFO, motor, inputs and outputs, program store; they consume path
+    words after a node_start. Nodes of another PROTOCOL with a master send the defaults of each response, with
+    echoed fields copied from the request.
 
-    trio is a ring: PORT is a place of its own between the last node and the first, which has address 1 then.
-    No program runs on a coordinator; it keeps what it is sent. A keypad sends nothing on before it has its
-    offset. mc1231a is a chip set with two axes that move.
+    trio is a ring: PORT is an additional place between the last node and the first, which then has address 1.
+    Coordinators run no program; they keep the data they receive. A keypad forwards nothing before it has its
+    offset. mc1231a is a chip set with two moving axes.
 
-    Faults are drop, flip, truncate, delay, late, duplicate, stray, noise and silent, each with its chance
-    from 0 to 1 and, behind a colon, its extent; all=0.05 spreads 5 % over those not named; to=slaves or
-    to=master keeps to one direction. On a ring they happen on every fibre.
+    Faults are drop, flip, truncate, delay, late, duplicate, stray, noise and silent, each with a probability
+    from 0 to 1 and, after a colon, its extent; all=0.05 spreads 5 % over those not listed; to=slaves or
+    to=master restricts them to one direction. On a ring they occur on every fibre.
 
     \b
     qlinkgen simulate qlink --nodes 1-16 --link /tmp/qlink
@@ -73,7 +69,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     kind = _kind(protocol, crc)
     plan = plan_of(faults, seed)
     if kind is RING:
-        from qlinkgen.cli.simulate_ring import simulate_ring  # noqa: PLC0415  # each kind loads its own
+        from qlinkgen.cli.simulate_ring import simulate_ring  # noqa: PLC0415  # only for rings
 
         simulate_ring(ring, link=link, baud=baud, plan=plan, crc=crc)
     elif kind is HOST:
@@ -87,7 +83,7 @@ def command(  # noqa: PLR0917  # click passes them by name
 
 
 def _kind(name: str, crc: str | None) -> Kind:
-    """The kind of a protocol that can be simulated, and the options are those of this kind."""
+    """Return the kind of a protocol; refuse kinds that cannot be simulated, and options of other kinds."""
     shipped = shipped_kind(name)
     if shipped is not None:
         check_options(*shipped, BELONGS)
@@ -97,13 +93,13 @@ def _kind(name: str, crc: str | None) -> Kind:
     if kind is not BUS:
         known = "trio" if kind is RING else "mc1231a"
         raise Failure(
-            f"{protocol.name}: of a schema of your own, `qlinkgen simulate` has nodes where one master "
-            f"asks and nodes answer (bus kind master_slave); of a {kind.value} it has {known} alone"
+            f"{protocol.name}: `qlinkgen simulate` supports your own schemas only with bus kind "
+            f"master_slave; of kind {kind.value} it supports only {known}"
         )
     check_options(protocol.name, kind, BELONGS)
     if not protocol.commands:
         raise Failure(
             f"{protocol.name} has no commands, only messages, so its nodes have nothing to answer; "
-            "`qlinkgen send` puts its messages on a line"
+            "use `qlinkgen send` to send its messages"
         )
     return kind

@@ -1,4 +1,4 @@
-"""``qlinkgen simulate`` for protocols where one master asks: nodes that answer."""
+"""``qlinkgen simulate`` for a bus with a master: nodes that answer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from qlinkgen.link.slave import Node, SlaveEngine
 from qlinkgen.protocols.qlink.facts import NODES
 from qlinkgen.sim import FaultPlan, Wire
 
-#: Byte times from a request to its answer on a line that takes its time, so that the asker can stop sending.
+#: Byte times from a request to its response on a paced line, so that the master can release the line.
 TURNAROUND = 1
 
 
@@ -28,12 +28,12 @@ def simulate_bus(
     echo: bool,
     crc: str | None,
 ) -> None:
-    """Put the nodes on a pty, until a signal comes."""
+    """Run the nodes on a pty until a signal."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
 
     codec, numbered = _nodes(protocol, nodes, crc)
     bits = codec.BUS.bits_per_byte
-    # Byte by byte is how a line delivers; without a speed there is nothing to deliver in between.
+    # A line delivers byte by byte; without a speed, whole frames are equivalent.
     wire = Wire(
         baud=baud, bits_per_byte=bits, faults=plan, echo=echo, chunks="byte" if baud is not None else "frame"
     )
@@ -47,17 +47,17 @@ def simulate_bus(
 
 def _nodes(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[Node]]:
     if is_shipped(name, "qlink"):
-        from qlinkgen.codecs import qlink  # noqa: PLC0415  # other protocols do without
+        from qlinkgen.codecs import qlink  # noqa: PLC0415  # only for Q.link
 
         return with_crc(qlink, qlink.Codec, crc), _qlink_nodes(parse_nodes(nodes or "1", NODES[0], NODES[-1]))
-    from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does without the compiler
+    from qlinkgen.cli.codec import load_codec  # noqa: PLC0415  # Q.link does not need the compiler
     from qlinkgen.sim.generic import GenericNode  # noqa: PLC0415
 
     protocol = load_protocol(name, crc)
     codec = load_codec(protocol)
     if protocol.bus.nodes is None or protocol.address_name is None:
         if nodes is not None:
-            raise Failure(f"the frames of {protocol.name} have no address; leave out --nodes {nodes}")
+            raise Failure(f"the frames of {protocol.name} have no address; omit --nodes {nodes}")
         return codec, [GenericNode(codec)]
     first, last = protocol.bus.nodes
     numbers = parse_nodes(str(first) if nodes is None else nodes, first, last)
@@ -66,9 +66,9 @@ def _nodes(name: str, nodes: str | None, crc: str | None) -> tuple[Codec, list[N
 
 def _qlink_nodes(numbers: Iterable[int]) -> list[Node]:
     from qlinkgen.codecs.qlink import PositionType  # noqa: PLC0415
-    from qlinkgen.protocols.qlink import VirtualNode  # noqa: PLC0415  # other protocols do without
+    from qlinkgen.protocols.qlink import VirtualNode  # noqa: PLC0415  # only for Q.link
 
-    kind = PositionType.JVL_MACTALK  # a node without one tells no position
+    kind = PositionType.JVL_MACTALK  # a node of type none reports no position
     return [VirtualNode(number, position_type=kind, serial_number=1000 + number) for number in numbers]
 
 

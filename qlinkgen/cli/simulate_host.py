@@ -10,17 +10,17 @@ from qlinkgen.sim.chip_bus import chip_wire
 
 
 def simulate_host(*, link: str | None, baud: int | None, plan: FaultPlan | None) -> None:
-    """Put the chip set behind a pty, until a signal comes."""
+    """Run the chip set on a pty until a signal."""
     from qlinkgen.sim.pty_bus import PtyBus  # noqa: PLC0415  # needs a system that has ptys
 
     chip = ChipEngine(ChipSet())
     wire = chip_wire(chip, baud=baud, faults=plan, chunks="byte" if baud is not None else "frame")
     run_bus(PtyBus(wire, link=link), link, "an mc1231a chip set")
     for number, axis in chip.chip.axes.items():
-        say(f"axis {number} stands at {axis.actual}, status 0x{axis.status:04X}", None)
+        say(f"axis {number}: position {axis.actual}, status 0x{axis.status:04X}", None)
     seen = chip.counters
     say(
-        f"{counted(seen.packets, 'packet')} carried out, {seen.illegal} illegal, "
+        f"{counted(seen.packets, 'packet')} executed, {seen.illegal} illegal, "
         f"{seen.out_of_range} out of range",
         plan,
     )

@@ -1,4 +1,4 @@
-"""``qlinkgen simulate trio``: nodes of a ring, with the outside between the last and the first."""
+"""``qlinkgen simulate trio``: nodes of a ring, with the port between the last and the first."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from qlinkgen.protocols.trio.coordinator_node import CoordinatorNode
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.sim import FaultPlan, SimulationError
 
-#: What is on the ring unless somebody says what.
+#: Default nodes of the ring.
 RING = "coordinator"
 
 
 def simulate_ring(
     ring: str | None, *, link: str | None, baud: int | None, plan: FaultPlan | None, crc: str | None
 ) -> None:
-    """Put the ring behind a pty, until a signal comes."""
-    from qlinkgen.codecs import trio  # noqa: PLC0415  # as the others import theirs
+    """Run the ring on a pty until a signal."""
+    from qlinkgen.codecs import trio  # noqa: PLC0415  # only for Trio
     from qlinkgen.sim.port_ring import ring_bus  # noqa: PLC0415  # needs a system that has ptys
 
     if plan is not None and plan.to != "both":
-        raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; leave out to={plan.to}")
+        raise Failure(f"--faults to={plan.to}: a ring has neither master nor slaves; omit to={plan.to}")
     codec: RingCodec = with_crc(trio, trio.Codec, crc)
     given = RING if ring is None else ring
     try:
@@ -39,10 +39,10 @@ def simulate_ring(
 
 
 def _account(node: Node) -> str:
-    """What a node has seen, and what it has become by that."""
+    """Return the counters and the state of a node as text."""
     engine = engine_of(node)
     counters = engine.counters
-    seen = f"{counters.taken} taken, {counters.passed} sent on, NETSTAT {int(engine.netstat)}"
+    seen = f"{counters.taken} taken, {counters.passed} forwarded, NETSTAT {int(engine.netstat)}"
     match node:
         case CoordinatorNode():
             return f"coordinator: {seen}{_received(node)}{_variables(node)}"
@@ -65,14 +65,14 @@ def _variables(node: CoordinatorNode) -> str:
 
 def _state(node: KeypadNode) -> str:
     if node.offset is None:
-        return f"; it has no offset, so it let {counted(node.link.counters.blocked, 'message')} go no further"
+        return f"; without offset, so it discarded {counted(node.link.counters.blocked, 'message')}"
     rows = [row for row in node.display.lines if row.strip()]
-    shown = f"; it shows {' / '.join(map(repr, rows))}" if rows else ""
+    shown = f"; display {' / '.join(map(repr, rows))}" if rows else ""
     return f"; offset {node.offset}{shown}"
 
 
 def _summary(nodes: list[Node]) -> str:
     counters = [engine_of(node).counters for node in nodes]
     taken = counted(sum(each.taken for each in counters), "message")
-    wrong = counted(sum(each.total_faults for each in counters), "broken one")
-    return f"{taken} taken in all, {wrong}"
+    damaged = sum(each.total_faults for each in counters)
+    return f"total: {taken} taken, {damaged} damaged"

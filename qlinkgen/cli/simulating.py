@@ -1,4 +1,4 @@
-"""What `simulate` does whatever it simulates: faults from the command line, a pty, the end."""
+"""Common parts of all simulations: faults from the command line, running a pty, the summary."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def plan_of(text: str | None, seed: int | None) -> FaultPlan | None:
-    """The faults of ``--faults`` and ``--seed``."""
+    """Return the faults of ``--faults`` and ``--seed``."""
     if text is None:
         return None
     try:
@@ -30,19 +30,19 @@ def plan_of(text: str | None, seed: int | None) -> FaultPlan | None:
 
 
 def run_bus(bus: PtyBus, link: str | None, what: str) -> None:
-    """Say where the port is, run until a signal comes, and close the port."""
+    """Print the path of the port, run until a signal, and close the port."""
     try:
         with StopSignals(bus.request_stop):
             click.echo(json.dumps({"port": bus.path}))
             where = bus.path if link is None else f"{bus.path}, linked as {link}"
-            click.echo(f"qlinkgen: {what} on {where}; Ctrl-C ends it", err=True)
+            click.echo(f"qlinkgen: {what} on {where}; press Ctrl-C to stop", err=True)
             bus.run()
     finally:
         bus.close()
 
 
 def say(text: str, plan: FaultPlan | None) -> None:
-    """A line of the summary, and the faults behind it if there were to be any."""
+    """Print a line of the summary, with the injected faults if a plan is given."""
     click.echo(f"qlinkgen: {text}{_faults(plan)}", err=True)
 
 

@@ -1,4 +1,4 @@
-"""Spans in words: what they are called, and what they hold."""
+"""Names and values of the spans of a frame as text."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ _AROUND = {
     Around.BEFORE: ("(noise)", "before the frame"),
     Around.LOST: ("(preamble)", "rest of the preamble"),
     Around.INSERTED: ("(stuffing)", "inserted"),
-    Around.EXTRA: ("(extra)", "belongs to no field"),
+    Around.EXTRA: ("(extra)", "outside all fields"),
     Around.NEXT: ("(next frame)", "begins inside this one"),
     Around.AFTER: ("(after)", "not part of the frame"),
 }
 
 
 def value_of(found: Dissection, span: Span) -> tuple[str, str]:
-    """The name of a span and its value."""
+    """Return the name of a span and its value."""
     of = span.of
     if isinstance(of, Around):
         return _AROUND[of]
     if len(span.raw) < span.size:
-        return of.name, f"{len(span.raw)} of {span.size} bytes are there"
+        return of.name, f"{len(span.raw)} of {span.size} bytes received"
     if isinstance(of, Part):
         return of.name, _of_part(found, of, span)
     return of.name, _of_field(of, span)
@@ -115,5 +115,5 @@ def _check(found: Dissection, part: CheckPart, span: Span) -> str:
 
 
 def check_number(part: CheckPart, value: int) -> str:
-    """A check value as it is written."""
+    """Return a check value in hex, with all digits of its width."""
     return f"0x{value:0{(part.check.algorithm.width + 3) // 4}X}"

@@ -1,4 +1,4 @@
-"""Standard input and output as the commands need them: always there, and able to take any text."""
+"""Makes the standard streams always available and able to encode any text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class _Nothing(io.RawIOBase):
-    """Takes everything, and keeps nothing."""
+    """Discards everything written."""
 
     def writable(self) -> bool:
         return True
@@ -22,11 +22,11 @@ class _Nothing(io.RawIOBase):
 
 
 def prepare() -> None:
-    """Replace streams that are closed, and let no character fail that an encoding does not have.
+    """Replace closed streams, and escape characters that an encoding lacks.
 
-    A program that was started with a closed stream has None in its place. It runs as with /dev/null: a
-    simulator started by a supervisor may have no output at all. The free descriptors 0 to 2 are taken: the
-    first file or port to be opened would get them, and with them what a library writes to standard output.
+    In a program started with a closed stream, the stream is None. It is replaced by /dev/null: a simulator
+    started by a supervisor may have no output. Free descriptors 0 to 2 are occupied: otherwise the first file
+    or port opened would get them, and receive what a library writes to standard output.
     """
     for descriptor in range(3):
         _occupy(descriptor)
@@ -42,7 +42,7 @@ def prepare() -> None:
 
 
 def nothing() -> io.TextIOWrapper:
-    """Return a stream that takes everything, and keeps nothing."""
+    """Return a stream that discards everything written."""
     return io.TextIOWrapper(io.BufferedWriter(_Nothing()), encoding="utf-8", errors="backslashreplace")
 
 
@@ -50,6 +50,6 @@ def _occupy(descriptor: int) -> None:
     try:
         os.fstat(descriptor)
     except OSError:
-        got = os.open(os.devnull, os.O_RDWR)  # the lowest that is free
+        got = os.open(os.devnull, os.O_RDWR)  # returns the lowest free descriptor
         if got != descriptor:
             os.close(got)

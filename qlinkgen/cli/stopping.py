@@ -1,4 +1,4 @@
-"""Ends what runs until it is stopped: Ctrl-C, SIGTERM, the loss of the terminal; the second one insists."""
+"""Stops long-running commands on Ctrl-C, SIGTERM or loss of the terminal; a second signal kills."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ _Handler = Callable[[int, FrameType | None], object] | int | None
 
 
 class StopSignals:
-    """While it is entered, signals ask to stop.
+    """A context in which signals request a stop.
 
-    The first one sets `stopped` and calls `on_stop`, and what they did before is in force again: who does not
-    want to wait can insist.
+    The first one sets `stopped` and calls `on_stop`, and restores the previous handlers, so that a second one
+    ends the program at once.
 
     Attributes:
-        stopped: a signal has come.
+        stopped: a signal was received.
     """
 
     def __init__(self, on_stop: Callable[[], object] | None = None) -> None:
-        """`on_stop` is called in a signal handler."""
+        """Call `on_stop` in the signal handler."""
         self.stopped = False
         self._on_stop = on_stop
         self._before: dict[signal.Signals, _Handler] = {}
 
     def __enter__(self) -> Self:
-        # A shell starts background programs with SIGINT ignored; they are to end with it all the same. nohup
-        # ignores SIGHUP, and means it.
+        # A shell starts background programs with SIGINT ignored; it must stop them all the same. SIGHUP stays
+        # ignored if nohup has set it so.
         for name in _NAMES:
             number = getattr(signal, name, None)
             if number is not None and not (name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN):

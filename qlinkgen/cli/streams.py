@@ -1,10 +1,10 @@
-"""Streams of bytes to messages and faults, whatever the protocol and whether or not the direction is known.
+"""Decodes a byte stream of any protocol into messages and faults, with or without a known direction.
 
-Nothing in most frames says whether it is a request or a response. Without a direction both are tried:
+Most frames do not state whether they are requests or responses. Without a direction both are tried:
 
-* what fits only one direction is that;
-* what fits both is the response if it directly follows a request of the same command and address, else the
-  request.
+* a frame that is valid in one direction has that direction;
+* a frame that is valid in both is the response if it directly follows a request of the same command and
+  address, else the request.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
 from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, FramePlan, frame_plan
 
-#: A frame that both directions refuse is reported by the one that came further with it.
+#: Kinds of faults in the order of the checks: of two faults, the later one is reported.
 PROGRESS = ("unknown", "length", "frame", "stuffing", "truncated", "crc", "illegal", "range")
 
 
 @dataclass(frozen=True, slots=True)
 class Bad:
-    """Bytes that are no message; the generated module's Fault with its place in the whole stream."""
+    """Bytes that are not a message: the generated module's Fault with its offset in the whole stream."""
 
     kind: str
     offset: int
@@ -34,25 +34,25 @@ class Bad:
     message: str
 
 
-#: A generated message object, or bytes that are none.
+#: A generated message object, or a fault.
 Event = MessageObject | Bad
 
 
 class Stream(Protocol):
-    """Bytes in, events out."""
+    """Decodes bytes into events."""
 
     def feed(self, data: bytes) -> Iterable[Event]:
-        """Take bytes; what became certain with them, in order."""
+        """Decode bytes; return the events that they complete, in order."""
 
     def finish(self) -> Iterable[Event]:
-        """The end of the stream; what was left."""
+        """End the stream; return the remaining events."""
 
 
 class OneWay:
     """Frames of one known direction (or of a protocol that has none)."""
 
     def __init__(self, codec: ModuleType, direction: Direction, base: int = 0) -> None:
-        """``base`` is the place of the first byte in the whole stream."""
+        """Decode one direction; ``base`` is the offset of the first byte in the whole stream."""
         self._decoder = codec.StreamDecoder() if direction == "message" else codec.StreamDecoder(direction)
         self._base = base
 
@@ -69,14 +69,14 @@ class OneWay:
 
 
 class InStep:
-    """Both directions of frames that begin and end at the same bytes in either.
+    """Both directions of frames whose boundaries do not depend on the direction.
 
-    Each direction has an event for each frame and for each fault, so the n-th of one belongs to the n-th of
-    the other, however much is fed at once.
+    Each direction has an event for each frame and for each fault, so the n-th event of one belongs to the
+    n-th of the other, for chunks of any size.
     """
 
     def __init__(self, codec: ModuleType) -> None:
-        """Hunt in both directions."""
+        """Decode in both directions."""
         self._requests, self._responses = codec.StreamDecoder("request"), codec.StreamDecoder("response")
         self._asked: tuple[str, int | None] | None = None
 
@@ -91,7 +91,7 @@ class InStep:
     def _merged(
         self, requests: Iterable[Framed | Fault], responses: Iterable[Framed | Fault]
     ) -> Iterator[Event]:
-        # Most frames fit one direction alone: the other's fault is thrown away without a look at it.
+        # Most frames are valid in one direction only: the fault of the other is discarded unread.
         for request, response in zip(requests, responses, strict=True):
             asked, self._asked = self._asked, None
             if not is_message(request):
@@ -104,10 +104,10 @@ class InStep:
 
 
 class EitherWay:
-    """Both directions of frames whose size only their message tells: they may end at different bytes."""
+    """Both directions of frames whose size depends on the message, and so on the direction."""
 
     def __init__(self, codec: ModuleType) -> None:
-        """Hunt in both directions."""
+        """Decode in both directions."""
         self._codec = codec
         self._ways: dict[Direction, OneWay] = {way: OneWay(codec, way) for way in ("request", "response")}
         self._held: dict[Direction, list[Event]] = {"request": [], "response": []}
@@ -115,13 +115,13 @@ class EitherWay:
         self._asked: tuple[str, int | None] | None = None
 
     def feed(self, data: bytes) -> Iterator[Event]:
-        """Take bytes, one at a time: both directions must be asked about the same frame."""
+        """Take bytes, one at a time, so that both directions decode the same frame."""
         for byte in data:
             self._offset += 1
             yield from self._settle({way: each.feed(bytes((byte,))) for way, each in self._ways.items()})
 
     def finish(self) -> Iterator[Event]:
-        """The end of the stream: the direction that understood more tells what is left."""
+        """End the stream: return the remaining events of the direction that decoded more."""
         for way, each in self._ways.items():
             self._held[way] += each.finish()
         best = min(self._held.values(), key=len)
@@ -146,11 +146,11 @@ class EitherWay:
         return "response" if self._asked == _transaction(_last_message(new["response"])) else "request"
 
     def _deliver(self, way: Direction, new: dict[Direction, list[Event]]) -> list[Event]:
-        """One direction has a message: what it saw before is the truth about the bytes before."""
+        """Return the events of the direction that has a message, including its earlier ones."""
         events = self._held[way]
         other: Direction = "request" if way == "response" else "response"
         if not new[other]:
-            # The other one reads a longer frame into these bytes; it must not swallow the next one.
+            # The other direction is inside a longer candidate, which must not consume the next frame.
             self._ways[other] = OneWay(self._codec, other, self._offset)
         self._held = {"request": [], "response": []}
         self._asked = _transaction(_last_message(events)) if way == "request" else None
@@ -166,18 +166,18 @@ def _last_message(events: list[Event]) -> MessageObject | None:
 
 
 def _further(request: Event, response: Event) -> Bad:
-    assert isinstance(request, Bad)  # a message is not held
+    assert isinstance(request, Bad)  # messages are delivered at once
     assert isinstance(response, Bad)
     return max(request, response, key=lambda bad: PROGRESS.index(bad.kind))
 
 
 def _transaction(message: Message | None) -> tuple[str, int | None] | None:
-    """Command and address: what a response has in common with its request."""
+    """Return command and address, which a response has in common with its request."""
     return None if message is None else (message.NAME.rpartition(".")[0], address_of(message))
 
 
 def open_stream(protocol: Described, codec: ModuleType, direction: Direction | None) -> Stream:
-    """The stream for a protocol with frames."""
+    """Return a stream for a protocol with frames."""
     if protocol.directions == ("message",):
         return OneWay(codec, "message")
     if direction:
@@ -186,7 +186,7 @@ def open_stream(protocol: Described, codec: ModuleType, direction: Direction | N
 
 
 def _ends_alike(frame: FramePlan) -> bool:
-    """Where a frame begins and ends does not depend on the direction."""
+    """Whether the boundaries of frames are independent of the direction."""
     match frame.end:
         case ByLength():
             return bool(frame.envelope.preamble)

@@ -1,4 +1,4 @@
-"""Tables: coloured and fitted on a terminal, aligned text of any width in a pipe."""
+"""Tables: coloured and fitted to the width on a terminal, plain aligned text in a pipe."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BREAKS = re.compile(r"[\t\n]+")
 
 @dataclass
 class Table:
-    """Rows of text under headings; columns named in ``right`` are aligned to the right."""
+    """Rows of text under headings; columns in ``right`` are right-aligned."""
 
     columns: Sequence[str]
     title: str = ""
@@ -31,7 +31,7 @@ class Table:
         )
 
     def show(self) -> None:
-        """Print it, without the columns in which nothing stands."""
+        """Print the table, without empty columns."""
         table = self._without_empty()
         if not table.rows:
             return
@@ -41,7 +41,7 @@ class Table:
             click.echo("\n".join(table.lines()))
 
     def lines(self) -> list[str]:
-        """Plain text, two blanks between columns."""
+        """Return plain text, with two blanks between columns."""
         head = [one_line(self.title)] if self.title else []
         widths = [
             max(len(row[index]) for row in (tuple(self.columns), *self.rows))
@@ -64,7 +64,7 @@ class Table:
 
 
 def _cell(text: str) -> str:
-    """A text on one line, its indentation kept."""
+    """Return a text on one line, with its indentation."""
     return _BREAKS.sub(" ", visible(text))
 
 
@@ -87,13 +87,13 @@ def _show_rich(table: Table) -> None:
 
 
 def heading(text: str) -> None:
-    """A line that stands out on a terminal."""
+    """Print a line, highlighted on a terminal."""
     line = one_line(text)
     click.echo(click.style(line, bold=True) if on_terminal() else line)
 
 
 def paragraph(lines: Iterable[str]) -> None:
-    """Lines, and an empty one if there were any."""
+    """Print lines, followed by an empty one if there are any."""
     shown = [visible(line) for line in lines if line]
     if shown:
         click.echo("\n".join((*shown, "")))

@@ -1,4 +1,4 @@
-"""The registry of targets: the one place that knows every back-end, so that none has to know another."""
+"""The registry of targets: the only module that imports every back-end."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Generate = Callable[[Protocol, Options], Outputs]
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What can be generated.
+    """A kind of output.
 
     Attributes:
-        name: word behind ``--target``.
-        summary: what it is, for help texts.
-        module: where its `generate` is; imported when it is asked for.
+        name: argument of ``--target``.
+        summary: description for help texts.
+        module: module of its `generate`, imported on use.
     """
 
     name: str
@@ -42,22 +42,22 @@ TARGETS = {
         Target("vectors", "test vectors as JSON", "qlinkgen.backends.vectors"),
         Target(
             "conformance",
-            "C program that holds a header against the vectors, on any target",
+            "C program that tests a header against the vectors, on any target",
             "qlinkgen.cli.kits",
         ),
     )
 }
 
-#: What is made where no target is chosen. A conformance kit is large, and wanted once for each new target.
+#: Default targets. A conformance kit is large, and needed only once for each new platform.
 DEFAULT = tuple(name for name in TARGETS if name != "conformance")
 
 
-#: Parts of docs/ that are made from the code; in the project's own repository alone.
+#: Generated parts of docs/; only in the project's own repository.
 REFERENCE = "reference"
 
 
 def reference_outputs() -> Outputs:
-    """Documentation of the schema language: rules, reference, JSON Schema; paths below the repository."""
+    """Generate the documentation of the schema language: rules, JSON Schema; paths below the repository."""
     documents = importlib.import_module("qlinkgen.schema.documents")
     outputs: Outputs = documents.outputs()
     return outputs

@@ -1,4 +1,4 @@
-"""What the commands on a port share: their options, which protocols and nodes they take, opening the port."""
+"""Common parts of the port commands: options, node numbers, opening the port."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from qlinkgen.plan.framing import frame_plan
 from qlinkgen.transport.opening import open_port
 from qlinkgen.transport.port import Ability, Port
 
-#: Speed of a port on which bytes take no time, such as a pty: nothing depends on it.
+#: Speed of a port without line time, such as a pty; it has no effect.
 ANY_SPEED = 115200
 
 
 def seconds(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:  # noqa: ARG001
-    """A finite number of seconds, 0 or more; a callback of click."""
+    """Parse a finite number of seconds, 0 or more; a callback of click."""
     if text is None:
         return None
     try:
@@ -31,7 +31,7 @@ def seconds(context: click.Context, parameter: click.Parameter, text: str | None
     except ValueError:
         number = math.nan
     if not 0 <= number < math.inf:
-        raise Failure(f"{parameter.opts[-1]} {text}: no number of seconds; give 0 or more, such as 0.05")
+        raise Failure(f"{parameter.opts[-1]} {text}: not a number of seconds; give 0 or more, such as 0.05")
     return number
 
 
@@ -39,7 +39,7 @@ baud_option = click.option(
     "--baud",
     type=click.IntRange(1, 100_000_000),
     metavar="N",
-    help="Speed of the line; that of the schema unless given.",
+    help="Speed of the line; by default that of the schema.",
 )
 attempts_option = click.option(
     "--attempts",
@@ -47,19 +47,19 @@ attempts_option = click.option(
     default=3,
     show_default=True,
     metavar="N",
-    help="How often a request is sent at most, all tries counted.",
+    help="Most transmissions of a request, the first included.",
 )
 slack_option = click.option(
     "--slack",
     callback=seconds,
     metavar="SECONDS",
-    help="Time that this computer and the adapter may add to an answer; what the port says unless given.",
+    help="Delay that this computer and the adapter may add to a response; by default derived from the port.",
 )
 echo_option = click.option(
     "--echo",
     type=click.Choice(["auto", "expect", "none"]),
-    help="Whether the adapter hands back what is sent; auto finds out with two bytes 00, and is the default "
-    "where frames begin with a preamble.",
+    help="Whether the adapter echoes sent bytes; auto probes with two bytes 00, and is the default if frames "
+    "begin with a preamble.",
 )
 
 
@@ -69,7 +69,7 @@ Parity = Literal["none", "even", "odd"]
 
 
 class Line(NamedTuple):
-    """How bytes are framed on the line."""
+    """Byte format on the line."""
 
     parity: Parity = "none"
     stop_bits: Literal[1, 2] = 1
@@ -92,12 +92,12 @@ stop_bits_option = click.option(
 
 
 def line_of(parity: Parity, stop_bits: str) -> Line:
-    """The options of a byte, as a port takes them."""
+    """Return the byte format of the options."""
     return Line(parity, 2 if stop_bits == "2" else 1)
 
 
 def open_line(name: str, baud: int, line: Line = Line()) -> Port:  # noqa: B008  # immutable
-    """Open a port. Raises PortError, and Failure for a name that can be none."""
+    """Open a port. Raises PortError, and Failure for an invalid name."""
     try:
         return open_port(name, baud=baud, parity=line.parity, stop_bits=line.stop_bits)
     except ValueError as error:
@@ -105,14 +105,14 @@ def open_line(name: str, baud: int, line: Line = Line()) -> Port:  # noqa: B008 
 
 
 def open_usual(protocol: Protocol, name: str, baud: int | None, line: Line = Line()) -> Port:  # noqa: B008
-    """Open a port at the speed given, or that of the schema; otherwise as `open_line`."""
+    """Open a port at the given speed, or that of the schema; otherwise as `open_line`."""
     return open_line(name, speed(protocol, baud), line)
 
 
 def open_free(protocol: Protocol, name: str, baud: int | None, line: Line = Line()) -> Port:  # noqa: B008
-    """Open a port for a protocol of which no source names a speed: one must be given where it matters.
+    """Open a port for a protocol without a standard speed, which a real line requires as an option.
 
-    Raises PortError, and Failure where the speed is missing.
+    Raises PortError, and Failure if the speed is missing.
     """
     if baud is not None or protocol.bus.baud is not None:
         return open_usual(protocol, name, baud, line)
@@ -120,19 +120,19 @@ def open_free(protocol: Protocol, name: str, baud: int | None, line: Line = Line
     if port.capabilities.paced is Ability.NO:
         return port
     port.close()
-    return open_usual(protocol, name, None, line)  # tells what is missing
+    return open_usual(protocol, name, None, line)  # raises Failure for the missing speed
 
 
 def speed(protocol: Protocol, given: int | None) -> int:
-    """The speed of the line: what was given, else that of the schema."""
+    """Return the given speed, else that of the schema."""
     baud = given or protocol.bus.baud
     if baud is None:
-        raise Failure(f"the schema of {protocol.name} names no usual speed; give --baud N")
+        raise Failure(f"the schema of {protocol.name} states no speed; add --baud N")
     return baud
 
 
 def echo_mode(protocol: Protocol, given: str | None) -> EchoMode:
-    """What was given; else a search, unless its bytes could be taken for the beginning of a frame."""
+    """Return the given mode; else a probe, unless its bytes could begin a frame."""
     if given is not None:
         return cast(EchoMode, given)
     preamble = frame_plan(protocol.frame).envelope.preamble
@@ -145,16 +145,16 @@ def counted(number: int, what: str) -> str:
 
 
 def matching(name: str) -> Mapping[str, Accepts] | None:
-    """What is known of the answers of a PROTOCOL beyond their shape."""
+    """Return the additional rules for matching responses of a PROTOCOL."""
     if not is_shipped(name, "qlink"):
         return None
-    from qlinkgen.protocols.qlink.matching import ACCEPTS  # noqa: PLC0415  # for Q.link alone
+    from qlinkgen.protocols.qlink.matching import ACCEPTS  # noqa: PLC0415  # only for Q.link
 
     return ACCEPTS
 
 
 def with_crc(plain: A, choose: Callable[[str], B], crc: str | None) -> A | B:
-    """A codec that ships, or what its class `Codec` makes of another CRC if one is wanted."""
+    """Return a shipped codec, with another CRC if one is given."""
     try:
         return plain if crc is None else choose(crc)
     except ValueError as error:
@@ -162,27 +162,27 @@ def with_crc(plain: A, choose: Callable[[str], B], crc: str | None) -> A | B:
 
 
 def parse_nodes(text: str, first: int, last: int) -> list[int]:
-    """Node numbers of a text such as 3, 1-16 or 1,3,5-7; in rising order."""
+    """Parse node numbers such as 3, 1-16 or 1,3,5-7; return them in ascending order."""
     nodes: list[int] = []
     for part in text.split(","):
         low, dash, high = (piece.strip() for piece in part.partition("-"))
         begin, end = whole_number(low), whole_number(high) if dash else whole_number(low)
         if begin is None or end is None:
             raise Failure(
-                f"--nodes {text}: '{part.strip()}' is no node; write for example 3, 1-16 or 1,3,5-7"
+                f"--nodes {text}: '{part.strip()}' is not a node; write for example 3, 1-16 or 1,3,5-7"
             )
         if not first <= begin <= end <= last:
             fix = f"nodes are {first}..{last}" if begin <= end else f"write {end}-{begin}"
-            raise Failure(f"--nodes {text}: {part.strip()} cannot be; {fix}")
+            raise Failure(f"--nodes {text}: {part.strip()} is out of range; {fix}")
         if double := set(nodes) & set(range(begin, end + 1)):
-            raise Failure(f"--nodes {text}: node {min(double)} stands there twice; name each once")
+            raise Failure(f"--nodes {text}: duplicate node {min(double)}; list each once")
         nodes += range(begin, end + 1)
     return sorted(nodes)
 
 
 def qlink_node(context: click.Context, parameter: click.Parameter, text: str) -> int:  # noqa: ARG001
-    """The node number of ``--node`` on Q.link; a callback of click."""
+    """Parse the node number of ``--node`` on Q.link; a callback of click."""
     node = whole_number(text)
     if node is None or not 1 <= node <= 16:
-        raise Failure(f"--node {text}: no node; nodes are 1..16")
+        raise Failure(f"--node {text}: not a node; nodes are 1..16")
     return node

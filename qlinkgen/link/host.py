@@ -77,7 +77,7 @@ class HostEngine:
         }
         self._byte_time = timing.byte_time
         self._decode = codec.decode_response
-        self._misfits = codec.DecodeError
+        self._decode_errors = codec.DecodeError
         self._check_size = self._commands[type(rules.proof)].check_size
         longest = max(command.request.MAX_WIRE_SIZE for command in codec.COMMANDS.values())
         self._most_fills = timing.fills(longest)
@@ -204,7 +204,7 @@ class HostEngine:
         """Do what is due."""
         if self._state is State.GUARD:
             if now < self._quiet_at and now >= self._give_up_at:
-                self._fail(BadReply, "the line does not get quiet: the device sends without being asked", now)
+                self._fail(BadReply, "line never became idle: unsolicited traffic", now)
         elif self._listening and now >= self._deadline:
             self._timed_out(now)
 
@@ -324,7 +324,7 @@ class HostEngine:
             else:
                 assert command.response is not None
                 response = command.response.from_bytes(raw)
-        except self._misfits as error:
+        except self._decode_errors as error:
             self._wrong_answer(getattr(error, "kind", "frame"), data, str(error), now)
             return
         if command.moves:
@@ -474,7 +474,7 @@ class HostEngine:
         if kinds == {"illegal"} and len(self._wrong) == self._attempt:
             self._fail(IllegalCommand, "the device does not know this command: its checksum is 0", now)
         elif kinds:
-            self._fail(BadReply, f"what came was no answer ({', '.join(sorted(kinds))})", now)
+            self._fail(BadReply, f"received only invalid replies ({', '.join(sorted(kinds))})", now)
         else:
             self._fail(NoReply, "no answer", now)
 

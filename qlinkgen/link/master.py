@@ -246,7 +246,7 @@ class MasterEngine:
             if now >= self._probe_until:
                 self._probe_answered(found=False, now=now)
         elif state is not IDLE and self._suspect and not self._line_is_quiet(now) and now >= self._give_up_at:
-            self._fail(BadReply, "the line does not get quiet: someone sends without being asked", now)
+            self._fail(BadReply, "line never became idle: unsolicited traffic", now)
 
     def take(self) -> Reply:
         """Return what the transaction that has just ended gave.
@@ -443,7 +443,7 @@ class MasterEngine:
             self._fail(Collision, "the request came back changed: another station was sending too", now)
         elif self._wrong:
             kinds = ", ".join(sorted({kind for kind, _ in self._wrong}))
-            self._fail(BadReply, f"what came was no answer ({kinds})", now)
+            self._fail(BadReply, f"received only invalid replies ({kinds})", now)
         else:
             self._fail(NoReply, "no answer", now)
 

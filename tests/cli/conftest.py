@@ -17,7 +17,7 @@ from qlinkgen.sim import VirtualPort, Wire
 
 @dataclass(frozen=True)
 class Result:
-    """What came out."""
+    """Output, errors and exit code of a run."""
 
     code: int
     out: str
@@ -30,7 +30,7 @@ class Result:
 
 Run = Callable[..., Result]
 
-#: A bus that does not ship: little endian, no stuffing, a one-byte sum, bit fields, a counted array.
+#: A bus that is not shipped: little endian, no stuffing, a one-byte sum, bit fields, a counted array.
 THERMO = """\
 qlinkgen: 1
 protocol: {name: thermo, title: Thermostat bus, revision: "2", source: Own design}
@@ -93,7 +93,7 @@ def qlinkgen(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     return call
 
 
-#: Gives the name of a port at which a simulated line is.
+#: Returns the name of the port of a simulated line.
 OnLine = Callable[[Wire], str]
 
 
@@ -116,7 +116,7 @@ def on_line(monkeypatch: pytest.MonkeyPatch) -> OnLine:
 
 @pytest.fixture
 def thermo(tmp_path: Path) -> Path:
-    """A schema outside of the tree."""
+    """A schema outside the tree."""
     path = tmp_path / "thermo.yaml"
     path.write_text(THERMO)
     return path

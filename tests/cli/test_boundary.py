@@ -1,4 +1,4 @@
-"""Every error ends in a sentence and an exit code: pipes, signals, full disks, faults of our own."""
+"""Every error ends in a sentence and an exit code: pipes, signals, full disks, internal errors."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_wrong_usage(qlinkgen: Run, arguments: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_misspelt_command(qlinkgen: Run, command: str) -> None:
-    """One character too few, too many or swapped: the right one is proposed."""
+    """One character too few, too many or swapped: the correct command is suggested."""
     wrong = {command[:-1], command + "x", command[1:], command[0] + command[2] + command[1] + command[3:]}
     for word in wrong - set(COMMANDS):
         result = qlinkgen(word)

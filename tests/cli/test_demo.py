@@ -34,7 +34,7 @@ def test_without_a_compiler() -> None:
 def test_the_bus() -> None:
     done = demo(ENVIRONMENT, "bus.py")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "stands at 720" in done.stdout
+    assert "position 720" in done.stdout
     assert "a5 a5 04 03 03 75 6c" in done.stdout, "the frame that starts node 3"
     assert "0 timeouts" in done.stdout
 
@@ -43,13 +43,13 @@ def test_the_ring() -> None:
     done = demo(ENVIRONMENT, "ring.py")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "the keypad shows 'SPEED:   150', its key '5' came" in done.stdout
-    assert "8a 00 00 2a 00 00 00 00 00 00 00 00 00 35 29 88" in done.stdout, "what came round"
+    assert "8a 00 00 2a 00 00 00 00 00 00 00 00 00 35 29 88" in done.stdout, "the message around the ring"
 
 
 def test_the_chip_set() -> None:
     done = demo(ENVIRONMENT, "chip.py")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "stands at 3000" in done.stdout
+    assert "position 3000" in done.stdout
     assert "11 00 02 c0 00" in done.stdout, "the packet of 2.75 counts a sample"
 
 

@@ -1,13 +1,12 @@
-"""What README and docs show is true: commands print what stands there, files compile, excerpts are excerpts.
+"""Tests the examples in README and docs: commands print the output shown, files compile, excerpts match.
 
-* ``<!-- file: NAME -->`` in front of a block: the block is that file.
-* ```` ```console ````: lines behind ``$`` are run by bash in one folder, and what follows is their output; a
-  line ``...`` stands for any lines, and ``…`` in a line for any characters.
-* ``<!-- background: NAME -->`` in front of a console block: its command runs until the document ends, and
-  what stands under it is what it has printed first.
+* ``<!-- file: NAME -->`` before a block: the block is that file.
+* ```` ```console ````: lines after ``$`` are run by bash in one folder, and the following lines are their
+  output; a line ``...`` matches any lines, and ``…`` in a line any characters.
+* ``<!-- background: NAME -->`` before a console block: its command runs until the document ends, and the
+  lines below are its first output.
 * ```` ```pycon ````: run as a doctest.
-* ``<!-- excerpt: PATH -->`` in front of a block: it stands in the file of that path, ``...`` where lines are
-  left out.
+* ``<!-- excerpt: PATH -->`` before a block: an excerpt of the file of that path, ``...`` for omitted lines.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ def blocks(document: str) -> list[Block]:
 
 
 class Shell:
-    """Runs commands in one folder; the output is both kinds together."""
+    """Runs commands in one folder; returns standard output and error together."""
 
     def __init__(self, folder: Path, environment: dict[str, str]) -> None:
         self._options: dict[str, Any] = {
@@ -77,14 +76,14 @@ class Shell:
         return str(subprocess.run(command_line, check=False, timeout=300, **self._options).stdout)
 
     def start(self, command: str, lines: int) -> str:
-        """Start a command that goes on; what it prints first."""
+        """Start a command in the background; return its first output."""
         process = subprocess.Popen(["bash", "-c", f"exec {command}"], **self._options)
         self._background.append(process)
         assert process.stdout is not None
         return "".join(process.stdout.readline() for _ in range(lines))
 
     def end(self) -> None:
-        """Stop what goes on."""
+        """Stop the background commands."""
         for process in self._background:
             process.terminate()
             process.communicate()
@@ -92,7 +91,7 @@ class Shell:
 
 @pytest.fixture
 def shell(tmp_path: Path) -> Iterator[Shell]:
-    """An empty folder in which the installed programs are found."""
+    """A shell in an empty folder, with the installed programs on its path."""
     programs = tmp_path / "bin"
     programs.mkdir()
     for name, module in (("qlinkgen", "-m qlinkgen"), ("python3", "")):
@@ -123,7 +122,7 @@ def sessions(text: str) -> Iterator[tuple[str, str]]:
 
 
 def matches(expected: str, found: str) -> bool:
-    """What follows a gap in a line may be wider than in the document, such as the time of an answer."""
+    """Whether the output matches; text after ``…`` may be wider than in the document, such as a time."""
     pattern = "".join(
         "(?:.*\n)*" if line == "..." else re.sub(r"(\\ )+…|…", ".*", re.escape(line)) + "\n"
         for line in expected.splitlines()

@@ -1,4 +1,4 @@
-"""`qlinkgen encode` and `decode`: scripts rely on what goes in and comes out."""
+"""`qlinkgen encode` and `decode`: scripts rely on their input and output."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FRAMES = [
     "a5a5a50421",
 ]
 
-#: Message, arguments, wire bytes; worked out by hand but for the check values.
+#: Message, arguments, wire bytes; worked out by hand except for the check values.
 GOLDEN = [
     ("qlink motor_position --node 3", "a5a504210315e8"),
     ("qlink motion --node 3 counter=1 outputs=0x0F segments=100,200", "a5a50a2003010f006400c86bb6"),
@@ -167,7 +167,7 @@ def test_bad_frames(qlinkgen: Run) -> None:
 def test_no_frame_at_all(qlinkgen: Run, wire: str) -> None:
     result = qlinkgen("decode", "qlink", "-", stdin=wire.encode())
     assert result.code == 1
-    assert "no frame" in result.err or "no bytes" in result.err
+    assert "no frame" in result.err or "no input" in result.err
 
 
 def test_standard_input(qlinkgen: Run) -> None:
@@ -187,7 +187,7 @@ def test_standard_input(qlinkgen: Run) -> None:
 
 
 def test_output_comes_frame_by_frame(qlinkgen: Run) -> None:
-    """Who pipes a live line into decode sees each frame when it is there."""
+    """Piping a live line into decode prints each frame as soon as it is complete."""
     frame = encoded(qlinkgen, "trio keypad_mode --address 2")
     with subprocess.Popen([*COMMAND, "decode", "trio", "-"], env=ENVIRONMENT, stdin=-1, stdout=-1) as process:
         assert process.stdin is not None
@@ -206,7 +206,7 @@ def test_comments_and_wrong_characters(qlinkgen: Run) -> None:
     result = qlinkgen("decode", "qlink", "-", stdin=text + b"a5 g5")
     assert result.code == 2
     assert len(result.lines) == 2
-    assert "line 5: 'g' is no hex digit" in result.err
+    assert "line 5: 'g' is not a hex digit" in result.err
     assert len(decoded(qlinkgen, "qlink", "0xa5a504", "0x210315e8")) == 1
     assert "(character 8)" in qlinkgen("decode", "qlink", "0xa5", "a5g").err
 
@@ -233,7 +233,7 @@ CORRUPTIONS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 40), st.integ
 def test_both_directions_whatever_is_fed_at_once(
     corruptions: list[tuple[int, int, int]], sizes: list[int]
 ) -> None:
-    """Directions tried side by side give what they give when they are asked about each byte."""
+    """Decoding both directions in chunks gives the same events as byte by byte."""
     protocol = load_protocol("qlink")
     codec = QLINK
     data = b""
@@ -331,11 +331,11 @@ def test_an_own_schema(qlinkgen: Run, thermo: Path) -> None:
     ("command", "said"),
     [
         ("qlink moton --node 1", "did you mean motion"),
-        ("qlink motion", "does not say for whom; give --node N with N in 1..16"),
+        ("qlink motion", "needs an address; add --node N with N in 1..16"),
         ("qlink motion --node x", "not a whole number"),
         ("qlink motion --node 17", "1..16"),
         ("qlink motion --node 1 countr=1", "did you mean counter?"),
-        ("qlink motion --node 1 counter", "is no FIELD=VALUE"),
+        ("qlink motion --node 1 counter", "is not FIELD=VALUE"),
         ("qlink motion --node 1 counter=256", "0..255"),
         ("qlink motion --node 1 counter=a", "'a' is not a whole number"),
         ("qlink motion --node 1 segments=1,2,3,4,5,6,7,8,9,10,11,12,13", "12"),
@@ -352,12 +352,12 @@ def test_an_own_schema(qlinkgen: Run, thermo: Path) -> None:
         ("qlink motion --node 1 counter=1 counter=2", "given twice"),
         ("qlink motion --node 1 --address 1", "given twice"),
         ("qlink motion --node 0", "motion cannot be broadcast; --node 1..16"),
-        ("qlink node_sync --node 3", "node_sync can only be broadcast; leave out --node"),
+        ("qlink node_sync --node 3", "node_sync can only be broadcast; omit --node"),
         ("qlink motion --node 1 segments=1,,2", "empty item"),
         ("qlink motion --node 1 segments=1,65536", "segments[1]: 65536 is out of range 0..65535"),
         ("qlink motion --node 1 segments=1,2,3,4,5,6,7,8,9,10,11,12,13", "13 items; at most 12"),
-        ("qlink motor_request --node 1", "motor_data must be given"),
-        ("trio character_transfer --address 1", "characters must be given"),
+        ("qlink motor_request --node 1", "motor_data has no default; add motor_data=VALUE"),
+        ("trio character_transfer --address 1", "characters has no default; add characters=VALUE"),
         ("qlink", "Missing argument 'MESSAGE'"),
         ('qlink motion --node 1 --json {"counter":-1.5}', "counter: -1.5 is not"),
         ('qlink motion --node 1 --json {"counter":null}', "counter: null is not"),
@@ -368,17 +368,17 @@ def test_an_own_schema(qlinkgen: Run, thermo: Path) -> None:
         ),
         ("qlink motion --node 1 --set crc=bogus", "--set crc=bogus: unknown checksum algorithm"),
         ("qlink motion --node 1 --set crc=crc-32/iso-hdlc", "--set crc=crc-32/iso-hdlc: "),
-        ("qlink motion --node 1 --json [1]", "a JSON object is needed"),
-        ("qlink motion --node 1 --json {", "no JSON at character"),
-        ('qlink motion --node 1 --json {"counter":1,"counter":2}', "stands there twice"),
-        ('qlink motion --node 1 --json {"counter":NaN}', "NaN is no number"),
+        ("qlink motion --node 1 --json [1]", "not a JSON object; write for example"),
+        ("qlink motion --node 1 --json {", "invalid JSON at character"),
+        ('qlink motion --node 1 --json {"counter":1,"counter":2}', "duplicate key"),
+        ('qlink motion --node 1 --json {"counter":NaN}', "NaN is not a finite number"),
         ('qlink motion --node 1 --json {"counter":1.5}', "not a whole number"),
         ('qlink motion --node 1 --json {"counter":null}', "not a whole number"),
         ("mc1231a set_pos --node 1", "has no address"),
-        ("mc1231a set_pos.response", "give it with --request HEX"),
-        ("mc1231a get_pos.response --request 02", "which get_pos.response does not answer"),
+        ("mc1231a set_pos.response", "pass --request HEX"),
+        ("mc1231a get_pos.response --request 02", "not the request of get_pos.response"),
         ("mc1231a get_pos.response --request ff", "--request ff"),
-        ("qlink motion --node 1 --request 00", "leave out --request"),
+        ("qlink motion --node 1 --request 00", "omit --request"),
         ("trio character_transfer --address 1 characters=\u00e4", "characters"),
     ],
 )
@@ -392,7 +392,7 @@ def test_wrong_values(qlinkgen: Run, command: str, said: str) -> None:
 def test_fields_that_the_codec_fills(qlinkgen: Run, thermo: Path) -> None:
     result = qlinkgen("encode", thermo, "get_log.response", "--node", "1", "count=2")
     assert result.code == 2
-    assert "'count' is filled by the encoder" in result.err
+    assert "'count' is filled in by the encoder" in result.err
 
 
 @pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])

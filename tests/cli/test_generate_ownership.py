@@ -1,4 +1,4 @@
-"""`qlinkgen generate` touches no file that it did not write, and leaves no trace of a run that was killed."""
+"""`qlinkgen generate` changes only files that it wrote, and leaves no trace of a killed run."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TARGETS = ("--target", "c", "--target", "python")
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Outputs that are made at once: what is in them does not matter here."""
+    """Outputs that are quick to make; their contents do not matter here."""
 
     def c(protocol: Protocol, options: Options) -> Outputs:
         return {f"c/{protocol.name}.h": "\n".join(banner(protocol))}
@@ -57,7 +57,7 @@ def outside(tmp_path: Path) -> Path:
 
 
 def tree(folder: Path) -> dict[str, object]:
-    """Everything below a folder: what it is, what is in it, and when it was written."""
+    """Everything below a folder: kind, contents and time of modification."""
 
     def state(path: Path) -> object:
         if path.is_symlink():
@@ -84,7 +84,7 @@ def link(target: str) -> Callable[[Path, Path], None]:
     return lambda place, outside: place.symlink_to(outside / target)
 
 
-#: What may be where a file should go.
+#: Obstacles at the path of an output.
 FOREIGN: dict[str, Callable[[Path, Path], None]] = {
     "no banner": text(b"int tank;\n"),
     "read-only": text(b"int tank;\n", 0o444),
@@ -306,7 +306,7 @@ def test_runs_at_once_do_not_lose_entries(out: Path, thermo: Path) -> None:
 
 
 class Killed(BaseException):
-    """The process is gone: nothing that would clean up works any more."""
+    """The process is killed: cleaning up fails too."""
 
 
 def at_step(

@@ -1,4 +1,4 @@
-"""`qlinkgen generate --package`: packages of a user's own, beside one another and beside qlinkgen."""
+"""`qlinkgen generate --package`: user packages next to one another and to qlinkgen."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def files(folder: Path) -> set[str]:
 
 
 def alone(code: str, folder: Path) -> str:
-    """What a program prints that has a folder on its path, and nothing of qlinkgen."""
+    """Return the output of a program that has a folder on its path, but not qlinkgen."""
     command = [sys.executable, "-I", "-S", "-c", f"import sys; sys.path.insert(0, {str(folder)!r})\n{code}"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -132,7 +132,7 @@ def test_a_protocol_cannot_have_the_name_of_a_bus_module(qlinkgen: Run, out: Pat
     other = renamed(thermo, "thermo_bus")
     for schemas in ((thermo, other), (other, thermo)):
         result = qlinkgen("generate", *schemas, *PYTHON, "-o", out)
-        assert (result.code, "would be made twice" in result.err, out.exists()) == (2, True, False)
+        assert (result.code, "is an output of" in result.err, out.exists()) == (2, True, False)
     for first, second in ((thermo, other), (other, thermo)):
         folder = out / first.stem
         assert qlinkgen("generate", first, *PYTHON, "-o", folder).code == 0

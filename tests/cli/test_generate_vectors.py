@@ -1,4 +1,4 @@
-"""`qlinkgen generate` holds the shipped schemas to the vectors that were worked out by hand."""
+"""`qlinkgen generate` checks the shipped schemas against the hand-written vectors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 
 @pytest.fixture
 def schemas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the shipped schemas, taken for the shipped ones."""
+    """A copy of the shipped schemas, used in their place."""
     folder = tmp_path / "schemas"
     shutil.copytree(REPOSITORY / "schemas", folder)
     for module in (hand_vectors, manifest):
@@ -26,7 +26,7 @@ def schemas(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def rows(schemas: Path, pattern: str, protocol: str = "qlink") -> list[int]:
-    """Lines on which entries begin whose text fits a pattern."""
+    """Line numbers of entries whose text matches a pattern."""
     text = (schemas / "vectors" / f"{protocol}.yaml").read_text()
     parts = re.split(r"(?m)^(?=  - (?:message|kind):)", text)
     lines, line = [], 1
@@ -44,13 +44,13 @@ def change(schemas: Path, old: str, new: str, protocol: str = "qlink") -> None:
     file.write_text(re.sub(old, new, text, count=1, flags=re.MULTILINE))
 
 
-def misfits(qlinkgen: Run, *schemas: Path) -> list[int]:
-    """The lines that are reported, all of one protocol's file."""
+def mismatches(qlinkgen: Run, *schemas: Path) -> list[int]:
+    """Line numbers of the reported mismatches, all in the file of one protocol."""
     result = qlinkgen("generate", *schemas, "--target", "c", "-o", "out")
     lines = result.err.splitlines()
     assert (result.code, Path("out").exists()) == (int(bool(lines)), not lines)
     name = schemas[-1].name
-    form = re.compile(rf"schemas/vectors/{name}:([0-9]+): this vector no longer fits: .+")
+    form = re.compile(rf"schemas/vectors/{name}:([0-9]+): this vector no longer matches: .+")
     found = [form.fullmatch(each) for each in lines]
     assert all(found), result.err
     return [int(each[1]) for each in found if each]
@@ -58,10 +58,10 @@ def misfits(qlinkgen: Run, *schemas: Path) -> list[int]:
 
 @pytest.mark.parametrize("name", ["qlink", "trio", "mc1231a"])
 def test_the_shipped_schemas_fit(qlinkgen: Run, schemas: Path, name: str) -> None:
-    assert misfits(qlinkgen, schemas / f"{name}.yaml") == []
+    assert mismatches(qlinkgen, schemas / f"{name}.yaml") == []
 
 
-#: An edit of qlink.yaml, and what the entries have in common that no longer fit.
+#: An edit of qlink.yaml, and a pattern of the entries that no longer match.
 EDITS = {
     "message renamed": (r"^  motion:", "  move:", r"message: motion\."),
     "field renamed": (r"node_number: {type: u8, range", "number: {type: u8, range", r"node_number: "),
@@ -83,7 +83,7 @@ EDITS = {
 def test_every_vector_that_no_longer_fits_is_named(qlinkgen: Run, schemas: Path, edit: str) -> None:
     old, new, pattern = EDITS[edit]
     change(schemas, old, new)
-    found, expected = misfits(qlinkgen, schemas / "qlink.yaml"), rows(schemas, pattern)
+    found, expected = mismatches(qlinkgen, schemas / "qlink.yaml"), rows(schemas, pattern)
     assert expected
     assert set(expected) <= set(found) <= set(rows(schemas, ""))
     assert found == sorted(set(found))
@@ -91,7 +91,7 @@ def test_every_vector_that_no_longer_fits_is_named(qlinkgen: Run, schemas: Path,
         assert found == expected
 
 
-def test_misfits_of_all_protocols_are_reported_together(qlinkgen: Run, schemas: Path) -> None:
+def test_mismatches_of_all_protocols_are_reported_together(qlinkgen: Run, schemas: Path) -> None:
     change(schemas, "A5 A5", "A5 A6")
     change(schemas, "^  set_pos:", "  set_position:", "mc1231a")
     files = [schemas / f"{name}.yaml" for name in ("qlink", "mc1231a", "trio")]

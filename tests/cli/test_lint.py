@@ -63,11 +63,11 @@ def test_a_file_that_is_not_there(qlinkgen: Run) -> None:
     for command in (("lint",), ("show",), ("generate",)):
         result = qlinkgen(*command, "qlnk")
         assert result.code == 2
-        assert result.err == "qlinkgen: error: there is no schema 'qlnk'; did you mean 'qlink'?\n"
+        assert result.err == "qlinkgen: error: unknown schema 'qlnk'; did you mean 'qlink'?\n"
 
 
 def test_a_folder(qlinkgen: Run, thermo: Path, tmp_path: Path) -> None:
-    """Every schema below, each named, and nothing else."""
+    """Checks and lists every schema below a folder, and no other file."""
     deep = tmp_path / "b" / "c"
     deep.mkdir(parents=True)
     (tmp_path / ".git").mkdir()
@@ -100,13 +100,13 @@ def test_a_folder_without_schemas(qlinkgen: Run, tmp_path: Path, content: str | 
         (tmp_path / "vectors.yaml").write_text(content)
     result = qlinkgen("lint", tmp_path)
     assert result.code == 2
-    assert f"there is no schema in {tmp_path}: no .yaml or .yml file in it has a key 'qlinkgen'" in result.err
+    assert f"no schema in {tmp_path}: none of its .yaml and .yml files has a key 'qlinkgen'" in result.err
 
 
 @pytest.mark.parametrize("kind", ["pipe", "socket", "device", "endless device", "folder"])
 @pytest.mark.parametrize("command", ["lint", "show", "encode", "decode", "explain", "generate", "send"])
 def test_what_is_not_a_regular_file(qlinkgen: Run, tmp_path: Path, command: str, kind: str) -> None:
-    """It is refused at once: a pipe without a writer would be waited for."""
+    """It is refused immediately: opening a pipe without a writer would block."""
     path = tmp_path / "bus.yaml"
     with contextlib.ExitStack() as opened:
         if kind == "pipe":
@@ -123,7 +123,7 @@ def test_what_is_not_a_regular_file(qlinkgen: Run, tmp_path: Path, command: str,
     assert result.code == 2
     said = result.out + result.err
     if command == "lint" and kind == "folder":
-        assert f"there is no schema in {path}" in said
+        assert f"no schema in {path}" in said
     elif kind == "socket":
         assert f"{path}:1:1: error[file-unreadable]: cannot read it: No such device or address" in said
     else:

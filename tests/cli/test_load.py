@@ -1,4 +1,4 @@
-"""`qlinkgen load`: a program arrives whole, once, or the message says how much of it has."""
+"""`qlinkgen load`: a program arrives complete and once, or the error states how much was acknowledged."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_silent_node(program: Path, qlinkgen: Run, on_line: OnLine) -> None:
 
 
 class Stubborn(VirtualNode):
-    """Takes some pieces and no more."""
+    """Accepts some pieces, then stops answering."""
 
     def node_program_load(
         self, request: qlink.NodeProgramLoadRequest, now: float
@@ -88,8 +88,8 @@ def test_ctrl_c_in_the_middle(program: Path) -> None:
             wait_for(lambda: node.statistics.requests > 6)
             code, out, err = end(process, signal.SIGINT)
         assert (code, out) == (130, "")
-        assert f"interrupted: node 3 has acknowledged 100 of {size(program)} bytes and holds a part" in err
-        assert "load it again, from the start" in err
+        assert f"interrupted: node 3 has acknowledged 100 of {size(program)} bytes and holds part" in err
+        assert "load it again" in err
         assert "Traceback" not in err
         done = call("send", running.path, "qlink", "motor_position", "--node", "3", *CALM)
         assert done.returncode == 0
@@ -105,7 +105,7 @@ def test_a_port_that_is_lost_in_the_middle(program: Path) -> None:
             out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out) == (1, b"")
     assert f"{running.path} was lost".encode() in err
-    assert f"node 3 has acknowledged 100 of {size(program)} bytes and holds a part".encode() in err
+    assert f"node 3 has acknowledged 100 of {size(program)} bytes and holds part".encode() in err
 
 
 def test_a_bar_on_a_terminal(program: Path) -> None:
@@ -141,10 +141,10 @@ def test_a_wrong_file_is_found_before_the_port_is_opened(
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (("--node", "17"), 2, "--node 17: no node; nodes are 1..16"),
-        (("--node", "x"), 2, "--node x: no node"),
+        (("--node", "17"), 2, "--node 17: not a node; nodes are 1..16"),
+        (("--node", "x"), 2, "--node x: not a node"),
         ((), 2, "Missing option '--node'"),
-        (("--node", "3", "--patience", "-1"), 2, "--patience -1: no number of seconds"),
+        (("--node", "3", "--patience", "-1"), 2, "--patience -1: not a number of seconds"),
         (("--node", "3"), 1, "there is no port '/dev/not-there'"),
     ],
 )

@@ -1,4 +1,4 @@
-"""`qlinkgen monitor`: who speaks on a bus that it only listens to."""
+"""`qlinkgen monitor`: prints requests and responses, and sends nothing."""
 
 from __future__ import annotations
 
@@ -63,7 +63,8 @@ def test_a_bus_on_which_others_talk(qlinkgen: Run) -> None:
         code, out, err = finish(monitor)
     assert code == 0
     assert (
-        err == "qlinkgen: 5 frames, 0 of them damaged; 0 requests not answered; 0 of 54 bytes in no frame\n"
+        err
+        == "qlinkgen: 5 frames, 0 of them damaged; 0 requests not answered; 0 of 54 bytes outside frames\n"
     )
     found = objects(out)
     assert records(found, "from", "to", "message", "node", "repeat", "late") == [
@@ -94,7 +95,7 @@ def test_what_others_say_is_not_disturbed() -> None:
 
 
 def heard(port: PtyPort, *pieces: bytes, options: tuple[str, ...] = ()) -> tuple[str, str]:
-    """What is printed when these are on a line, one after the other."""
+    """Return the output for these frames, in order."""
     with started("monitor", port.path, "--slack", "0.2", *options) as monitor:
         listening(monitor)
         out = ""
@@ -223,8 +224,8 @@ def test_seconds_end_it(qlinkgen: Run) -> None:
         result = qlinkgen("monitor", port.path, "--seconds", "0.05")
     assert (result.code, result.out) == (0, "")
     assert result.err.splitlines() == [
-        f"qlinkgen: listening to qlink on {port.path}; Ctrl-C ends it",
-        "qlinkgen: 0 frames, 0 of them damaged; 0 requests not answered; 0 of 0 bytes in no frame",
+        f"qlinkgen: listening to qlink on {port.path}; press Ctrl-C to stop",
+        "qlinkgen: 0 frames, 0 of them damaged; 0 requests not answered; 0 of 0 bytes outside frames",
     ]
 
 
@@ -275,11 +276,11 @@ def test_two_at_one_port() -> None:
     ("arguments", "code", "text"),
     [
         (("/dev/not-there",), 1, "there is no port '/dev/not-there'"),
-        (("x", "--protocol", "trio", "--slack", "1"), 2, "--slack goes with a bus with a master"),
+        (("x", "--protocol", "trio", "--slack", "1"), 2, "--slack requires a bus with a master"),
         (("x", "--protocol", "mc1231a"), 2, "`qlinkgen decode mc1231a --direction request --raw < x`"),
-        (("x", "--protocol", "nope"), 2, "there is no schema 'nope'"),
+        (("x", "--protocol", "nope"), 2, "unknown schema 'nope'"),
         (("x", "--count", "0"), 2, "--count"),
-        (("x", "--seconds", "soon"), 2, "--seconds soon: no number of seconds"),
+        (("x", "--seconds", "soon"), 2, "--seconds soon: not a number of seconds"),
     ],
 )
 def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str) -> None:

@@ -39,16 +39,16 @@ def test_as_processes(tmp_path: Path) -> None:
             mc.send(10, 1, 7, -0.25)
             mc.send(11, 2, 11)
             mc.print_(11, "HELLO", end="")
-            mc.send(13, 1, 0, 42)  # once round
+            mc.send(13, 1, 0, 42)  # once around the ring
             mc.wait_until(lambda: mc.vr[0] == 42, 60)
         code, out, err = end(process, signal.SIGTERM)
     assert (code, out) == (0, "")
     assert not os.path.lexists(link)
     assert "3 nodes of trio on" in err
-    assert "address 1, coordinator: 1 taken, 3 sent on, NETSTAT 0; VR(7) = -0.25\n" in err
-    assert "address 2, keypad: 2 taken, 1 sent on, NETSTAT 0; offset 2; it shows 'HELLO'\n" in err
-    assert "address 3, coordinator: 0 taken, 1 sent on, NETSTAT 0\n" in err
-    assert err.endswith("qlinkgen: 3 messages taken in all, 0 broken ones\n")
+    assert "address 1, coordinator: 1 taken, 3 forwarded, NETSTAT 0; VR(7) = -0.25\n" in err
+    assert "address 2, keypad: 2 taken, 1 forwarded, NETSTAT 0; offset 2; display 'HELLO'\n" in err
+    assert "address 3, coordinator: 0 taken, 1 forwarded, NETSTAT 0\n" in err
+    assert err.endswith("qlinkgen: total: 3 messages taken, 0 damaged\n")
 
 
 def send(qlinkgen: Run, path: str, *words: str) -> tuple[list[dict[str, object]], str]:
@@ -57,7 +57,7 @@ def send(qlinkgen: Run, path: str, *words: str) -> tuple[list[dict[str, object]]
     return objects(result.out), result.err
 
 
-#: What comes round ends it, however long that takes.
+#: The command ends when its own message returns.
 ROUND = ("--count", "1", "--seconds", "60")
 
 
@@ -68,18 +68,18 @@ def test_send_reaches_the_node(qlinkgen: Run) -> None:
             qlinkgen, running.path, "keypad_offset", "--address", "1", "offset=2", "--seconds", "0"
         ) == (
             [],
-            "qlinkgen: sent; meanwhile 0 messages for this place, 0 sent on; NETSTAT 0\n",
+            "qlinkgen: sent; 0 messages for this node, 0 forwarded; NETSTAT 0\n",
         )
         words = ("direct_variable_transfer", "--address", "2", "number=7", "value=-0.25", "--seconds", "0")
         send(qlinkgen, running.path, *words)
-        # It is behind the others on the ring: when it comes back, they have arrived.
+        # It follows the others on the ring: when it returns, they have arrived.
         found, err = send(
             qlinkgen, running.path, "character_transfer", "--address", "3", "characters=X Y", *ROUND
         )
     assert found == [{"message": "character_transfer", "address": 1, "fields": {"characters": "X Y"}}]
     assert err == (
-        "qlinkgen: sent, and it came round: 3 places on this ring; meanwhile 1 message for this place, "
-        "0 sent on; NETSTAT 0\n"
+        "qlinkgen: sent, and returned: 3 nodes on this ring; 1 message for this node, "
+        "0 forwarded; NETSTAT 0\n"
     )
     assert keypad.offset == 2
     assert coordinator.vr[7] == -0.25
@@ -91,7 +91,7 @@ def test_send_is_a_node_that_sends_on(qlinkgen: Run) -> None:
         words = ("character_transfer", "--address", "6", "characters=TWICE")
         found, err = send(qlinkgen, running.path, *words, *ROUND)
     assert records(found, "address") == [(1,)]
-    assert "3 places on this ring; meanwhile 1 message for this place, 1 sent on" in err
+    assert "3 nodes on this ring; 1 message for this node, 1 forwarded" in err
     assert first.link.counters.passed == 2
 
 
@@ -112,7 +112,7 @@ def test_send_as_a_process_among_others() -> None:
     assert (
         "qlinkgen: warning: damaged (frame): the end byte has another address than the header" in err.decode()
     )
-    assert err.decode().endswith("1 message for this place, 1 sent on; NETSTAT 8 (rx_frame)\n")
+    assert err.decode().endswith("1 message for this node, 1 forwarded; NETSTAT 8 (rx_frame)\n")
 
 
 def received(port: Port, size: int) -> bytes:
@@ -129,11 +129,11 @@ def test_ring_sends_on_and_prints() -> None:
     bad[2] ^= 1
     with open_pty() as port:
         with started("ring", port.path, "--count", "5") as node:
-            read_until(node.stderr, "a node of the ring")
+            read_until(node.stderr, "joined the ring")
             port.write(b"\x05" + HELLO.to_frame() + unknown + mine.to_frame() + bytes(bad))
             out, err = node.communicate(timeout=60)
         assert node.returncode == 0
-        # The broken one to this place is not sent on, nor is the byte outside.
+        # The broken message to this node is not forwarded, nor is the byte between messages.
         sent = received(port, len(HELLO.to_frame()) + len(unknown))
     told = [re.sub(" +", " ", line[14:]) for line in out.decode().splitlines()]
     assert told[:2] == [
@@ -141,19 +141,19 @@ def test_ring_sends_on_and_prints() -> None:
         'address 3 character_transfer characters="HELLO YOU\\r\\n"',
     ]
     assert told[2].startswith("? damaged (frame) no message has the number 7")
-    assert told[2].endswith("97 01 90 [sent on]")
+    assert told[2].endswith("97 01 90 [forwarded]")
     assert told[3] == "address 1, here direct_variable_transfer number=3 value=2"
     assert told[4].startswith("? damaged (crc) ")
     assert sent == bytes((0x91,)) + HELLO.to_frame()[1:-1] + bytes((0x90,)) + b"\x8f\x01\x88"
     assert err.decode().endswith(
-        "qlinkgen: 5 messages, 3 of them damaged; 2 sent on, 1 for this place, 2 broken on arrival; "
+        "qlinkgen: 5 messages, 3 of them damaged; 2 forwarded, 1 for this node, 2 broken on arrival; "
         "NETSTAT 12 (rx_crc, rx_frame)\n"
     )
 
 
 def test_ring_as_json() -> None:
     with open_pty() as port, started("ring", port.path, "--json", "--raw") as node:
-        read_until(node.stderr, "a node of the ring")
+        read_until(node.stderr, "joined the ring")
         port.write(HELLO.to_frame() + b"\x88")
         out = read_until(node.stdout, "error")
         code, rest, _ = end(node, signal.SIGINT)
@@ -177,15 +177,16 @@ def test_ring_ends_by_itself(qlinkgen: Run) -> None:
         result = qlinkgen("ring", port.path, "--seconds", "0.05")
     assert (result.code, result.out) == (0, "")
     first, last = result.err.splitlines()
-    assert first == f"qlinkgen: a node of the ring on {port.path}; Ctrl-C ends it"
+    assert first == f"qlinkgen: joined the ring on {port.path}; press Ctrl-C to stop"
     assert last == (
-        "qlinkgen: 0 messages, 0 of them damaged; 0 sent on, 0 for this place, 0 broken on arrival; NETSTAT 0"
+        "qlinkgen: 0 messages, 0 of them damaged; 0 forwarded, 0 for this node, 0 broken on arrival; "
+        "NETSTAT 0"
     )
 
 
 def test_a_port_that_goes_away() -> None:
     with open_pty() as port, started("ring", port.path) as node:
-        read_until(node.stderr, "a node of the ring")
+        read_until(node.stderr, "joined the ring")
         port.close()
         out, err = node.communicate(timeout=60)
     assert (node.returncode, out) == (1, b"")
@@ -197,9 +198,9 @@ def test_a_port_that_goes_away() -> None:
     ("arguments", "code", "text"),
     [
         (("/dev/not-there",), 1, "there is no port '/dev/not-there'"),
-        (("x", "--protocol", "qlink"), 2, "qlink is no ring; listen with `qlinkgen monitor PORT"),
+        (("x", "--protocol", "qlink"), 2, "qlink is not a ring; use `qlinkgen monitor PORT"),
         (("x", "--count", "0"), 2, "--count"),
-        (("x", "--seconds", "soon"), 2, "--seconds soon: no number of seconds"),
+        (("x", "--seconds", "soon"), 2, "--seconds soon: not a number of seconds"),
     ],
 )
 def test_errors(qlinkgen: Run, arguments: tuple[str, ...], code: int, text: str) -> None:

@@ -1,4 +1,4 @@
-"""`qlinkgen scan`: who is there."""
+"""`qlinkgen scan`: finds the nodes of a bus."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ def test_progress_on_a_terminal() -> None:
         (("/dev/null",), 1, "is no serial port"),
         (("nonsense://x",), 1, "nonsense://x"),
         (("x", "--nodes", "0-3"), 2, "nodes are 1..16"),
-        (("x", "--slack", "-1"), 2, "--slack -1: no number of seconds"),
-        (("x", "--slack", "nan"), 2, "--slack nan: no number of seconds"),
+        (("x", "--slack", "-1"), 2, "--slack -1: not a number of seconds"),
+        (("x", "--slack", "nan"), 2, "--slack nan: not a number of seconds"),
         (("x", "--set", "crc=nope"), 2, "unknown 16-bit CRC 'nope'"),
     ],
 )

@@ -27,7 +27,7 @@ SCHEMAS = REPOSITORY / "tests" / "schemas"
 
 @pytest.fixture
 def silent() -> Iterator[PtyPort]:
-    """A port at which nobody answers."""
+    """A port without a node."""
     with open_pty() as port:
         yield port
 
@@ -101,7 +101,7 @@ def test_what_must_not_be_repeated_is_sent_once(qlinkgen: Run, silent: PtyPort) 
 
 
 class Reciter:
-    """A station that has one answer to everything."""
+    """A station that answers every request with the same bytes."""
 
     def __init__(self, answer: bytes) -> None:
         self._answer = answer
@@ -143,11 +143,11 @@ def test_a_wrong_answer(qlinkgen: Run) -> None:
     with reciting(good[:-1] + bytes([good[-1] ^ 1])) as path:
         result = qlinkgen("send", path, *request)
         assert (result.code, result.out) == (1, "")
-        assert "what came was no answer (crc)" in result.err
+        assert "received only invalid replies (crc)" in result.err
     with reciting(qlink.MotorPositionResponse(node=5, position=1).to_frame()) as path:
         result = qlinkgen("send", path, *request)
         assert (result.code, result.out) == (1, "")
-        assert 'is no answer: {"message": "motor_position.response", "node": 5' in result.err
+        assert 'not the response: {"message": "motor_position.response", "node": 5' in result.err
 
 
 def test_a_refusal_of_the_schema_is_shown(qlinkgen: Run) -> None:
@@ -193,33 +193,36 @@ def test_two_commands_at_one_port(qlinkgen: Run) -> None:
     [
         (("qlink", "motion", "--node", "3", "counter=256"), "counter: 256 cannot be sent"),
         (("qlink", "motion", "--node", "17"), "node: 17 cannot be sent"),
-        (("qlink", "motion"), "does not say for whom"),
+        (("qlink", "motion"), "needs an address"),
         (("qlink", "motion", "--node", "0"), "motion cannot be broadcast"),
         (("qlink", "motion", "--node", "3", "nonsense=1"), "motion.request has no field 'nonsense'"),
         (("qlink", "moition", "--node", "3"), "did you mean motion"),
         (
             ("qlink", "motion.response", "--node", "3"),
-            "motion.response is what a node answers; send its request",
+            "motion.response is a response; send its request",
         ),
         (("qlink",), "Missing argument 'MESSAGE'"),
         (("qlink", "motor_position", "--node", "3", "--attempts", "0"), "--attempts"),
-        (("qlink", "motor_position", "--node", "3", "--slack", "inf"), "--slack inf: no number of seconds"),
+        (
+            ("qlink", "motor_position", "--node", "3", "--slack", "inf"),
+            "--slack inf: not a number of seconds",
+        ),
         (("qlink", "motor_position", "--node", "3", "--baud", "0"), "--baud"),
         (
             ("qlink", "motor_position", "--node", "3", "--axis", "1"),
-            "--axis goes with a host with one device",
+            "--axis requires a host with one device",
         ),
-        (("qlink", "motor_position", "--node", "3", "--seconds", "1"), "--seconds goes with a ring"),
-        (("trio", "keypad_mode", "--attempts", "2"), "trio is a ring: leave it out"),
-        (("trio", "keypad_mode", "mode=on_off"), "does not say for whom"),
+        (("qlink", "motor_position", "--node", "3", "--seconds", "1"), "--seconds requires a ring"),
+        (("trio", "keypad_mode", "--attempts", "2"), "trio is a ring: omit it"),
+        (("trio", "keypad_mode", "mode=on_off"), "needs an address"),
         (("trio", "keypad_mode", "--address", "16"), "address: 16 cannot be sent"),
         (("trio", "character_transfer", "--address", "1", "characters=é"), "character_transfer"),
-        (("mc1231a", "get_pos", "--node", "2"), "mc1231a has no address in its frame; leave out --node 2"),
-        (("mc1231a", "get_pos.response"), "get_pos.response is what a node answers"),
+        (("mc1231a", "get_pos", "--node", "2"), "mc1231a has no address in its frame; omit --node 2"),
+        (("mc1231a", "get_pos.response"), "get_pos.response is a response"),
         (("mc1231a", "get_pos", "--axis", "3"), "--axis"),
-        (("mc1231a", "get_pos", "--check"), "say which with --axis 1 or --axis 2"),
-        (("mc1231a", "get_vrsn", "--axis", "1"), "get_vrsn does not act on the current axis"),
-        (("mc1231a", "get_pos", "--echo", "none"), "--echo goes with a bus with a master"),
+        (("mc1231a", "get_pos", "--check"), "add --axis 1 or --axis 2"),
+        (("mc1231a", "get_vrsn", "--axis", "1"), "get_vrsn does not depend on the current axis"),
+        (("mc1231a", "get_pos", "--echo", "none"), "--echo requires a bus with a master"),
     ],
 )
 def test_what_cannot_be_sent_is_refused_first(
@@ -249,7 +252,7 @@ def test_a_message_that_nothing_answers(qlinkgen: Run, silent: PtyPort, path: Pa
     assert wire.code == 0, wire.err
     result = qlinkgen("send", silent.path, path, message, *node, "--baud", "9600")
     assert (result.code, result.out) == (0, "")
-    assert result.err.endswith(f"qlinkgen: {message} was sent; no answer is expected\n")
+    assert result.err.endswith(f"qlinkgen: {message} sent; it has no response\n")
     assert silent.read(PATIENCE).hex() == wire.out.strip()
 
 
@@ -262,7 +265,7 @@ def test_no_port(qlinkgen: Run) -> None:
 def test_a_schema_without_a_speed(qlinkgen: Run, thermo: Path, silent: PtyPort) -> None:
     result = qlinkgen("send", silent.path, thermo, "set_target", "--node", "3")
     assert result.code == 2
-    assert "the schema of thermo names no usual speed; give --baud N" in result.err
+    assert "the schema of thermo states no speed; add --baud N" in result.err
     with simulated(thermo, "--nodes", "3") as (path, _):
         result = qlinkgen("send", path, thermo, "get_log", "--node", "3", "first=0", "--baud", "9600", *CALM)
     assert result.code == 0

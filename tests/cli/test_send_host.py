@@ -38,8 +38,8 @@ def test_as_processes() -> None:
         code, out, err = end(process, signal.SIGTERM)
     assert (code, out) == (0, "")
     assert "an mc1231a chip set on" in err
-    assert "qlinkgen: axis 2 stands at 0, status 0x0300\n" in err
-    assert err.endswith("qlinkgen: 4 packets carried out, 0 illegal, 0 out of range\n")
+    assert "qlinkgen: axis 2: position 0, status 0x0300\n" in err
+    assert err.endswith("qlinkgen: 4 packets executed, 0 illegal, 0 out of range\n")
 
 
 def test_the_axis_is_chosen_before_where_one_is_given(qlinkgen: Run) -> None:
@@ -53,8 +53,8 @@ def test_the_axis_is_chosen_before_where_one_is_given(qlinkgen: Run) -> None:
 def test_without_checksum(qlinkgen: Run) -> None:
     with chip() as (path, _):
         written = send(qlinkgen, path, "set_acc", "value=0.5", "--axis", "1", "--checksum", "never")
-        assert (written.code, written.out) == (0, ""), "nobody has waited for an answer"
-        # The bytes that nobody waited for are still in the port, or on their way: they disturb nothing.
+        assert (written.code, written.out) == (0, ""), "the response is not awaited"
+        # The unread response is still in the port, or on the line: the next call discards it.
         read = send(qlinkgen, path, "get_acc", "--axis", "1")
     assert json.loads(read.out)["fields"] == {"value": 0.5}
 
@@ -78,10 +78,10 @@ def test_a_command_error(qlinkgen: Run) -> None:
             assert json.loads(result.out)["message"] == f"{words[0]}.response"
             assert "axis 2: command error, status 0x0380" in result.err
         assert send(qlinkgen, path, "multi_update", "axes=1", "--check").code == 0
-        assert send(qlinkgen, path, "update", "--axis", "2").code == 0, "nobody has asked"
+        assert send(qlinkgen, path, "update", "--axis", "2").code == 0, "without --check"
 
 
-def test_nobody_there(qlinkgen: Run) -> None:
+def test_a_missing_port(qlinkgen: Run) -> None:
     result = send(qlinkgen, "/dev/not-there", "get_pos")
     assert (result.code, result.out) == (1, "")
     assert "there is no port" in result.err

@@ -1,4 +1,4 @@
-"""`qlinkgen show`: what a person looks up in it is there, and a pipe gets it unfolded."""
+"""`qlinkgen show`: prints all facts of a protocol, and does not wrap lines in a pipe."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_bits_counts_and_steps_of_an_own_schema(qlinkgen: Run, thermo: Path) -> 
 
 
 def test_defaults_that_there_are(qlinkgen: Run, thermo: Path) -> None:
-    """A value that the caller has to give has no default, whatever vectors use in its place."""
+    """A required value has no default, although vectors use one."""
     fields = {
         "free": ("u8", "0"),
         "given": ("{type: u8, default: 7}", "7"),
@@ -136,7 +136,7 @@ def test_no_allowance_is_no_time(qlinkgen: Run, thermo: Path) -> None:
 
 @pytest.mark.parametrize("path", SCHEMAS, ids=lambda path: path.stem)
 def test_the_plan_of_everything(qlinkgen: Run, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It names every part and every step, and is the same each time."""
+    """It lists every part and every step, and is deterministic."""
     plan = plan_of(load(path))
     out = qlinkgen("show", path, "--plan").out
     assert out == qlinkgen("show", path, "--plan").out

@@ -1,4 +1,4 @@
-"""`qlinkgen simulate`: nodes on a port of their own, and how they are stopped."""
+"""`qlinkgen simulate`: nodes on a new port, and how to stop them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_the_first_line_and_the_end(tmp_path: Path, number: int) -> None:
         assert first == f'{{"port": "{path}"}}\n'
         assert os.readlink(link) == path  # noqa: PTH115
         told = read_until(process.stderr, "Ctrl-C")
-        assert told == f"qlinkgen: 16 nodes of qlink on {path}, linked as {link}; Ctrl-C ends it\n"
+        assert told == f"qlinkgen: 16 nodes of qlink on {path}, linked as {link}; press Ctrl-C to stop\n"
         code, out, err = end(process, number)
     assert (code, out) == (0, "")
     assert err == "qlinkgen: 0 answers to 0 requests, 0 broadcasts\n"
@@ -49,7 +49,7 @@ def test_the_first_line_and_the_end(tmp_path: Path, number: int) -> None:
 
 
 def test_ends_with_a_shell_that_ignores_ctrl_c(tmp_path: Path) -> None:
-    # A script starts its background programs so that Ctrl-C passes them by.
+    # Scripts start background programs with SIGINT ignored.
     script = 'trap "" INT; "$@" & echo $! >pid; wait $!; exit $?'
     command = ["bash", "-c", script, "bash", *COMMAND, "simulate", "qlink"]
     with subprocess.Popen(command, cwd=tmp_path, env=ENVIRONMENT, stdout=-1, stderr=-1, bufsize=0) as shell:
@@ -93,7 +93,7 @@ def test_faults_are_counted_and_the_seed_decides_them() -> None:
         )
         assert found, err
         answers, requests, faults, drops = map(int, found.groups())
-        # Who is kept waiting by the machine repeats as well; it does not change which answers are dropped.
+        # A busy machine causes repeats as well; they do not change which answers are dropped.
         assert answers <= requests
         assert faults == drops
         assert requests == total.requests
@@ -185,7 +185,7 @@ def test_frames_without_addresses(tmp_path: Path, qlinkgen: Run) -> None:
     assert qlinkgen("lint", file).code == 0
     refused = qlinkgen("simulate", file, "--nodes", "1")
     assert refused.code == 2
-    assert "have no address; leave out --nodes 1" in refused.err
+    assert "have no address; omit --nodes 1" in refused.err
     with simulated(file) as (path, _):
         done = qlinkgen("send", path, file, "get", *CALM)
     assert objects(done.out) == [{"message": "get.response", "fields": {"value": 0}}]
@@ -194,29 +194,29 @@ def test_frames_without_addresses(tmp_path: Path, qlinkgen: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("qlink", "--nodes", "0"), "--nodes 0: 0 cannot be; nodes are 1..16"),
-        (("qlink", "--nodes", "1-17"), "--nodes 1-17: 1-17 cannot be; nodes are 1..16"),
+        (("qlink", "--nodes", "0"), "--nodes 0: 0 is out of range; nodes are 1..16"),
+        (("qlink", "--nodes", "1-17"), "--nodes 1-17: 1-17 is out of range; nodes are 1..16"),
         (("qlink", "--nodes", "3-1"), "write 1-3"),
-        (("qlink", "--nodes", "1-3,2"), "node 2 stands there twice"),
-        (("qlink", "--nodes", "1,"), "'' is no node"),
-        (("qlink", "--nodes", "one"), "'one' is no node; write for example 3, 1-16 or 1,3,5-7"),
+        (("qlink", "--nodes", "1-3,2"), "duplicate node 2"),
+        (("qlink", "--nodes", "1,"), "'' is not a node"),
+        (("qlink", "--nodes", "one"), "'one' is not a node; write for example 3, 1-16 or 1,3,5-7"),
         (
             ("qlink", "--ring", "keypad"),
-            "--ring goes with a ring; qlink is a bus with a master: leave it out",
+            "--ring requires a ring; qlink is a bus with a master: omit it",
         ),
-        (("trio", "--nodes", "3"), "--nodes goes with a bus with a master; trio is a ring: leave it out"),
+        (("trio", "--nodes", "3"), "--nodes requires a bus with a master; trio is a ring: omit it"),
         (("trio", "--ring", "keybad"), "--ring keybad: there is no node of the kind 'keybad'"),
         (("trio", "--ring", ",".join(15 * ["keypad"])), "a ring has 15 at most"),
         (("trio", "--faults", "drop=1,to=master"), "a ring has neither master nor slaves"),
         (("trio", "--set", "crc=crc-99"), "unknown 16-bit CRC 'crc-99'"),
-        (("mc1231a", "--ring", "keypad"), "--ring goes with a ring; mc1231a has one host and one device"),
-        (("mc1231a", "--echo"), "--echo goes with a bus with a master"),
+        (("mc1231a", "--ring", "keypad"), "--ring requires a ring; mc1231a has one host and one device"),
+        (("mc1231a", "--echo"), "--echo requires a bus with a master"),
         (("qlink", "--faults", "dorp=1"), "did you mean drop?"),
         (("qlink", "--faults", "drop=2"), "a chance is a number from 0 to 1"),
         (("qlink", "--faults", "drop=0.1,seed=1", "--seed", "2"), "seed was given before"),
         (("qlink", "--baud", "0"), "--baud"),
         (("qlink", "--set", "crc=crc-99"), "unknown 16-bit CRC 'crc-99'"),
-        (("nothing",), "there is no schema 'nothing'"),
+        (("nothing",), "unknown schema 'nothing'"),
     ],
 )
 def test_wrong_usage(qlinkgen: Run, arguments: tuple[str, ...], text: str) -> None:

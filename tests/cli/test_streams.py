@@ -1,4 +1,4 @@
-"""Closed standard streams, encodings without the characters of a schema, and faults of qlinkgen itself."""
+"""Closed standard streams, encodings without the characters of a schema, and internal errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from qlinkgen.cli import COMMANDS, boundary, cli
 from tests.cli.conftest import THERMO, Run
 from tests.cli.test_boundary import COMMAND, ENVIRONMENT
 
-#: One run of each command that comes to its end by itself, and its exit code.
+#: One terminating run of each command, and its exit code.
 RUNS: dict[str, tuple[list[str], int]] = {
     "generate": (["--target", "vectors", "-o", "OUT", "thermo.yaml"], 0),
     "lint": (["qlink"], 0),
@@ -71,7 +71,7 @@ def test_reading_from_a_closed_stdin(
 ) -> None:
     monkeypatch.setattr(sys, "stdin", None)
     assert run_here(monkeypatch, "decode", "qlink") == 1
-    assert "no bytes came" in capsys.readouterr().err
+    assert "no input" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
@@ -112,7 +112,7 @@ def test_an_encoding_that_lacks_characters(
     monkeypatch.setattr(sys, "stderr", streams[1])
     code = run_here(monkeypatch, *arguments)
     if encoding == "ascii":
-        encoding = "utf-8"  # click takes ASCII for a locale that was never set
+        encoding = "utf-8"  # click treats ASCII as an unset locale
     out, err = (stream.buffer.getvalue().decode(encoding) for stream in streams)
     monkeypatch.undo()
     assert (code, err) == (0, "") or arguments[0] == "lint"
@@ -163,7 +163,7 @@ def test_a_fault_of_our_own_is_one_line(
         captured = capsys.readouterr()
         assert captured.out == ""
         *trace, line = captured.err.splitlines()
-        assert line.startswith(f"qlinkgen: error: a fault of qlinkgen itself ({type(error).__name__}")
+        assert line.startswith(f"qlinkgen: error: internal error ({type(error).__name__}")
         assert "please report it with" in line
         assert line.isprintable()
         assert bool(trace) is bool(debug)
@@ -178,7 +178,7 @@ def test_debug_changes_nothing_else(qlinkgen: Run, arguments: list[str]) -> None
 
 
 def test_nothing_follows_the_line_of_a_fault() -> None:
-    """Not even from the flush at the end of Python."""
+    """Not even from the flush at exit."""
     code = (
         "import sys; from qlinkgen.cli import boundary, cli, show\n"
         "def fail(**_):\n"

@@ -143,7 +143,7 @@ def bus(
     baud: int | None = None,
     faults: FaultPlan | None = None,
 ) -> Iterator[PtyBus]:
-    """The same line behind a pty, run by a thread."""
+    """The same line on a pty, run by a thread."""
     with PtyBus(line(*nodes, codec=codec, baud=baud, faults=faults)) as running:
         yield running
 

@@ -224,7 +224,7 @@ class Account:
                 )
 
     def _follow(self, faults: list[Injected], at: float) -> None:
-        """Every fault is counted: by a timeout, a stray, a damaged frame, or bytes in no frame."""
+        """Every fault is counted: by a timeout, a stray, a damaged frame, or bytes outside frames."""
         if not faults and not self._open:
             return
         now = self._trouble + self._counted_elsewhere()
@@ -245,7 +245,7 @@ class Account:
         self._open = still
 
     def _counted_elsewhere(self) -> int:
-        """What no event tells: bytes in no frame at the master, and what the nodes have counted."""
+        """What no event tells: bytes outside frames at the master, and what the nodes have counted."""
         nodes = sum(_repeated(each) for each in self._stations)
         return nodes + self._skipped()
 
@@ -308,7 +308,7 @@ class Account:
             ),
             Equation(
                 "bytes that the line brought to the master",
-                "bytes of answers, strays and damaged frames + bytes in no frame",
+                "bytes of answers, strays and damaged frames + bytes outside frames",
                 (self.heard, self.decoded + total.skipped),
                 self.inserted,
             ),

@@ -10,13 +10,13 @@ from tests.soak.bus_run import LATE, PTY_LATE, PTY_SLACK, SHARE, SLACK, Result
 
 _SEEN_AS = {
     "drop": "a timeout; of a request that nothing answers, not at all",
-    "flip": "a damaged frame, or bytes in no frame, and a timeout",
-    "truncate": "a damaged frame, or bytes in no frame, and a timeout",
+    "flip": "a damaged frame, or bytes outside frames, and a timeout",
+    "truncate": "a damaged frame, or bytes outside frames, and a timeout",
     "delay": "nothing: the answer is right and in time",
     "late": "a timeout, and a late stray while the line is watched",
     "duplicate": "a collision and a timeout, or a stray",
     "stray": "a stray, or a collision",
-    "noise": "bytes in no frame, or a damaged frame",
+    "noise": "bytes outside frames, or a damaged frame",
     "silent": "timeouts, one for each answer that was swallowed",
 }
 
@@ -133,7 +133,7 @@ What each row stands on:
 {faults}
 
 For each fault that was injected the soak waits for something to be counted, at the latest four transactions
-later: a timeout, a stray, a damaged frame, bytes in no frame, or a repeat that a node has recognised.
+later: a timeout, a stray, a damaged frame, bytes outside frames, or a repeat that a node has recognised.
 Exempt are `delay`, `late` where the answer of a node_program_load is still in time, and the loss of
 requests that nothing answers (node_start, node_stop, node_sync), which a master cannot notice. The other
 way round each timeout has to have a cause: a fault, a collision, a node that is not there or does not
