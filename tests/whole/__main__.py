@@ -59,6 +59,7 @@ class _Arguments:
     report: Path | None
     output: Path | None
     show: bool
+    stop: bool
     command: str
 
 
@@ -83,6 +84,9 @@ def main(words: Sequence[str] | None = None) -> int:
                 arguments.report.write_text("\n\n".join(different), "utf-8")
             if len(outcomes) % _STEP == 0:
                 print(f"{len(outcomes)} schemas, {time.monotonic() - begun:.0f} s", flush=True)
+            if arguments.stop and outcome.differences:
+                pool.shutdown(cancel_futures=True)
+                break
     seconds = time.monotonic() - begun
     print(summary(outcomes))
     print(f"{seconds:.0f} s")
@@ -166,14 +170,23 @@ def _parsed(words: Sequence[str] | None) -> _Arguments:
     )
     parser.add_argument("--uncompiled", action="store_true", help="leave out the compilers and the kit")
     parser.add_argument("--every", action="store_true", help="every compiler, standard and role")
-    parser.add_argument("--output", type=Path, help="page for the figures, if there are no differences")
+    parser.add_argument("--output", type=Path, help="page for the figures, unless there are differences")
     parser.add_argument("--report", type=Path, help="file for every difference with its schema")
     parser.add_argument("--show", action="store_true", help="print the schemas alone")
+    parser.add_argument("--stop", action="store_true", help="try no more seeds after a difference")
     given = parser.parse_args(words)
     effort = Effort(given.messages, given.streams, uncompiled=given.uncompiled, every=given.every)
     command = shlex.join(["python", "-m", "tests.whole", *(sys.argv[1:] if words is None else words)])
     return _Arguments(
-        given.seeds, given.jobs, given.names, effort, given.report, given.output, given.show, command
+        given.seeds,
+        given.jobs,
+        given.names,
+        effort,
+        given.report,
+        given.output,
+        given.show,
+        given.stop,
+        command,
     )
 
 
