@@ -11,7 +11,7 @@ TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py)))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast lint generate bench soak soak-schemas soak-frames clean
+.PHONY: help setup demo test test-fast lint generate bench soak soak-schemas soak-frames mutants clean
 
 help:  ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -76,6 +76,10 @@ soak-schemas: .venv/.dev  ## 1 000 random whole schemas through every target, gc
 
 soak-frames: .venv/.dev  ## A million mutated frames of each protocol through Python, C and interpreter; writes docs/soak-frames.md (20 minutes)
 	@$(BIN)/python -m tests.soak.frames --output docs/soak-frames.md
+
+mutants: .venv/.dev  ## 500 mutants of plan/ and model/ against the tests; writes docs/mutants.md (an hour)
+	@$(PIP) '.[mutants]'
+	@$(BIN)/python -m tests.mutants --output docs/mutants.md
 
 clean:  ## Remove everything that make and the tools made
 	rm -rf .venv build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

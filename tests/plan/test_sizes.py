@@ -47,7 +47,7 @@ def _longest(plan: Plan) -> int:
     sizes = range(message.payload.least, message.payload.most + 1)
     codec = Codec(plan)
     return max(
-        len(codec.seal("own", bytes((_MARK,)) * size, address))
+        len(codec.wrap("own", bytes((_MARK,)) * size, address))
         for size, address in itertools.product(sizes, addresses)
     )
 

@@ -19,7 +19,8 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from qlinkgen.plan import plan_of
+from qlinkgen.backends import python
+from qlinkgen.plan import Options, plan_of
 from qlinkgen.schema import find, load, shipped
 from tests.support.cdriver import Driver, build
 from tests.support.whole import chance
@@ -110,7 +111,7 @@ def run(trial: Trial) -> Tally:
         with Driver(build(protocol, folder, "gcc", ("-O1", "-std=c99"))) as driver:
             targets: list[Target] = [
                 InterpreterTarget(reference, plan_of(protocol)),
-                PythonTarget(reference, printed_codec(protocol, folder)),
+                PythonTarget(reference, printed_codec(python.generate(protocol, Options()), folder)),
                 CTarget(reference, driver),
             ]
             for message, wire, request in itertools.islice(mutated(reference, rng), trial.frames):

@@ -1,0 +1,112 @@
+"""Mutation testing of plan/ and model/: ``python -m tests.mutants [--number 500] [--output PAGE]``.
+
+cosmic-ray says where a module can be changed. 500 of these changes are drawn, and the stages of
+`tests.mutants.killing` run on each, in a copy of the tree, until one fails. A mutant that every stage passes
+needs a test, or a reason in `survivors.yaml`; one with neither ends the program with 1.
+
+Not drawn, because tests cannot or should not tell them from the original:
+
+- text that is not Python: `*` before keyword-only parameters and `|` of patterns are operators to cosmic-ray;
+- differences in annotations, docstrings or unions of types (`A | B`) alone, which only type checkers read;
+- `is` in place of `==` or the reverse, `is not` in place of `!=` or the reverse: both sides are enumerations,
+  None or small integers, which are the same object exactly where they are equal.
+
+The draw depends on the seed and, for each place, on its function and its line alone, so an edit changes the
+sample only where it changes code. Results are kept in build/mutants.jsonl; with ``--keep`` a mutant that an
+earlier run killed is not tried again, to try only the survivors after a new test.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import queue
+import shlex
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+
+from tests.mutants import drawing, killing, page
+from tests.mutants.drawing import Mutant
+from tests.mutants.killing import Result
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("qlinkgen/model", "qlinkgen/plan")
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Draw mutants and judge them as a command line asks."""
+    given = _parser().parse_args(words)
+    files = [path for name in PACKAGES for path in sorted((ROOT / name).glob("*.py"))]
+    places = list(drawing.candidates(ROOT, [str(path.relative_to(ROOT)) for path in files]))
+    mutants = drawing.draw(ROOT, places, given.number, given.seed)
+    print(f"{len(mutants)} of {len(places)} places drawn", flush=True)
+    given.results.parent.mkdir(parents=True, exist_ok=True)
+    results = {each.id: each for each in _killed(given.results)} if given.keep else {}
+    with given.results.open("a" if given.keep else "w", encoding="utf-8") as file:
+        left = [each for each in mutants if each.id not in results]
+        for mutant, result in zip(left, _judged(left, given.jobs), strict=True):
+            results[result.id] = result
+            print(json.dumps(asdict(result)), file=file, flush=True)
+            print(_line(mutant, result), flush=True)
+    command = shlex.join(["python", "-m", "tests.mutants", *(sys.argv[1:] if words is None else words)])
+    run = page.Run(command, given.seed, len(places), mutants, results)
+    known = page.reasons()
+    if given.output:
+        given.output.write_text(page.text(run, known), "utf-8")
+    unexplained = [each for each in run.survivors if page.reason_of(each, known) == page.UNEXPLAINED]
+    print(f"{len(run.survivors)} of {len(mutants)} survive, {len(unexplained)} without a known reason")
+    return int(bool(unexplained))
+
+
+def _killed(path: Path) -> Iterator[Result]:
+    for line in path.read_text("utf-8").splitlines() if path.exists() else ():
+        result = Result(**json.loads(line))
+        if result.stage:
+            yield result
+
+
+def _judged(mutants: Sequence[Mutant], jobs: int) -> Iterator[Result]:
+    """The results of mutants in their order, each job in a copy of its own."""
+    with tempfile.TemporaryDirectory() as base, ThreadPoolExecutor(jobs) as pool:
+        folders: queue.SimpleQueue[Path] = queue.SimpleQueue()
+        first, *others = [killing.copied(ROOT, Path(base, str(number))) for number in range(jobs)]
+        stages = killing.fit(first)
+        for folder in (first, *others):
+            folders.put(folder)
+
+        def judge(mutant: Mutant) -> Result:
+            folder = folders.get()
+            try:
+                return killing.judged(folder, stages, mutant)
+            finally:
+                folders.put(folder)
+
+        yield from pool.map(judge, mutants)
+        killing.check(first, stages)
+
+
+def _line(mutant: Mutant, result: Result) -> str:
+    verdict = f"killed by {result.stage}" if result.stage else "SURVIVES"
+    late = " (endless)" if result.late else ""
+    return f"{mutant.module}:{mutant.line}: {mutant.was} -> {mutant.now}: {verdict}{late}, {result.seconds} s"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.mutants", description="Mutation testing of plan/ and model/."
+    )
+    parser.add_argument("--number", type=int, default=500, help="mutants to draw (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=1, help="of the draw (default: %(default)s)")
+    parser.add_argument("--jobs", type=int, default=1, help="mutants at a time (default: %(default)s)")
+    parser.add_argument("--keep", action="store_true", help="try only what an earlier run did not kill")
+    parser.add_argument("--results", type=Path, default=ROOT / "build/mutants.jsonl", metavar="FILE")
+    parser.add_argument("--output", type=Path, metavar="PAGE", help="page for the figures")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
