@@ -575,7 +575,8 @@ static inline int qlink_scan_(
     size_t at = 0U;
     size_t total = 5U;
     size_t payload = 0U;
-    bool inserted = false; /* the next byte must be an inserted one */
+    uint8_t byte = 0U;
+    bool inserted; /* an inserted byte may follow */
     const uint8_t *end;
     uint16_t value = qlink_check_start();
 
@@ -595,26 +596,17 @@ static inline int qlink_scan_(
         return QLINK_ERROR_FRAME;
     }
     while (at < total) {
-        uint8_t byte;
         if (from == size) {
             *used = size + 1U;
             return QLINK_ERROR_TRUNCATED;
         }
         byte = wire[from];
         ++from;
-        if (inserted) {
-            if (byte != 0x00U) {
-                return (byte == 0xA5U) ? QLINK_ERROR_TRUNCATED : QLINK_ERROR_STUFFING;
-            }
-            inserted = false;
-            continue;
-        }
         body[at] = byte;
         if (at < (total - 2U)) {
             value = qlink_check_update(value, byte);
         }
         ++at;
-        inserted = byte == 0xA5U;
         if (at == 1U) {
             if ((body[0] < 4U) || (body[0] > 30U)) {
                 return QLINK_ERROR_LENGTH;
@@ -622,7 +614,19 @@ static inline int qlink_scan_(
             payload = (size_t)(body[0] - 4U);
             total = payload + 5U;
         }
+        if ((byte == 0xA5U) && (at < total)) {
+            if (from == size) {
+                *used = size + 1U;
+                return QLINK_ERROR_TRUNCATED;
+            }
+            byte = wire[from];
+            if (byte != 0x00U) {
+                return (byte == 0xA5U) ? QLINK_ERROR_TRUNCATED : QLINK_ERROR_STUFFING;
+            }
+            ++from;
+        }
     }
+    inserted = (byte == 0xA5U);
     *used = from;
     end = &body[total - 2U];
     if (whole && (from != size) && !(inserted && ((from + 1U) == size) && (wire[from] == 0x00U))) {

@@ -54,7 +54,7 @@ def test_check_values(form: str, tmp_path: Path, require_tool: Callable[..., str
         done = compiled(tmp_path, compiler, macro(algorithm), form)
         if form == "TABLE" and (algorithm.poly, algorithm.refin) != (GENERATED.poly, GENERATED.refin):
             assert done.returncode != 0
-            assert "choose QLINK_CRC_FORM_NIBBLE, or generate with --set crc=NAME" in done.stderr
+            assert "select QLINK_CRC_FORM_NIBBLE, or generate with --set crc=NAME" in done.stderr
             continue
         assert done.returncode == 0, done.stderr
         assert run(tmp_path / "check") == f"{algorithm.check:04x}", algorithm.name

@@ -31,10 +31,10 @@ CORPUS = Path(__file__).parents[1] / "c" / "corpus"
 EVERY_EDGE = ("-fsanitize-coverage=no-prune",)
 #: What gcov tells apart and the fuzzer does not: a Trio header of a known message for no node, and an MC1231A
 #: packet with a byte too much. And what a mistake may let in: a Q.link length that is beyond the longest, and
-#: as many bytes.
+#: as many bytes; a Q.link frame that ends before an inserted byte.
 KEPT = {
     "receiver": ("01000181", "000000a5a540" + 70 * "11"),
-    "decoders": ("0201000100",),
+    "decoders": ("0201000100", "000100a5a504a5"),
     "dispatch": (),
 }
 _ROOT = Path(__file__).parents[2]
