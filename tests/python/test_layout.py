@@ -120,6 +120,10 @@ def test_statements_are_split_as_ruff_splits_them(statement: str, tmp_path: Path
 
 
 def test_text_is_left_alone() -> None:
-    word = "x" * 100
-    source = f'"""{word}"""\n\nA = 1  # {word}\nB = (1, "{word}")\n'
-    assert fitted(source) == source.replace(f'(1, "{word}")', f'(\n    1,\n    "{word}",\n)')
+    word = "f(1,2)=" + "x" * 100
+    top = f'"""Title.\n\n{word}\n"""\n\nA = 1  # {word}\n# {word}\n\n\n'
+    left = f'{top}def f():\n    """{word}\n\n    {word}\n    """\n'
+    assert fitted(left) == left
+    split = f'    return (\n        1,\n        "{word}",\n    )\n'
+    assert fitted(f'{left}    return (1, "{word}")\n') == left + split
+    assert fitted(f'"""{word}"""\nB = 1\n') == f'"""{word}"""\nB = 1\n'

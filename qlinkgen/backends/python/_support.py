@@ -10,9 +10,7 @@ from _operator import index  # built in; `operator` is loaded from a file
 from binascii import crc_hqx
 from struct import error as struct_error
 
-TYPE_CHECKING = (
-    False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
-)
+TYPE_CHECKING = False  # as typing.TYPE_CHECKING; importing `typing` costs 5 ms
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from typing import Any, ClassVar, Literal, TypeVar
@@ -844,9 +842,7 @@ def crc(
 ) -> Checksum:
     """A CRC with the parameters of the catalogue."""
     if (width, poly, refin, refout, xorout) == (16, 0x1021, False, False, 0):
-        return Checksum(
-            name, crc_hqx, init
-        )  # in the standard library, 20 times faster
+        return Checksum(name, crc_hqx, init)  # in the standard library, 20 times faster
     if refin:
         return Checksum(
             name, _reflected_crc(width, poly, refout, xorout), _reflect(init, width)

@@ -78,13 +78,27 @@ Node = Word | Group
 def fitted(source: str) -> str:
     """The source of a module with its long statements split."""
     lines = source.split("\n")
-    if all(len(line) <= WIDTH for line in lines):
-        return source
-    for statement in reversed(list(_statements(source))):
-        first, last = statement[0].start[0] - 1, statement[-1].end[0]
-        if any(len(line) > WIDTH for line in lines[first:last]):
-            lines[first:last] = _split(_nodes(statement), statement[0].start[1])
+    for begin, end in reversed(_blocks(lines)):
+        for statement in reversed(list(_statements("\n".join([*lines[begin:end], ""])))):
+            first, last = begin + statement[0].start[0] - 1, begin + statement[-1].end[0]
+            if any(len(line) > WIDTH for line in lines[first:last]):
+                lines[first:last] = _split(_nodes(statement), statement[0].start[1])
     return "\n".join(lines)
+
+
+def _blocks(lines: Sequence[str]) -> list[tuple[int, int]]:
+    """Outermost statements with a long line, as ranges of lines: few, and all that is read by token."""
+    # Of all texts only the docstring of the module has lines that begin as statements do.
+    body = 0
+    if lines[0].startswith('"""'):
+        body = next(at for at, line in enumerate(lines) if line.endswith('"""')) + 1
+    starts = [at for at in range(body, len(lines)) if lines[at][:1] not in ("", *" )]}#")]
+    ends = [*starts[1:], len(lines)]
+    return [
+        (begin, end)
+        for begin, end in zip(starts, ends, strict=True)
+        if any(len(line) > WIDTH for line in lines[begin:end])
+    ]
 
 
 def _statements(source: str) -> Iterator[list[TokenInfo]]:
