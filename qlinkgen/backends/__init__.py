@@ -1,1 +1,1 @@
-"""Back-ends: each turns the model into the texts of one target, independent of the others."""
+"""Back-ends: each generates the output of one target, independently of the others."""

@@ -1,6 +1,6 @@
-"""Text in C source: every text of a schema is quoted here, for the targets `c` and `conformance`.
+"""Quotes all schema text in C source, for the targets `c` and `conformance`.
 
-Texts appear in block comments alone. String literals hold names, which need no quoting.
+Text appears only in block comments. String literals contain names, which need no quoting.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import textwrap
 
 from qlinkgen.model.texts import one_line
 
-#: Characters that open or close a comment together with the next one, or begin a trigraph.
+#: First characters of comment delimiters and trigraphs.
 _JOINED = re.compile(r"\*(?=/)|/(?=\*)|\?(?=\?[=/'()!<>-])")
 
 
 def comment_line(text: str) -> str:
-    """Text for one line of a block comment; what would end the comment or splice its lines is broken up."""
+    """Text for one line of a block comment; a space breaks up comment delimiters and trigraphs."""
     return _JOINED.sub(r"\g<0> ", one_line(text))
 
 
 def comment(text: str, width: int, *, break_on_hyphens: bool = True) -> list[str]:
-    """Text for the lines of a block comment, each of at most ``width`` characters."""
+    """Text for a block comment, in lines of at most ``width`` characters."""
     return textwrap.wrap(comment_line(text), width, break_on_hyphens=break_on_hyphens)

@@ -1,7 +1,7 @@
-"""Text in Python source: every text of a schema is quoted here, for the targets `python` and `construct`.
+"""Quotes all schema text in Python source, for the targets `python` and `construct`.
 
-Nothing else may place free text in Python: what is returned is a literal, a docstring or comments, whatever
-the text holds. A literal and a docstring have the value of the text.
+No other module may insert free text into Python. Any text results in a literal, a docstring or comments. The
+value of a literal or docstring equals the text.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ def _in_literal(character: str, quote: str) -> str:
 
 
 def numbers(text: str) -> str:
-    """A string literal of seven-bit text that spells each character as its number."""
+    """A string literal of seven-bit text with every character escaped."""
     return '"' + "".join(map(escaped, text)) + '"'
 
 
 def docstring(lines: Iterable[str]) -> list[str]:
-    """Lines as a docstring; where there are several, the closing quotes get a line of their own."""
+    """Lines as a docstring; after several lines the closing quotes have their own line."""
     first, *others = map(_in_docstring, lines)
     return [f'"""{first}', *others, '"""'] if others else [f'"""{first}"""']
 
 
 def _in_docstring(line: str) -> str:
-    # Backslashes come first: those of the escapes below have a meaning.
+    # Backslashes first, since the escapes below contain backslashes.
     doubled = visible(line.replace("\\", "\\\\"))
     return _QUOTES.sub(lambda found: found[0].replace('"', '\\"'), doubled)
 
 
 def comment(text: str, width: int) -> list[str]:
-    """The text of comments of at most ``width`` characters each, without their marks."""
+    """Text for comments, in lines of at most ``width`` characters without the comment sign."""
     return textwrap.wrap(one_line(text), width)

@@ -42,7 +42,7 @@ class GenericNode:
         }
 
     def handle(self, request: Framed, now: float) -> Message | None:  # noqa: ARG002  # what stations are asked
-        """Return the response to a request; None where the command has none, or where it is no command."""
+        """Return the response to a request; None if the command has none or is unknown."""
         self.requests += 1
         command = self._commands.get(type(request))
         if command is None or command.response is None:

@@ -277,7 +277,7 @@ __all__ = [
 class OutputMode(OpenEnum):
     """Form of the motor output (Host commands).
 
-    Numbers without a name are kept as they are.
+    Numbers without a name are preserved.
     """
 
     PWM: ClassVar[OutputMode] = named(0)
@@ -291,7 +291,7 @@ class AxisStatus:
     Bits 0-7 and 11 are events that stay set until they are cleared, bits 8-10 are
     levels; bits 12-15 were not found in a source and are kept as received (Axis
     status).
-    Masks. Other bits are kept as they are.
+    Masks. Other bits are preserved.
     """
 
     MOTION_COMPLETE: Final = 0x0001
@@ -313,7 +313,7 @@ class AxisStatus:
 class EventMask:
     """Events of the axis status word (Interrupts).
 
-    Masks. Other bits are kept as they are.
+    Masks. Other bits are preserved.
     """
 
     MOTION_COMPLETE: Final = 0x0001
@@ -330,7 +330,7 @@ class EventMask:
 class Axes:
     """Axes of the chip set (Axis addressing).
 
-    Masks. Other bits are kept as they are.
+    Masks. Other bits are preserved.
     """
 
     AXIS_1: Final = 0x0001
@@ -340,7 +340,7 @@ class Axes:
 class LimitSwitches:
     """Limit inputs, two bits for each axis (Host commands).
 
-    Masks. Other bits are kept as they are.
+    Masks. Other bits are preserved.
     """
 
     AXIS_1_POSITIVE: Final = 0x0001
@@ -443,7 +443,7 @@ class _EmptyRequest(Request):
         pass
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         return b""
 
     @classmethod
@@ -472,7 +472,7 @@ class _StatusU16Response(Response):
         self.status = status
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_STATUS_U16_RESPONSE(self.status)
         except REFUSALS:
@@ -497,7 +497,7 @@ class _EmptyResponse(Response):
         pass
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         return b""
 
     @classmethod
@@ -526,7 +526,7 @@ class _ValueI32Response(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_VALUE_I32_RESPONSE(self.value)
         except REFUSALS:
@@ -557,7 +557,7 @@ class _ValueU16Request(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not 0 <= self.value <= 32767:
                 raise OutOfRange
@@ -593,7 +593,7 @@ class _ValueU16Response(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_VALUE_U16_RESPONSE(self.value)
         except REFUSALS:
@@ -787,7 +787,7 @@ class SetPosRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not -1073741824 <= self.value <= 1073741823:
                 raise OutOfRange
@@ -841,7 +841,7 @@ class SetVelRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_VELOCITY.raw(self.value)
             return _PACK_SET_VEL_REQUEST(value_raw)
@@ -892,7 +892,7 @@ class SetAccRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_ACCELERATION_LIMIT.raw(self.value)
             return _PACK_SET_ACC_REQUEST(value_raw)
@@ -945,7 +945,7 @@ class SetMaxAccRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_PEAK_ACCELERATION.raw(self.value)
             return _PACK_SET_MAX_ACC_REQUEST(value_raw)
@@ -996,7 +996,7 @@ class SetJerkRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_JERK.raw(self.value)
             return _PACK_SET_JERK_REQUEST(value_raw)
@@ -1028,7 +1028,7 @@ _UNPACK_SET_RATIO_REQUEST = Struct(">i").unpack
 class SetRatioRequest(Request):
     """Load electronic gear ratio: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Electronic gear ratio; -32768.0..32767.99998474121 in steps of 1/65536.
@@ -1048,7 +1048,7 @@ class SetRatioRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_GEAR_RATIO.raw(self.value)
             return _PACK_SET_RATIO_REQUEST(value_raw)
@@ -1066,7 +1066,7 @@ class SetRatioRequest(Request):
 class SetRatioResponse(_EmptyResponse):
     """Load electronic gear ratio: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1151,7 +1151,7 @@ class SynchPrflResponse(_EmptyResponse):
 class GetPosRequest(_EmptyRequest):
     """Read back buffered destination position: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1164,7 +1164,7 @@ class GetPosRequest(_EmptyRequest):
 class GetPosResponse(_ValueI32Response):
     """Read back buffered destination position: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Buffered destination position; -2147483648..2147483647 counts.
@@ -1180,7 +1180,7 @@ class GetPosResponse(_ValueI32Response):
 class GetVelRequest(_EmptyRequest):
     """Read back buffered velocity: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1197,7 +1197,7 @@ _UNPACK_GET_VEL_RESPONSE = Struct(">I").unpack
 class GetVelResponse(Response):
     """Read back buffered velocity: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Buffered velocity; 0.0..65535.99998474121 counts/sample in steps of
@@ -1218,7 +1218,7 @@ class GetVelResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_VELOCITY.raw(self.value)
             return _PACK_GET_VEL_RESPONSE(value_raw)
@@ -1236,7 +1236,7 @@ class GetVelResponse(Response):
 class GetAccRequest(_EmptyRequest):
     """Read back buffered acceleration: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1253,7 +1253,7 @@ _UNPACK_GET_ACC_RESPONSE = Struct(">i").unpack
 class GetAccResponse(Response):
     """Read back buffered acceleration: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Acceleration; unsigned in trapezoidal mode, signed in velocity mode;
@@ -1274,7 +1274,7 @@ class GetAccResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_ACCELERATION.raw(self.value)
             return _PACK_GET_ACC_RESPONSE(value_raw)
@@ -1325,7 +1325,7 @@ class GetMaxAccResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_PEAK_ACCELERATION.raw(self.value)
             return _PACK_GET_MAX_ACC_RESPONSE(value_raw)
@@ -1376,7 +1376,7 @@ class GetJerkResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_JERK.raw(self.value)
             return _PACK_GET_JERK_RESPONSE(value_raw)
@@ -1426,7 +1426,7 @@ class GetRatioResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_GEAR_RATIO.raw(self.value)
             return _PACK_GET_RATIO_RESPONSE(value_raw)
@@ -1468,7 +1468,7 @@ class GetTrgtPosResponse(_ValueI32Response):
 class GetTrgtVelRequest(_EmptyRequest):
     """Read instantaneous profile target velocity: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1485,7 +1485,7 @@ _UNPACK_GET_TRGT_VEL_RESPONSE = Struct(">i").unpack
 class GetTrgtVelResponse(Response):
     """Read instantaneous profile target velocity: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Profile target velocity; -32768.0..32767.99998474121 counts/sample in
@@ -1506,7 +1506,7 @@ class GetTrgtVelResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             value_raw = _SCALE_SIGNED_VELOCITY.raw(self.value)
             return _PACK_GET_TRGT_VEL_RESPONSE(value_raw)
@@ -1596,7 +1596,7 @@ class SetKiResponse(_EmptyResponse):
 class SetKvffRequest(_ValueU16Request):
     """Load velocity feed-forward gain: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Velocity feed-forward gain; 0..32767.
@@ -1612,7 +1612,7 @@ class SetKvffRequest(_ValueU16Request):
 class SetKvffResponse(_EmptyResponse):
     """Load velocity feed-forward gain: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1699,7 +1699,7 @@ class SetMtrBiasRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not -32767 <= self.value <= 32767:
                 raise OutOfRange
@@ -1732,7 +1732,7 @@ class SetMtrBiasResponse(_EmptyResponse):
 class SetPosErrRequest(_ValueU16Request):
     """Set position-error limit that raises motion error: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Position-error limit that raises motion error; 0..32767.
@@ -1748,7 +1748,7 @@ class SetPosErrRequest(_ValueU16Request):
 class SetPosErrResponse(_EmptyResponse):
     """Set position-error limit that raises motion error: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1761,7 +1761,7 @@ class SetPosErrResponse(_EmptyResponse):
 class GetKpRequest(_EmptyRequest):
     """Read back buffered proportional gain: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1774,7 +1774,7 @@ class GetKpRequest(_EmptyRequest):
 class GetKpResponse(_ValueU16Response):
     """Read back buffered proportional gain: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Buffered proportional gain; 0..65535.
@@ -1790,7 +1790,7 @@ class GetKpResponse(_ValueU16Response):
 class GetKdRequest(_EmptyRequest):
     """Read back buffered derivative gain: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -1803,7 +1803,7 @@ class GetKdRequest(_EmptyRequest):
 class GetKdResponse(_ValueU16Response):
     """Read back buffered derivative gain: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Buffered derivative gain; 0..65535.
@@ -1923,7 +1923,7 @@ class GetMtrLmtResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not 0 <= self.value <= 32767:
                 raise OutOfRange
@@ -1976,7 +1976,7 @@ class GetMtrBiasResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not -32767 <= self.value <= 32767:
                 raise OutOfRange
@@ -1997,7 +1997,7 @@ class GetMtrBiasResponse(Response):
 class GetPosErrRequest(_EmptyRequest):
     """Read back position-error limit: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2010,7 +2010,7 @@ class GetPosErrRequest(_EmptyRequest):
 class GetPosErrResponse(_ValueU16Response):
     """Read back position-error limit: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Position-error limit; 0..65535.
@@ -2026,7 +2026,7 @@ class GetPosErrResponse(_ValueU16Response):
 class GetIntgrRequest(_EmptyRequest):
     """Read the accumulated integral term: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2043,7 +2043,7 @@ _UNPACK_GET_INTGR_RESPONSE = Struct(">h").unpack
 class GetIntgrResponse(Response):
     """Read the accumulated integral term: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Accumulated integral; its scaling was not found; -32768..32767.
@@ -2063,7 +2063,7 @@ class GetIntgrResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_INTGR_RESPONSE(self.value)
         except REFUSALS:
@@ -2079,7 +2079,7 @@ class GetIntgrResponse(Response):
 class GetActlPosErrRequest(_EmptyRequest):
     """Read instantaneous position error: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2096,7 +2096,7 @@ _UNPACK_GET_ACTL_POS_ERR_RESPONSE = Struct(">h").unpack
 class GetActlPosErrResponse(Response):
     """Read instantaneous position error: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Position error; -32768..32767 counts.
@@ -2116,7 +2116,7 @@ class GetActlPosErrResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_ACTL_POS_ERR_RESPONSE(self.value)
         except REFUSALS:
@@ -2152,7 +2152,7 @@ class SetAutoStopOnResponse(_EmptyResponse):
 class SetAutoStopOffRequest(_EmptyRequest):
     """Keep motor on after motion error: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2165,7 +2165,7 @@ class SetAutoStopOffRequest(_EmptyRequest):
 class SetAutoStopOffResponse(_EmptyResponse):
     """Keep motor on after motion error: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2178,7 +2178,7 @@ class SetAutoStopOffResponse(_EmptyResponse):
 class SetTimeBrkRequest(_EmptyRequest):
     """Arm time breakpoint: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2191,7 +2191,7 @@ class SetTimeBrkRequest(_EmptyRequest):
 class SetTimeBrkResponse(_EmptyResponse):
     """Arm time breakpoint: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2205,7 +2205,7 @@ class SetPosBrkRequest(_EmptyRequest):
     """Arm breakpoint on target position reached going positive: request (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2219,7 +2219,7 @@ class SetPosBrkResponse(_EmptyResponse):
     """Arm breakpoint on target position reached going positive: response (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2233,7 +2233,7 @@ class SetNegBrkRequest(_EmptyRequest):
     """Arm breakpoint on target position reached going negative: request (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2247,7 +2247,7 @@ class SetNegBrkResponse(_EmptyResponse):
     """Arm breakpoint on target position reached going negative: response (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2261,7 +2261,7 @@ class SetActlPosBrkRequest(_EmptyRequest):
     """Arm breakpoint on actual position reached going positive: request (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2275,7 +2275,7 @@ class SetActlPosBrkResponse(_EmptyResponse):
     """Arm breakpoint on actual position reached going positive: response (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2289,7 +2289,7 @@ class SetActlNegBrkRequest(_EmptyRequest):
     """Arm breakpoint on actual position reached going negative: request (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2303,7 +2303,7 @@ class SetActlNegBrkResponse(_EmptyResponse):
     """Arm breakpoint on actual position reached going negative: response (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2317,7 +2317,7 @@ class SetMtnCmpltBrkRequest(_EmptyRequest):
     """Arm breakpoint on motion complete, without a compare value: request (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2331,7 +2331,7 @@ class SetMtnCmpltBrkResponse(_EmptyResponse):
     """Arm breakpoint on motion complete, without a compare value: response (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2345,7 +2345,7 @@ class SetExtBrkRequest(_EmptyRequest):
     """Arm breakpoint on an external signal, without a compare value: request (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2359,7 +2359,7 @@ class SetExtBrkResponse(_EmptyResponse):
     """Arm breakpoint on an external signal, without a compare value: response (Host
     commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2414,7 +2414,7 @@ class SetBrkPntRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_SET_BRK_PNT_REQUEST(self.value)
         except REFUSALS:
@@ -2483,7 +2483,7 @@ class MultiUpdateRequest(Request):
         self.axes = axes
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_MULTI_UPDATE_REQUEST(self.axes)
         except REFUSALS:
@@ -2529,7 +2529,7 @@ class SetAutoUpdateOnResponse(_EmptyResponse):
 class SetAutoUpdateOffRequest(_EmptyRequest):
     """Stop breakpoints from causing an update: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2542,7 +2542,7 @@ class SetAutoUpdateOffRequest(_EmptyRequest):
 class SetAutoUpdateOffResponse(_EmptyResponse):
     """Stop breakpoints from causing an update: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2587,7 +2587,7 @@ class GetBrkPntResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_BRK_PNT_RESPONSE(self.value)
         except REFUSALS:
@@ -2626,7 +2626,7 @@ class SetIntrptMaskRequest(Request):
         self.mask = mask
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_SET_INTRPT_MASK_REQUEST(self.mask)
         except REFUSALS:
@@ -2699,7 +2699,7 @@ class RstIntrptRequest(Request):
         self.mask = mask
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_RST_INTRPT_REQUEST(self.mask)
         except REFUSALS:
@@ -2759,7 +2759,7 @@ class GetIntrptMaskResponse(Response):
         self.mask = mask
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_INTRPT_MASK_RESPONSE(self.mask)
         except REFUSALS:
@@ -2799,7 +2799,7 @@ _UNPACK_RST_STATUS_REQUEST = Struct(">H").unpack
 class RstStatusRequest(Request):
     """Clear chosen event bits: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         mask: Events to keep: 0 clears one; masks of EventMask.
@@ -2819,7 +2819,7 @@ class RstStatusRequest(Request):
         self.mask = mask
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_RST_STATUS_REQUEST(self.mask)
         except REFUSALS:
@@ -2835,7 +2835,7 @@ class RstStatusRequest(Request):
 class RstStatusResponse(_EmptyResponse):
     """Clear chosen event bits: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2872,7 +2872,7 @@ class GetStatusResponse(_StatusU16Response):
 class GetModeRequest(_EmptyRequest):
     """Read profile and breakpoint mode flags: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2885,7 +2885,7 @@ class GetModeRequest(_EmptyRequest):
 class GetModeResponse(_ValueU16Response):
     """Read profile and breakpoint mode flags: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Mode bits; their layout was not found; 0..65535.
@@ -2901,7 +2901,7 @@ class GetModeResponse(_ValueU16Response):
 class SetCaptIndexRequest(_EmptyRequest):
     """Capture position on index pulse: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -2914,7 +2914,7 @@ class SetCaptIndexRequest(_EmptyRequest):
 class SetCaptIndexResponse(_EmptyResponse):
     """Capture position on index pulse: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3031,7 +3031,7 @@ class MtrOnResponse(_EmptyResponse):
 class MtrOffRequest(_EmptyRequest):
     """Open the loop: manual motor command drives the motor: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3044,7 +3044,7 @@ class MtrOffRequest(_EmptyRequest):
 class MtrOffResponse(_EmptyResponse):
     """Open the loop: manual motor command drives the motor: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3079,7 +3079,7 @@ class SetMtrCmdRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not -32767 <= self.value <= 32767:
                 raise OutOfRange
@@ -3142,7 +3142,7 @@ class GetMtrCmdResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not -32767 <= self.value <= 32767:
                 raise OutOfRange
@@ -3168,7 +3168,7 @@ class SetBufMtrCmdRequest(Request):
     """Load the buffered motor command, also the drive level of algorithmic phase
     initialisation: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: The buffered motor command; -32767..32767.
@@ -3188,7 +3188,7 @@ class SetBufMtrCmdRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not -32767 <= self.value <= 32767:
                 raise OutOfRange
@@ -3210,7 +3210,7 @@ class SetBufMtrCmdResponse(_EmptyResponse):
     """Load the buffered motor command, also the drive level of algorithmic phase
     initialisation: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3255,7 +3255,7 @@ class GetBufMtrCmdResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_BUF_MTR_CMD_RESPONSE(self.value)
         except REFUSALS:
@@ -3303,7 +3303,7 @@ class GetOutputModeResponse(Response):
         self.mode = mode
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_OUTPUT_MODE_RESPONSE(self.mode)
         except REFUSALS:
@@ -3383,7 +3383,7 @@ class SetActlPosRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not -1073741824 <= self.value <= 1073741823:
                 raise OutOfRange
@@ -3444,7 +3444,7 @@ _UNPACK_SET_LMT_SENSE_REQUEST = Struct(">H").unpack
 class SetLmtSenseRequest(Request):
     """Set active level of limit inputs: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Active level of each limit input, laid out as in get_lmt_swtch, as
@@ -3465,7 +3465,7 @@ class SetLmtSenseRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_SET_LMT_SENSE_REQUEST(self.value)
         except REFUSALS:
@@ -3481,7 +3481,7 @@ class SetLmtSenseRequest(Request):
 class SetLmtSenseResponse(_EmptyResponse):
     """Set active level of limit inputs: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3526,7 +3526,7 @@ class GetLmtSwtchResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_LMT_SWTCH_RESPONSE(self.value)
         except REFUSALS:
@@ -3542,7 +3542,7 @@ class GetLmtSwtchResponse(Response):
 class LmtsOnRequest(_EmptyRequest):
     """Enable limit-switch handling: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3555,7 +3555,7 @@ class LmtsOnRequest(_EmptyRequest):
 class LmtsOnResponse(_EmptyResponse):
     """Enable limit-switch handling: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3568,7 +3568,7 @@ class LmtsOnResponse(_EmptyResponse):
 class LmtsOffRequest(_EmptyRequest):
     """Disable limit-switch handling: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3581,7 +3581,7 @@ class LmtsOffRequest(_EmptyRequest):
 class LmtsOffResponse(_EmptyResponse):
     """Disable limit-switch handling: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3594,7 +3594,7 @@ class LmtsOffResponse(_EmptyResponse):
 class GetHomeRequest(_EmptyRequest):
     """Read home inputs: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3607,7 +3607,7 @@ class GetHomeRequest(_EmptyRequest):
 class GetHomeResponse(_ValueU16Response):
     """Read home inputs: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: One bit for each axis, as inferred; 0..65535.
@@ -3627,7 +3627,7 @@ _UNPACK_SET_SMPL_TIME_REQUEST = Struct(">H").unpack
 class SetSmplTimeRequest(Request):
     """Set servo loop time: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Servo loop time; its unit was not found; 0..65535.
@@ -3647,7 +3647,7 @@ class SetSmplTimeRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_SET_SMPL_TIME_REQUEST(self.value)
         except REFUSALS:
@@ -3663,7 +3663,7 @@ class SetSmplTimeRequest(Request):
 class SetSmplTimeResponse(_EmptyResponse):
     """Set servo loop time: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3676,7 +3676,7 @@ class SetSmplTimeResponse(_EmptyResponse):
 class GetSmplTimeRequest(_EmptyRequest):
     """Read servo loop time: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3689,7 +3689,7 @@ class GetSmplTimeRequest(_EmptyRequest):
 class GetSmplTimeResponse(_ValueU16Response):
     """Read servo loop time: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Servo loop time; its unit was not found; 0..65535.
@@ -3725,7 +3725,7 @@ class ResetResponse(_EmptyResponse):
 class GetVrsnRequest(_EmptyRequest):
     """Read product and software version: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3738,7 +3738,7 @@ class GetVrsnRequest(_EmptyRequest):
 class GetVrsnResponse(_ValueU16Response):
     """Read product and software version: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Packed version; its layout was not found; 0..65535.
@@ -3754,7 +3754,7 @@ class GetVrsnResponse(_ValueU16Response):
 class GetTimeRequest(_EmptyRequest):
     """Read cycle counter since reset: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3771,7 +3771,7 @@ _UNPACK_GET_TIME_RESPONSE = Struct(">I").unpack
 class GetTimeResponse(Response):
     """Read cycle counter since reset: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Cycle counter since reset; 0..4294967295 cycles.
@@ -3791,7 +3791,7 @@ class GetTimeResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_TIME_RESPONSE(self.value)
         except REFUSALS:
@@ -3811,7 +3811,7 @@ _UNPACK_SET_PHASE_CNTS_REQUEST = Struct(">H").unpack
 class SetPhaseCntsRequest(Request):
     """Set counts per electrical cycle: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Encoder counts of an electrical cycle; 129..65535 counts.
@@ -3831,7 +3831,7 @@ class SetPhaseCntsRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             if not 129 <= self.value <= 65535:
                 raise OutOfRange
@@ -3852,7 +3852,7 @@ class SetPhaseCntsRequest(Request):
 class SetPhaseCntsResponse(_EmptyResponse):
     """Set counts per electrical cycle: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3869,7 +3869,7 @@ _UNPACK_SET_PHASE_OFFSET_REQUEST = Struct(">H").unpack
 class SetPhaseOffsetRequest(Request):
     """Set the phase offset from the index pulse: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Phase offset from the index pulse; 0..65535 counts.
@@ -3889,7 +3889,7 @@ class SetPhaseOffsetRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_SET_PHASE_OFFSET_REQUEST(self.value)
         except REFUSALS:
@@ -3905,7 +3905,7 @@ class SetPhaseOffsetRequest(Request):
 class SetPhaseOffsetResponse(_EmptyResponse):
     """Set the phase offset from the index pulse: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3922,7 +3922,7 @@ _UNPACK_SET_PHASE_TIME_REQUEST = Struct(">H").unpack
 class SetPhaseTimeRequest(Request):
     """Set duration of algorithmic phase initialisation: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Duration of algorithmic phase initialisation; 0..65535 samples.
@@ -3942,7 +3942,7 @@ class SetPhaseTimeRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_SET_PHASE_TIME_REQUEST(self.value)
         except REFUSALS:
@@ -3958,7 +3958,7 @@ class SetPhaseTimeRequest(Request):
 class SetPhaseTimeResponse(_EmptyResponse):
     """Set duration of algorithmic phase initialisation: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -3975,7 +3975,7 @@ _UNPACK_SET_PHASE_REQUEST = Struct(">H").unpack
 class SetPhaseRequest(Request):
     """Set phase angle directly: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Phase angle; encoder counts assumed; 0..65535 counts.
@@ -3995,7 +3995,7 @@ class SetPhaseRequest(Request):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_SET_PHASE_REQUEST(self.value)
         except REFUSALS:
@@ -4011,7 +4011,7 @@ class SetPhaseRequest(Request):
 class SetPhaseResponse(_EmptyResponse):
     """Set phase angle directly: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -4024,7 +4024,7 @@ class SetPhaseResponse(_EmptyResponse):
 class InitPhaseRequest(_EmptyRequest):
     """Start phase initialisation (algorithmic or Hall): request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -4037,7 +4037,7 @@ class InitPhaseRequest(_EmptyRequest):
 class InitPhaseResponse(_EmptyResponse):
     """Start phase initialisation (algorithmic or Hall): response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -4107,7 +4107,7 @@ class GetPhaseCntsResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_PHASE_CNTS_RESPONSE(self.value)
         except REFUSALS:
@@ -4155,7 +4155,7 @@ class GetPhaseTimeResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_PHASE_TIME_RESPONSE(self.value)
         except REFUSALS:
@@ -4171,7 +4171,7 @@ class GetPhaseTimeResponse(Response):
 class GetPhaseOffsetRequest(_EmptyRequest):
     """Read back phase offset: request (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
     """
 
     __slots__ = ()
@@ -4188,7 +4188,7 @@ _UNPACK_GET_PHASE_OFFSET_RESPONSE = Struct(">H").unpack
 class GetPhaseOffsetResponse(Response):
     """Read back phase offset: response (Host commands).
 
-    UNCONFIRMED: the source is weak; check at the device before trusting it.
+    UNCONFIRMED: the source is weak; check it on the device.
 
     Attributes:
         value: Phase offset; 0..65535 counts.
@@ -4208,7 +4208,7 @@ class GetPhaseOffsetResponse(Response):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             return _PACK_GET_PHASE_OFFSET_RESPONSE(self.value)
         except REFUSALS:

@@ -229,7 +229,7 @@ __all__ = [
 class HostCalls:
     """The calls of a host, a method for each command.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
     """
 
     __slots__ = ()
@@ -271,7 +271,7 @@ class HostCalls:
         """Select S-curve point-to-point profiling (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetPrflSCrvRequest()
         return self.ask(_request, SetPrflSCrvResponse, axis)
@@ -280,7 +280,7 @@ class HostCalls:
         """Select trapezoidal point-to-point profiling (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetPrflTrapRequest()
         return self.ask(_request, SetPrflTrapResponse, axis)
@@ -289,7 +289,7 @@ class HostCalls:
         """Select velocity-contouring profiling (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetPrflVelRequest()
         return self.ask(_request, SetPrflVelResponse, axis)
@@ -298,7 +298,7 @@ class HostCalls:
         """Select electronic-gear profiling (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetPrflGearRequest()
         return self.ask(_request, SetPrflGearResponse, axis)
@@ -309,7 +309,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Destination position; -1073741824..1073741823 counts; UNCONFIRMED:
                 check at the device.
         """
@@ -322,7 +322,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Velocity limit of the move; 0.0..65535.99998474121 counts/sample in
                 steps of 1/65536.
         """
@@ -335,7 +335,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Acceleration; unsigned in trapezoidal mode, signed in velocity mode;
                 -16384.0..16383.999984741211 counts/sample^2 in steps of 1/65536.
         """
@@ -348,7 +348,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Peak acceleration (S-curve mode); 0.0..0.9999847412109375
                 counts/sample^2 in steps of 1/65536.
         """
@@ -361,7 +361,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Jerk (S-curve mode); 0.0..0.9999999997671694 counts/sample^3 in steps
                 of 1/4294967296.
         """
@@ -371,12 +371,12 @@ class HostCalls:
     def set_ratio(self, axis: int, *, value: float = 0.0) -> SetRatioResponse:
         """Load electronic gear ratio (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Electronic gear ratio; -32768.0..32767.99998474121 in steps of
                 1/65536.
         """
@@ -390,7 +390,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = StopRequest()
         return self.ask(_request, StopResponse, axis)
@@ -402,7 +402,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SmoothStopRequest()
         return self.ask(_request, SmoothStopResponse, axis)
@@ -413,7 +413,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SynchPrflRequest()
         return self.ask(_request, SynchPrflResponse, axis)
@@ -421,10 +421,10 @@ class HostCalls:
     def get_pos(self, axis: int) -> GetPosResponse:
         """Read back buffered destination position (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetPosRequest()
         return self.ask(_request, GetPosResponse, axis)
@@ -432,10 +432,10 @@ class HostCalls:
     def get_vel(self, axis: int) -> GetVelResponse:
         """Read back buffered velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetVelRequest()
         return self.ask(_request, GetVelResponse, axis)
@@ -443,10 +443,10 @@ class HostCalls:
     def get_acc(self, axis: int) -> GetAccResponse:
         """Read back buffered acceleration (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetAccRequest()
         return self.ask(_request, GetAccResponse, axis)
@@ -455,7 +455,7 @@ class HostCalls:
         """Read back buffered S-curve acceleration (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetMaxAccRequest()
         return self.ask(_request, GetMaxAccResponse, axis)
@@ -464,7 +464,7 @@ class HostCalls:
         """Read back buffered jerk (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetJerkRequest()
         return self.ask(_request, GetJerkResponse, axis)
@@ -473,7 +473,7 @@ class HostCalls:
         """Read back buffered gear ratio (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetRatioRequest()
         return self.ask(_request, GetRatioResponse, axis)
@@ -482,7 +482,7 @@ class HostCalls:
         """Read instantaneous profile target position (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetTrgtPosRequest()
         return self.ask(_request, GetTrgtPosResponse, axis)
@@ -490,10 +490,10 @@ class HostCalls:
     def get_trgt_vel(self, axis: int) -> GetTrgtVelResponse:
         """Read instantaneous profile target velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetTrgtVelRequest()
         return self.ask(_request, GetTrgtVelResponse, axis)
@@ -504,7 +504,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Proportional gain; 0..32767.
         """
         _request = SetKpRequest(value=value)
@@ -516,7 +516,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Derivative gain; 0..32767.
         """
         _request = SetKdRequest(value=value)
@@ -528,7 +528,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Integral gain; 0..32767.
         """
         _request = SetKiRequest(value=value)
@@ -537,12 +537,12 @@ class HostCalls:
     def set_kvff(self, axis: int, *, value: int = 0) -> SetKvffResponse:
         """Load velocity feed-forward gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Velocity feed-forward gain; 0..32767.
         """
         _request = SetKvffRequest(value=value)
@@ -554,7 +554,7 @@ class HostCalls:
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Integration limit; 0..32767.
         """
         _request = SetILmRequest(value=value)
@@ -565,7 +565,7 @@ class HostCalls:
         (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Ceiling of the filter output; 0..32767.
         """
         _request = SetMtrLmtRequest(value=value)
@@ -576,7 +576,7 @@ class HostCalls:
         commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: DC offset added to the filter output; -32767..32767.
         """
         _request = SetMtrBiasRequest(value=value)
@@ -585,10 +585,10 @@ class HostCalls:
     def set_pos_err(self, axis: int, *, value: int = 0) -> SetPosErrResponse:
         """Set position-error limit that raises motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Position-error limit that raises motion error; 0..32767.
         """
         _request = SetPosErrRequest(value=value)
@@ -597,10 +597,10 @@ class HostCalls:
     def get_kp(self, axis: int) -> GetKpResponse:
         """Read back buffered proportional gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetKpRequest()
         return self.ask(_request, GetKpResponse, axis)
@@ -608,10 +608,10 @@ class HostCalls:
     def get_kd(self, axis: int) -> GetKdResponse:
         """Read back buffered derivative gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetKdRequest()
         return self.ask(_request, GetKdResponse, axis)
@@ -620,7 +620,7 @@ class HostCalls:
         """Read back buffered integral gain (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetKiRequest()
         return self.ask(_request, GetKiResponse, axis)
@@ -629,7 +629,7 @@ class HostCalls:
         """Read back buffered velocity feed-forward gain (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetKvffRequest()
         return self.ask(_request, GetKvffResponse, axis)
@@ -638,7 +638,7 @@ class HostCalls:
         """Read back buffered integration limit (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetILmRequest()
         return self.ask(_request, GetILmResponse, axis)
@@ -647,7 +647,7 @@ class HostCalls:
         """Read back filter output ceiling (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetMtrLmtRequest()
         return self.ask(_request, GetMtrLmtResponse, axis)
@@ -656,7 +656,7 @@ class HostCalls:
         """Read back filter DC offset (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetMtrBiasRequest()
         return self.ask(_request, GetMtrBiasResponse, axis)
@@ -664,10 +664,10 @@ class HostCalls:
     def get_pos_err(self, axis: int) -> GetPosErrResponse:
         """Read back position-error limit (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetPosErrRequest()
         return self.ask(_request, GetPosErrResponse, axis)
@@ -675,10 +675,10 @@ class HostCalls:
     def get_intgr(self, axis: int) -> GetIntgrResponse:
         """Read the accumulated integral term (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetIntgrRequest()
         return self.ask(_request, GetIntgrResponse, axis)
@@ -686,10 +686,10 @@ class HostCalls:
     def get_actl_pos_err(self, axis: int) -> GetActlPosErrResponse:
         """Read instantaneous position error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetActlPosErrRequest()
         return self.ask(_request, GetActlPosErrResponse, axis)
@@ -698,7 +698,7 @@ class HostCalls:
         """Turn motor off automatically on motion error (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetAutoStopOnRequest()
         return self.ask(_request, SetAutoStopOnResponse, axis)
@@ -706,10 +706,10 @@ class HostCalls:
     def set_auto_stop_off(self, axis: int) -> SetAutoStopOffResponse:
         """Keep motor on after motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetAutoStopOffRequest()
         return self.ask(_request, SetAutoStopOffResponse, axis)
@@ -717,10 +717,10 @@ class HostCalls:
     def set_time_brk(self, axis: int) -> SetTimeBrkResponse:
         """Arm time breakpoint (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetTimeBrkRequest()
         return self.ask(_request, SetTimeBrkResponse, axis)
@@ -728,10 +728,10 @@ class HostCalls:
     def set_pos_brk(self, axis: int) -> SetPosBrkResponse:
         """Arm breakpoint on target position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetPosBrkRequest()
         return self.ask(_request, SetPosBrkResponse, axis)
@@ -739,10 +739,10 @@ class HostCalls:
     def set_neg_brk(self, axis: int) -> SetNegBrkResponse:
         """Arm breakpoint on target position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetNegBrkRequest()
         return self.ask(_request, SetNegBrkResponse, axis)
@@ -750,10 +750,10 @@ class HostCalls:
     def set_actl_pos_brk(self, axis: int) -> SetActlPosBrkResponse:
         """Arm breakpoint on actual position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetActlPosBrkRequest()
         return self.ask(_request, SetActlPosBrkResponse, axis)
@@ -761,10 +761,10 @@ class HostCalls:
     def set_actl_neg_brk(self, axis: int) -> SetActlNegBrkResponse:
         """Arm breakpoint on actual position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetActlNegBrkRequest()
         return self.ask(_request, SetActlNegBrkResponse, axis)
@@ -772,10 +772,10 @@ class HostCalls:
     def set_mtn_cmplt_brk(self, axis: int) -> SetMtnCmpltBrkResponse:
         """Arm breakpoint on motion complete, without a compare value (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetMtnCmpltBrkRequest()
         return self.ask(_request, SetMtnCmpltBrkResponse, axis)
@@ -784,10 +784,10 @@ class HostCalls:
         """Arm breakpoint on an external signal, without a compare value (Host
         commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetExtBrkRequest()
         return self.ask(_request, SetExtBrkResponse, axis)
@@ -796,7 +796,7 @@ class HostCalls:
         """Disarm any pending breakpoint (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetBrkOffRequest()
         return self.ask(_request, SetBrkOffResponse, axis)
@@ -805,7 +805,7 @@ class HostCalls:
         """Load breakpoint compare value (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Cycles for a time breakpoint, else counts; -2147483648..2147483647.
         """
         _request = SetBrkPntRequest(value=value)
@@ -815,7 +815,7 @@ class HostCalls:
         """Make all buffered values active now (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = UpdateRequest()
         return self.ask(_request, UpdateResponse, axis)
@@ -836,7 +836,7 @@ class HostCalls:
         """Let breakpoints cause an update (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetAutoUpdateOnRequest()
         return self.ask(_request, SetAutoUpdateOnResponse, axis)
@@ -844,10 +844,10 @@ class HostCalls:
     def set_auto_update_off(self, axis: int) -> SetAutoUpdateOffResponse:
         """Stop breakpoints from causing an update (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetAutoUpdateOffRequest()
         return self.ask(_request, SetAutoUpdateOffResponse, axis)
@@ -856,7 +856,7 @@ class HostCalls:
         """Read back breakpoint compare value (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetBrkPntRequest()
         return self.ask(_request, GetBrkPntResponse, axis)
@@ -865,7 +865,7 @@ class HostCalls:
         """Choose which events raise the host interrupt (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             mask: Events that may interrupt: 1 lets one through; masks of EventMask;
                 UNCONFIRMED: check at the device.
         """
@@ -896,7 +896,7 @@ class HostCalls:
         """Read back interrupt mask (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetIntrptMaskRequest()
         return self.ask(_request, GetIntrptMaskResponse, axis)
@@ -905,7 +905,7 @@ class HostCalls:
         """Clear all event bits of the status word (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = ClrStatusRequest()
         return self.ask(_request, ClrStatusResponse, axis)
@@ -913,10 +913,10 @@ class HostCalls:
     def rst_status(self, axis: int, *, mask: int = 0) -> RstStatusResponse:
         """Clear chosen event bits (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             mask: Events to keep: 0 clears one; masks of EventMask.
         """
         _request = RstStatusRequest(mask=mask)
@@ -926,7 +926,7 @@ class HostCalls:
         """Read the axis status word (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetStatusRequest()
         return self.ask(_request, GetStatusResponse, axis)
@@ -934,10 +934,10 @@ class HostCalls:
     def get_mode(self, axis: int) -> GetModeResponse:
         """Read profile and breakpoint mode flags (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetModeRequest()
         return self.ask(_request, GetModeResponse, axis)
@@ -945,10 +945,10 @@ class HostCalls:
     def set_capt_index(self, axis: int) -> SetCaptIndexResponse:
         """Capture position on index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetCaptIndexRequest()
         return self.ask(_request, SetCaptIndexResponse, axis)
@@ -957,7 +957,7 @@ class HostCalls:
         """Capture position on home signal (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = SetCaptHomeRequest()
         return self.ask(_request, SetCaptHomeResponse, axis)
@@ -966,7 +966,7 @@ class HostCalls:
         """Read captured position and re-arm capture (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetCaptRequest()
         return self.ask(_request, GetCaptResponse, axis)
@@ -991,7 +991,7 @@ class HostCalls:
         """Close the loop: filter drives the motor (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = MtrOnRequest()
         return self.ask(_request, MtrOnResponse, axis)
@@ -999,10 +999,10 @@ class HostCalls:
     def mtr_off(self, axis: int) -> MtrOffResponse:
         """Open the loop: manual motor command drives the motor (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = MtrOffRequest()
         return self.ask(_request, MtrOffResponse, axis)
@@ -1011,7 +1011,7 @@ class HostCalls:
         """Write manual motor command (open loop only) (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Manual motor command (open loop only); -32767..32767.
         """
         _request = SetMtrCmdRequest(value=value)
@@ -1021,7 +1021,7 @@ class HostCalls:
         """Read motor command now being output (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetMtrCmdRequest()
         return self.ask(_request, GetMtrCmdResponse, axis)
@@ -1030,12 +1030,12 @@ class HostCalls:
         """Load the buffered motor command, also the drive level of algorithmic phase
         initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: The buffered motor command; -32767..32767.
         """
         _request = SetBufMtrCmdRequest(value=value)
@@ -1045,7 +1045,7 @@ class HostCalls:
         """Read back buffered motor command (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetBufMtrCmdRequest()
         return self.ask(_request, GetBufMtrCmdResponse, axis)
@@ -1062,7 +1062,7 @@ class HostCalls:
         """Enable servicing of the axis (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = AxisOnRequest()
         return self.ask(_request, AxisOnResponse, axis)
@@ -1071,7 +1071,7 @@ class HostCalls:
         """Disable servicing of the axis (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = AxisOffRequest()
         return self.ask(_request, AxisOffResponse, axis)
@@ -1081,7 +1081,7 @@ class HostCalls:
         effect at once (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: The actual position; -1073741824..1073741823 counts.
         """
         _request = SetActlPosRequest(value=value)
@@ -1091,7 +1091,7 @@ class HostCalls:
         """Read actual position (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetActlPosRequest()
         return self.ask(_request, GetActlPosResponse, axis)
@@ -1099,7 +1099,7 @@ class HostCalls:
     def set_lmt_sense(self, *, value: int = 0) -> SetLmtSenseResponse:
         """Set active level of limit inputs (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
 
@@ -1121,12 +1121,12 @@ class HostCalls:
     def lmts_on(self, axis: int) -> LmtsOnResponse:
         """Enable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = LmtsOnRequest()
         return self.ask(_request, LmtsOnResponse, axis)
@@ -1134,12 +1134,12 @@ class HostCalls:
     def lmts_off(self, axis: int) -> LmtsOffResponse:
         """Disable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = LmtsOffRequest()
         return self.ask(_request, LmtsOffResponse, axis)
@@ -1147,7 +1147,7 @@ class HostCalls:
     def get_home(self) -> GetHomeResponse:
         """Read home inputs (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -1157,7 +1157,7 @@ class HostCalls:
     def set_smpl_time(self, *, value: int = 0) -> SetSmplTimeResponse:
         """Set servo loop time (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
 
@@ -1170,7 +1170,7 @@ class HostCalls:
     def get_smpl_time(self) -> GetSmplTimeResponse:
         """Read servo loop time (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -1188,7 +1188,7 @@ class HostCalls:
     def get_vrsn(self) -> GetVrsnResponse:
         """Read product and software version (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -1198,7 +1198,7 @@ class HostCalls:
     def get_time(self) -> GetTimeResponse:
         """Read cycle counter since reset (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -1208,12 +1208,12 @@ class HostCalls:
     def set_phase_cnts(self, axis: int, *, value: int = 129) -> SetPhaseCntsResponse:
         """Set counts per electrical cycle (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Encoder counts of an electrical cycle; 129..65535 counts.
         """
         _request = SetPhaseCntsRequest(value=value)
@@ -1222,12 +1222,12 @@ class HostCalls:
     def set_phase_offset(self, axis: int, *, value: int = 0) -> SetPhaseOffsetResponse:
         """Set the phase offset from the index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Phase offset from the index pulse; 0..65535 counts.
         """
         _request = SetPhaseOffsetRequest(value=value)
@@ -1236,12 +1236,12 @@ class HostCalls:
     def set_phase_time(self, axis: int, *, value: int = 0) -> SetPhaseTimeResponse:
         """Set duration of algorithmic phase initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Duration of algorithmic phase initialisation; 0..65535 samples.
         """
         _request = SetPhaseTimeRequest(value=value)
@@ -1250,12 +1250,12 @@ class HostCalls:
     def set_phase(self, axis: int, *, value: int = 0) -> SetPhaseResponse:
         """Set phase angle directly (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
             value: Phase angle; encoder counts assumed; 0..65535 counts.
         """
         _request = SetPhaseRequest(value=value)
@@ -1264,10 +1264,10 @@ class HostCalls:
     def init_phase(self, axis: int) -> InitPhaseResponse:
         """Start phase initialisation (algorithmic or Hall) (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = InitPhaseRequest()
         return self.ask(_request, InitPhaseResponse, axis)
@@ -1276,7 +1276,7 @@ class HostCalls:
         """Read commutation flags (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetPhaseInfoRequest()
         return self.ask(_request, GetPhaseInfoResponse, axis)
@@ -1285,7 +1285,7 @@ class HostCalls:
         """Read back counts per electrical cycle (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetPhaseCntsRequest()
         return self.ask(_request, GetPhaseCntsResponse, axis)
@@ -1294,7 +1294,7 @@ class HostCalls:
         """Read back initialisation duration (Host commands).
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetPhaseTimeRequest()
         return self.ask(_request, GetPhaseTimeResponse, axis)
@@ -1302,10 +1302,10 @@ class HostCalls:
     def get_phase_offset(self, axis: int) -> GetPhaseOffsetResponse:
         """Read back phase offset (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
-            axis: Axis that it acts on, counted from 1.
+            axis: Axis to act on, from 1.
         """
         _request = GetPhaseOffsetRequest()
         return self.ask(_request, GetPhaseOffsetResponse, axis)
@@ -1314,10 +1314,10 @@ class HostCalls:
 class AxisCalls:
     """The calls to one axis, a method for each command.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
 
     Attributes:
-        number: Number of the axis, counted from 1.
+        number: Number of the axis, from 1.
     """
 
     __slots__ = ()
@@ -1415,7 +1415,7 @@ class AxisCalls:
     def set_ratio(self, *, value: float = 0.0) -> SetRatioResponse:
         """Load electronic gear ratio (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
 
@@ -1455,7 +1455,7 @@ class AxisCalls:
     def get_pos(self) -> GetPosResponse:
         """Read back buffered destination position (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPosRequest()
         return self.ask(_request, GetPosResponse)
@@ -1463,7 +1463,7 @@ class AxisCalls:
     def get_vel(self) -> GetVelResponse:
         """Read back buffered velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetVelRequest()
         return self.ask(_request, GetVelResponse)
@@ -1471,7 +1471,7 @@ class AxisCalls:
     def get_acc(self) -> GetAccResponse:
         """Read back buffered acceleration (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetAccRequest()
         return self.ask(_request, GetAccResponse)
@@ -1499,7 +1499,7 @@ class AxisCalls:
     def get_trgt_vel(self) -> GetTrgtVelResponse:
         """Read instantaneous profile target velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetTrgtVelRequest()
         return self.ask(_request, GetTrgtVelResponse)
@@ -1540,7 +1540,7 @@ class AxisCalls:
     def set_kvff(self, *, value: int = 0) -> SetKvffResponse:
         """Load velocity feed-forward gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
 
@@ -1584,7 +1584,7 @@ class AxisCalls:
     def set_pos_err(self, *, value: int = 0) -> SetPosErrResponse:
         """Set position-error limit that raises motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
             value: Position-error limit that raises motion error; 0..32767.
@@ -1595,7 +1595,7 @@ class AxisCalls:
     def get_kp(self) -> GetKpResponse:
         """Read back buffered proportional gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetKpRequest()
         return self.ask(_request, GetKpResponse)
@@ -1603,7 +1603,7 @@ class AxisCalls:
     def get_kd(self) -> GetKdResponse:
         """Read back buffered derivative gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetKdRequest()
         return self.ask(_request, GetKdResponse)
@@ -1636,7 +1636,7 @@ class AxisCalls:
     def get_pos_err(self) -> GetPosErrResponse:
         """Read back position-error limit (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPosErrRequest()
         return self.ask(_request, GetPosErrResponse)
@@ -1644,7 +1644,7 @@ class AxisCalls:
     def get_intgr(self) -> GetIntgrResponse:
         """Read the accumulated integral term (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetIntgrRequest()
         return self.ask(_request, GetIntgrResponse)
@@ -1652,7 +1652,7 @@ class AxisCalls:
     def get_actl_pos_err(self) -> GetActlPosErrResponse:
         """Read instantaneous position error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetActlPosErrRequest()
         return self.ask(_request, GetActlPosErrResponse)
@@ -1665,7 +1665,7 @@ class AxisCalls:
     def set_auto_stop_off(self) -> SetAutoStopOffResponse:
         """Keep motor on after motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetAutoStopOffRequest()
         return self.ask(_request, SetAutoStopOffResponse)
@@ -1673,7 +1673,7 @@ class AxisCalls:
     def set_time_brk(self) -> SetTimeBrkResponse:
         """Arm time breakpoint (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetTimeBrkRequest()
         return self.ask(_request, SetTimeBrkResponse)
@@ -1681,7 +1681,7 @@ class AxisCalls:
     def set_pos_brk(self) -> SetPosBrkResponse:
         """Arm breakpoint on target position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetPosBrkRequest()
         return self.ask(_request, SetPosBrkResponse)
@@ -1689,7 +1689,7 @@ class AxisCalls:
     def set_neg_brk(self) -> SetNegBrkResponse:
         """Arm breakpoint on target position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetNegBrkRequest()
         return self.ask(_request, SetNegBrkResponse)
@@ -1697,7 +1697,7 @@ class AxisCalls:
     def set_actl_pos_brk(self) -> SetActlPosBrkResponse:
         """Arm breakpoint on actual position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetActlPosBrkRequest()
         return self.ask(_request, SetActlPosBrkResponse)
@@ -1705,7 +1705,7 @@ class AxisCalls:
     def set_actl_neg_brk(self) -> SetActlNegBrkResponse:
         """Arm breakpoint on actual position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetActlNegBrkRequest()
         return self.ask(_request, SetActlNegBrkResponse)
@@ -1713,7 +1713,7 @@ class AxisCalls:
     def set_mtn_cmplt_brk(self) -> SetMtnCmpltBrkResponse:
         """Arm breakpoint on motion complete, without a compare value (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetMtnCmpltBrkRequest()
         return self.ask(_request, SetMtnCmpltBrkResponse)
@@ -1722,7 +1722,7 @@ class AxisCalls:
         """Arm breakpoint on an external signal, without a compare value (Host
         commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetExtBrkRequest()
         return self.ask(_request, SetExtBrkResponse)
@@ -1754,7 +1754,7 @@ class AxisCalls:
     def set_auto_update_off(self) -> SetAutoUpdateOffResponse:
         """Stop breakpoints from causing an update (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetAutoUpdateOffRequest()
         return self.ask(_request, SetAutoUpdateOffResponse)
@@ -1787,7 +1787,7 @@ class AxisCalls:
     def rst_status(self, *, mask: int = 0) -> RstStatusResponse:
         """Clear chosen event bits (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Args:
             mask: Events to keep: 0 clears one; masks of EventMask.
@@ -1803,7 +1803,7 @@ class AxisCalls:
     def get_mode(self) -> GetModeResponse:
         """Read profile and breakpoint mode flags (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetModeRequest()
         return self.ask(_request, GetModeResponse)
@@ -1811,7 +1811,7 @@ class AxisCalls:
     def set_capt_index(self) -> SetCaptIndexResponse:
         """Capture position on index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetCaptIndexRequest()
         return self.ask(_request, SetCaptIndexResponse)
@@ -1834,7 +1834,7 @@ class AxisCalls:
     def mtr_off(self) -> MtrOffResponse:
         """Open the loop: manual motor command drives the motor (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = MtrOffRequest()
         return self.ask(_request, MtrOffResponse)
@@ -1857,7 +1857,7 @@ class AxisCalls:
         """Load the buffered motor command, also the drive level of algorithmic phase
         initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
 
@@ -1900,7 +1900,7 @@ class AxisCalls:
     def lmts_on(self) -> LmtsOnResponse:
         """Enable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
         """
@@ -1910,7 +1910,7 @@ class AxisCalls:
     def lmts_off(self) -> LmtsOffResponse:
         """Disable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
         """
@@ -1920,7 +1920,7 @@ class AxisCalls:
     def set_phase_cnts(self, *, value: int = 129) -> SetPhaseCntsResponse:
         """Set counts per electrical cycle (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
@@ -1933,7 +1933,7 @@ class AxisCalls:
     def set_phase_offset(self, *, value: int = 0) -> SetPhaseOffsetResponse:
         """Set the phase offset from the index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
@@ -1946,7 +1946,7 @@ class AxisCalls:
     def set_phase_time(self, *, value: int = 0) -> SetPhaseTimeResponse:
         """Set duration of algorithmic phase initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
@@ -1959,7 +1959,7 @@ class AxisCalls:
     def set_phase(self, *, value: int = 0) -> SetPhaseResponse:
         """Set phase angle directly (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
 
@@ -1972,7 +1972,7 @@ class AxisCalls:
     def init_phase(self) -> InitPhaseResponse:
         """Start phase initialisation (algorithmic or Hall) (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = InitPhaseRequest()
         return self.ask(_request, InitPhaseResponse)
@@ -1995,7 +1995,7 @@ class AxisCalls:
     def get_phase_offset(self) -> GetPhaseOffsetResponse:
         """Read back phase offset (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPhaseOffsetRequest()
         return self.ask(_request, GetPhaseOffsetResponse)
@@ -2006,7 +2006,7 @@ class AsyncHostCalls:
 
     The arguments are those of HostCalls.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
     """
 
     __slots__ = ()
@@ -2109,7 +2109,7 @@ class AsyncHostCalls:
     async def set_ratio(self, axis: int, *, value: float = 0.0) -> SetRatioResponse:
         """Load electronic gear ratio (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
         """
@@ -2145,7 +2145,7 @@ class AsyncHostCalls:
     async def get_pos(self, axis: int) -> GetPosResponse:
         """Read back buffered destination position (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPosRequest()
         return await self.ask(_request, GetPosResponse, axis)
@@ -2153,7 +2153,7 @@ class AsyncHostCalls:
     async def get_vel(self, axis: int) -> GetVelResponse:
         """Read back buffered velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetVelRequest()
         return await self.ask(_request, GetVelResponse, axis)
@@ -2161,7 +2161,7 @@ class AsyncHostCalls:
     async def get_acc(self, axis: int) -> GetAccResponse:
         """Read back buffered acceleration (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetAccRequest()
         return await self.ask(_request, GetAccResponse, axis)
@@ -2189,7 +2189,7 @@ class AsyncHostCalls:
     async def get_trgt_vel(self, axis: int) -> GetTrgtVelResponse:
         """Read instantaneous profile target velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetTrgtVelRequest()
         return await self.ask(_request, GetTrgtVelResponse, axis)
@@ -2221,7 +2221,7 @@ class AsyncHostCalls:
     async def set_kvff(self, axis: int, *, value: int = 0) -> SetKvffResponse:
         """Load velocity feed-forward gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
         """
@@ -2253,7 +2253,7 @@ class AsyncHostCalls:
     async def set_pos_err(self, axis: int, *, value: int = 0) -> SetPosErrResponse:
         """Set position-error limit that raises motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetPosErrRequest(value=value)
         return await self.ask(_request, SetPosErrResponse, axis)
@@ -2261,7 +2261,7 @@ class AsyncHostCalls:
     async def get_kp(self, axis: int) -> GetKpResponse:
         """Read back buffered proportional gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetKpRequest()
         return await self.ask(_request, GetKpResponse, axis)
@@ -2269,7 +2269,7 @@ class AsyncHostCalls:
     async def get_kd(self, axis: int) -> GetKdResponse:
         """Read back buffered derivative gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetKdRequest()
         return await self.ask(_request, GetKdResponse, axis)
@@ -2302,7 +2302,7 @@ class AsyncHostCalls:
     async def get_pos_err(self, axis: int) -> GetPosErrResponse:
         """Read back position-error limit (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPosErrRequest()
         return await self.ask(_request, GetPosErrResponse, axis)
@@ -2310,7 +2310,7 @@ class AsyncHostCalls:
     async def get_intgr(self, axis: int) -> GetIntgrResponse:
         """Read the accumulated integral term (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetIntgrRequest()
         return await self.ask(_request, GetIntgrResponse, axis)
@@ -2318,7 +2318,7 @@ class AsyncHostCalls:
     async def get_actl_pos_err(self, axis: int) -> GetActlPosErrResponse:
         """Read instantaneous position error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetActlPosErrRequest()
         return await self.ask(_request, GetActlPosErrResponse, axis)
@@ -2331,7 +2331,7 @@ class AsyncHostCalls:
     async def set_auto_stop_off(self, axis: int) -> SetAutoStopOffResponse:
         """Keep motor on after motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetAutoStopOffRequest()
         return await self.ask(_request, SetAutoStopOffResponse, axis)
@@ -2339,7 +2339,7 @@ class AsyncHostCalls:
     async def set_time_brk(self, axis: int) -> SetTimeBrkResponse:
         """Arm time breakpoint (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetTimeBrkRequest()
         return await self.ask(_request, SetTimeBrkResponse, axis)
@@ -2347,7 +2347,7 @@ class AsyncHostCalls:
     async def set_pos_brk(self, axis: int) -> SetPosBrkResponse:
         """Arm breakpoint on target position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetPosBrkRequest()
         return await self.ask(_request, SetPosBrkResponse, axis)
@@ -2355,7 +2355,7 @@ class AsyncHostCalls:
     async def set_neg_brk(self, axis: int) -> SetNegBrkResponse:
         """Arm breakpoint on target position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetNegBrkRequest()
         return await self.ask(_request, SetNegBrkResponse, axis)
@@ -2363,7 +2363,7 @@ class AsyncHostCalls:
     async def set_actl_pos_brk(self, axis: int) -> SetActlPosBrkResponse:
         """Arm breakpoint on actual position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetActlPosBrkRequest()
         return await self.ask(_request, SetActlPosBrkResponse, axis)
@@ -2371,7 +2371,7 @@ class AsyncHostCalls:
     async def set_actl_neg_brk(self, axis: int) -> SetActlNegBrkResponse:
         """Arm breakpoint on actual position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetActlNegBrkRequest()
         return await self.ask(_request, SetActlNegBrkResponse, axis)
@@ -2379,7 +2379,7 @@ class AsyncHostCalls:
     async def set_mtn_cmplt_brk(self, axis: int) -> SetMtnCmpltBrkResponse:
         """Arm breakpoint on motion complete, without a compare value (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetMtnCmpltBrkRequest()
         return await self.ask(_request, SetMtnCmpltBrkResponse, axis)
@@ -2388,7 +2388,7 @@ class AsyncHostCalls:
         """Arm breakpoint on an external signal, without a compare value (Host
         commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetExtBrkRequest()
         return await self.ask(_request, SetExtBrkResponse, axis)
@@ -2424,7 +2424,7 @@ class AsyncHostCalls:
     async def set_auto_update_off(self, axis: int) -> SetAutoUpdateOffResponse:
         """Stop breakpoints from causing an update (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetAutoUpdateOffRequest()
         return await self.ask(_request, SetAutoUpdateOffResponse, axis)
@@ -2474,7 +2474,7 @@ class AsyncHostCalls:
     async def rst_status(self, axis: int, *, mask: int = 0) -> RstStatusResponse:
         """Clear chosen event bits (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = RstStatusRequest(mask=mask)
         return await self.ask(_request, RstStatusResponse, axis)
@@ -2487,7 +2487,7 @@ class AsyncHostCalls:
     async def get_mode(self, axis: int) -> GetModeResponse:
         """Read profile and breakpoint mode flags (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetModeRequest()
         return await self.ask(_request, GetModeResponse, axis)
@@ -2495,7 +2495,7 @@ class AsyncHostCalls:
     async def set_capt_index(self, axis: int) -> SetCaptIndexResponse:
         """Capture position on index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetCaptIndexRequest()
         return await self.ask(_request, SetCaptIndexResponse, axis)
@@ -2534,7 +2534,7 @@ class AsyncHostCalls:
     async def mtr_off(self, axis: int) -> MtrOffResponse:
         """Open the loop: manual motor command drives the motor (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = MtrOffRequest()
         return await self.ask(_request, MtrOffResponse, axis)
@@ -2558,7 +2558,7 @@ class AsyncHostCalls:
         """Load the buffered motor command, also the drive level of algorithmic phase
         initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
         """
@@ -2603,7 +2603,7 @@ class AsyncHostCalls:
     async def set_lmt_sense(self, *, value: int = 0) -> SetLmtSenseResponse:
         """Set active level of limit inputs (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -2621,7 +2621,7 @@ class AsyncHostCalls:
     async def lmts_on(self, axis: int) -> LmtsOnResponse:
         """Enable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
         """
@@ -2631,7 +2631,7 @@ class AsyncHostCalls:
     async def lmts_off(self, axis: int) -> LmtsOffResponse:
         """Disable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
         """
@@ -2641,7 +2641,7 @@ class AsyncHostCalls:
     async def get_home(self) -> GetHomeResponse:
         """Read home inputs (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -2651,7 +2651,7 @@ class AsyncHostCalls:
     async def set_smpl_time(self, *, value: int = 0) -> SetSmplTimeResponse:
         """Set servo loop time (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -2661,7 +2661,7 @@ class AsyncHostCalls:
     async def get_smpl_time(self) -> GetSmplTimeResponse:
         """Read servo loop time (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -2679,7 +2679,7 @@ class AsyncHostCalls:
     async def get_vrsn(self) -> GetVrsnResponse:
         """Read product and software version (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -2689,7 +2689,7 @@ class AsyncHostCalls:
     async def get_time(self) -> GetTimeResponse:
         """Read cycle counter since reset (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis global.
         """
@@ -2704,7 +2704,7 @@ class AsyncHostCalls:
     ) -> SetPhaseCntsResponse:
         """Set counts per electrical cycle (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -2719,7 +2719,7 @@ class AsyncHostCalls:
     ) -> SetPhaseOffsetResponse:
         """Set the phase offset from the index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -2734,7 +2734,7 @@ class AsyncHostCalls:
     ) -> SetPhaseTimeResponse:
         """Set duration of algorithmic phase initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -2744,7 +2744,7 @@ class AsyncHostCalls:
     async def set_phase(self, axis: int, *, value: int = 0) -> SetPhaseResponse:
         """Set phase angle directly (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -2754,7 +2754,7 @@ class AsyncHostCalls:
     async def init_phase(self, axis: int) -> InitPhaseResponse:
         """Start phase initialisation (algorithmic or Hall) (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = InitPhaseRequest()
         return await self.ask(_request, InitPhaseResponse, axis)
@@ -2777,7 +2777,7 @@ class AsyncHostCalls:
     async def get_phase_offset(self, axis: int) -> GetPhaseOffsetResponse:
         """Read back phase offset (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPhaseOffsetRequest()
         return await self.ask(_request, GetPhaseOffsetResponse, axis)
@@ -2788,10 +2788,10 @@ class AsyncAxisCalls:
 
     The arguments are those of AxisCalls.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
 
     Attributes:
-        number: Number of the axis, counted from 1.
+        number: Number of the axis, from 1.
     """
 
     __slots__ = ()
@@ -2869,7 +2869,7 @@ class AsyncAxisCalls:
     async def set_ratio(self, *, value: float = 0.0) -> SetRatioResponse:
         """Load electronic gear ratio (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
         """
@@ -2905,7 +2905,7 @@ class AsyncAxisCalls:
     async def get_pos(self) -> GetPosResponse:
         """Read back buffered destination position (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPosRequest()
         return await self.ask(_request, GetPosResponse)
@@ -2913,7 +2913,7 @@ class AsyncAxisCalls:
     async def get_vel(self) -> GetVelResponse:
         """Read back buffered velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetVelRequest()
         return await self.ask(_request, GetVelResponse)
@@ -2921,7 +2921,7 @@ class AsyncAxisCalls:
     async def get_acc(self) -> GetAccResponse:
         """Read back buffered acceleration (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetAccRequest()
         return await self.ask(_request, GetAccResponse)
@@ -2949,7 +2949,7 @@ class AsyncAxisCalls:
     async def get_trgt_vel(self) -> GetTrgtVelResponse:
         """Read instantaneous profile target velocity (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetTrgtVelRequest()
         return await self.ask(_request, GetTrgtVelResponse)
@@ -2981,7 +2981,7 @@ class AsyncAxisCalls:
     async def set_kvff(self, *, value: int = 0) -> SetKvffResponse:
         """Load velocity feed-forward gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
         """
@@ -3013,7 +3013,7 @@ class AsyncAxisCalls:
     async def set_pos_err(self, *, value: int = 0) -> SetPosErrResponse:
         """Set position-error limit that raises motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetPosErrRequest(value=value)
         return await self.ask(_request, SetPosErrResponse)
@@ -3021,7 +3021,7 @@ class AsyncAxisCalls:
     async def get_kp(self) -> GetKpResponse:
         """Read back buffered proportional gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetKpRequest()
         return await self.ask(_request, GetKpResponse)
@@ -3029,7 +3029,7 @@ class AsyncAxisCalls:
     async def get_kd(self) -> GetKdResponse:
         """Read back buffered derivative gain (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetKdRequest()
         return await self.ask(_request, GetKdResponse)
@@ -3062,7 +3062,7 @@ class AsyncAxisCalls:
     async def get_pos_err(self) -> GetPosErrResponse:
         """Read back position-error limit (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPosErrRequest()
         return await self.ask(_request, GetPosErrResponse)
@@ -3070,7 +3070,7 @@ class AsyncAxisCalls:
     async def get_intgr(self) -> GetIntgrResponse:
         """Read the accumulated integral term (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetIntgrRequest()
         return await self.ask(_request, GetIntgrResponse)
@@ -3078,7 +3078,7 @@ class AsyncAxisCalls:
     async def get_actl_pos_err(self) -> GetActlPosErrResponse:
         """Read instantaneous position error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetActlPosErrRequest()
         return await self.ask(_request, GetActlPosErrResponse)
@@ -3091,7 +3091,7 @@ class AsyncAxisCalls:
     async def set_auto_stop_off(self) -> SetAutoStopOffResponse:
         """Keep motor on after motion error (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetAutoStopOffRequest()
         return await self.ask(_request, SetAutoStopOffResponse)
@@ -3099,7 +3099,7 @@ class AsyncAxisCalls:
     async def set_time_brk(self) -> SetTimeBrkResponse:
         """Arm time breakpoint (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetTimeBrkRequest()
         return await self.ask(_request, SetTimeBrkResponse)
@@ -3107,7 +3107,7 @@ class AsyncAxisCalls:
     async def set_pos_brk(self) -> SetPosBrkResponse:
         """Arm breakpoint on target position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetPosBrkRequest()
         return await self.ask(_request, SetPosBrkResponse)
@@ -3115,7 +3115,7 @@ class AsyncAxisCalls:
     async def set_neg_brk(self) -> SetNegBrkResponse:
         """Arm breakpoint on target position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetNegBrkRequest()
         return await self.ask(_request, SetNegBrkResponse)
@@ -3123,7 +3123,7 @@ class AsyncAxisCalls:
     async def set_actl_pos_brk(self) -> SetActlPosBrkResponse:
         """Arm breakpoint on actual position reached going positive (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetActlPosBrkRequest()
         return await self.ask(_request, SetActlPosBrkResponse)
@@ -3131,7 +3131,7 @@ class AsyncAxisCalls:
     async def set_actl_neg_brk(self) -> SetActlNegBrkResponse:
         """Arm breakpoint on actual position reached going negative (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetActlNegBrkRequest()
         return await self.ask(_request, SetActlNegBrkResponse)
@@ -3139,7 +3139,7 @@ class AsyncAxisCalls:
     async def set_mtn_cmplt_brk(self) -> SetMtnCmpltBrkResponse:
         """Arm breakpoint on motion complete, without a compare value (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetMtnCmpltBrkRequest()
         return await self.ask(_request, SetMtnCmpltBrkResponse)
@@ -3148,7 +3148,7 @@ class AsyncAxisCalls:
         """Arm breakpoint on an external signal, without a compare value (Host
         commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetExtBrkRequest()
         return await self.ask(_request, SetExtBrkResponse)
@@ -3176,7 +3176,7 @@ class AsyncAxisCalls:
     async def set_auto_update_off(self) -> SetAutoUpdateOffResponse:
         """Stop breakpoints from causing an update (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetAutoUpdateOffRequest()
         return await self.ask(_request, SetAutoUpdateOffResponse)
@@ -3204,7 +3204,7 @@ class AsyncAxisCalls:
     async def rst_status(self, *, mask: int = 0) -> RstStatusResponse:
         """Clear chosen event bits (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = RstStatusRequest(mask=mask)
         return await self.ask(_request, RstStatusResponse)
@@ -3217,7 +3217,7 @@ class AsyncAxisCalls:
     async def get_mode(self) -> GetModeResponse:
         """Read profile and breakpoint mode flags (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetModeRequest()
         return await self.ask(_request, GetModeResponse)
@@ -3225,7 +3225,7 @@ class AsyncAxisCalls:
     async def set_capt_index(self) -> SetCaptIndexResponse:
         """Capture position on index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = SetCaptIndexRequest()
         return await self.ask(_request, SetCaptIndexResponse)
@@ -3248,7 +3248,7 @@ class AsyncAxisCalls:
     async def mtr_off(self) -> MtrOffResponse:
         """Open the loop: manual motor command drives the motor (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = MtrOffRequest()
         return await self.ask(_request, MtrOffResponse)
@@ -3267,7 +3267,7 @@ class AsyncAxisCalls:
         """Load the buffered motor command, also the drive level of algorithmic phase
         initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered.
         """
@@ -3304,7 +3304,7 @@ class AsyncAxisCalls:
     async def lmts_on(self) -> LmtsOnResponse:
         """Enable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
         """
@@ -3314,7 +3314,7 @@ class AsyncAxisCalls:
     async def lmts_off(self) -> LmtsOffResponse:
         """Disable limit-switch handling (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Axis unknown.
         """
@@ -3324,7 +3324,7 @@ class AsyncAxisCalls:
     async def set_phase_cnts(self, *, value: int = 129) -> SetPhaseCntsResponse:
         """Set counts per electrical cycle (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -3334,7 +3334,7 @@ class AsyncAxisCalls:
     async def set_phase_offset(self, *, value: int = 0) -> SetPhaseOffsetResponse:
         """Set the phase offset from the index pulse (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -3344,7 +3344,7 @@ class AsyncAxisCalls:
     async def set_phase_time(self, *, value: int = 0) -> SetPhaseTimeResponse:
         """Set duration of algorithmic phase initialisation (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -3354,7 +3354,7 @@ class AsyncAxisCalls:
     async def set_phase(self, *, value: int = 0) -> SetPhaseResponse:
         """Set phase angle directly (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
 
         Double buffered unknown.
         """
@@ -3364,7 +3364,7 @@ class AsyncAxisCalls:
     async def init_phase(self) -> InitPhaseResponse:
         """Start phase initialisation (algorithmic or Hall) (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = InitPhaseRequest()
         return await self.ask(_request, InitPhaseResponse)
@@ -3387,7 +3387,7 @@ class AsyncAxisCalls:
     async def get_phase_offset(self) -> GetPhaseOffsetResponse:
         """Read back phase offset (Host commands).
 
-        UNCONFIRMED: the source is weak; check at the device before trusting it.
+        UNCONFIRMED: the source is weak; check it on the device.
         """
         _request = GetPhaseOffsetRequest()
         return await self.ask(_request, GetPhaseOffsetResponse)

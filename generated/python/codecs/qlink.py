@@ -115,7 +115,7 @@ __all__ = [
 class PositionType(OpenEnum):
     """How a node asks its motor for the position (section 7.1.1).
 
-    Numbers without a name are kept as they are.
+    Numbers without a name are preserved.
     """
 
     #: The position is not asked for
@@ -130,7 +130,7 @@ class MotorStatus:
     """State of the motor; the bits without a name are not defined yet and are kept as
     received (section 7.10).
 
-    Masks. Other bits are kept as they are.
+    Masks. Other bits are preserved.
     """
 
     #: The motor runs
@@ -258,7 +258,7 @@ class _Empty(Message):
         self.node = node
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 1 <= self.node <= 16:
                 raise OutOfRange
@@ -332,7 +332,7 @@ class NodeSetupRequest(Message):
         self.position_type = position_type
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             t1_delay_raw = _SCALE_TENTHS.raw(self.t1_delay)
             t2_delay_raw = _SCALE_TENTHS.raw(self.t2_delay)
@@ -422,7 +422,7 @@ class NodeInfoRequest(Message):
         self.node = node
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 0 <= self.node <= 16:
                 raise OutOfRange
@@ -524,7 +524,7 @@ class NodeInfoResponse(Message):
         self.serial_number = serial_number
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             t1_delay_raw = _SCALE_TENTHS.raw(self.t1_delay)
             t2_delay_raw = _SCALE_TENTHS.raw(self.t2_delay)
@@ -601,7 +601,7 @@ class NodeStartRequest(Message):
         self.node = node
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 0 <= self.node <= 16:
                 raise OutOfRange
@@ -649,7 +649,7 @@ class NodeStopRequest(Message):
         self.node = node
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 0 <= self.node <= 16:
                 raise OutOfRange
@@ -702,7 +702,7 @@ class NodeSyncRequest(Message):
         self.counter = counter
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not self.node == 0:
                 raise OutOfRange
@@ -769,7 +769,7 @@ class NodeProgramLoadRequest(Message):
         self.program_data = program_data
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             program_data_raw = as_bytes(self.program_data)
             program_data_count = len(program_data_raw)
@@ -844,7 +844,7 @@ class NodeProgramLoadResponse(Message):
         self.counter = counter
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 1 <= self.node <= 16:
                 raise OutOfRange
@@ -956,7 +956,7 @@ class MotorResponsePollResponse(Message):
         self.motor_data = motor_data
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             motor_data_raw = as_bytes(self.motor_data)
             motor_data_count = len(motor_data_raw)
@@ -1024,7 +1024,7 @@ class MotorRequestRequest(Message):
         self.motor_data = motor_data
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             motor_data_raw = as_bytes(self.motor_data)
             motor_data_count = len(motor_data_raw)
@@ -1115,7 +1115,7 @@ class MotionRequest(Message):
         self.segments = [] if segments is None else segments
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             segments_count = len(self.segments)
             if not 1 <= self.node <= 16:
@@ -1205,7 +1205,7 @@ class MotionResponse(Message):
         self.fifo_space = fifo_space
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 1 <= self.node <= 16:
                 raise OutOfRange
@@ -1290,7 +1290,7 @@ class MotorPositionResponse(Message):
         self.position = position
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 1 <= self.node <= 16:
                 raise OutOfRange
@@ -1374,7 +1374,7 @@ class PresetMotorPositionRequest(Message):
         self.position = position
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not 1 <= self.node <= 16:
                 raise OutOfRange
@@ -1451,7 +1451,7 @@ class ReadRequest(Message):
         self.offset = offset
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             if not (1 <= self.node <= 16 and 1 <= self.size <= 26):
                 raise OutOfRange
@@ -1505,7 +1505,7 @@ class ReadResponse(Message):
         self.data = data
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             data_raw = as_bytes(self.data)
             data_count = len(data_raw)
@@ -1569,7 +1569,7 @@ class WriteRequest(Message):
         self.data = data
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             data_raw = as_bytes(self.data)
             data_count = len(data_raw)
@@ -1641,7 +1641,7 @@ class WriteReadRequest(Message):
         self.outputs = outputs
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             outputs_raw = index(self.outputs)
             if not (1 <= self.node <= 16 and 0 <= outputs_raw <= 16777215):
@@ -1700,7 +1700,7 @@ class WriteReadResponse(Message):
         self.inputs = inputs
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             inputs_raw = index(self.inputs)
             if not (1 <= self.node <= 16 and 0 <= inputs_raw <= 16777215):
@@ -1759,7 +1759,7 @@ class SetOutputsRequest(Message):
         self.mask = mask
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             mask_raw = index(self.mask)
             if not (1 <= self.node <= 16 and 0 <= mask_raw <= 16777215):
@@ -1832,7 +1832,7 @@ class ClearOutputsRequest(Message):
         self.mask = mask
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             mask_raw = index(self.mask)
             if not (1 <= self.node <= 16 and 0 <= mask_raw <= 16777215):
@@ -1911,7 +1911,7 @@ class LoopBackRequest(Message):
         self.data = data
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             data_raw = as_bytes(self.data)
             data_count = len(data_raw)
@@ -1975,7 +1975,7 @@ class LoopBackResponse(Message):
         self.data = data
 
     def to_frame(self) -> bytes:
-        """The whole frame as it is on the wire. Raises EncodeError."""
+        """The whole frame as sent. Raises EncodeError."""
         try:
             data_raw = as_bytes(self.data)
             data_count = len(data_raw)

@@ -66,7 +66,7 @@ __all__ = [
 class MasterCalls:
     """The calls of a master, a method for each command.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
     """
 
     __slots__ = ()
@@ -92,8 +92,8 @@ class MasterCalls:
         for a position (section 7.1).
 
         Args:
-            node: Address of the node, 1..16; or 0 for a node that is alone on the line,
-                whatever its number.
+            node: Address of the node, 1..16; or 0 for a single node on the line with
+                any number.
             node_number: Number of the node from now on; 1..16.
             t1_delay: Time from input 1 going high to output 1 going high; 0.0..25.5 s
                 in steps of 1/10.
@@ -115,8 +115,8 @@ class MasterCalls:
         7.2).
 
         Args:
-            node: Address of the node, 1..16; or 0 for a node that is alone on the line,
-                whatever its number.
+            node: Address of the node, 1..16; or 0 for a single node on the line with
+                any number.
         """
         _request = NodeInfoRequest(node=node)
         return self.ask(_request, NodeInfoResponse)
@@ -330,7 +330,7 @@ class MasterCalls:
 class NodeCalls:
     """The calls to one node, a method for each command.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
 
     Attributes:
         number: Address of the node, 1..16.
@@ -548,7 +548,7 @@ class AsyncMasterCalls:
 
     The arguments are those of MasterCalls.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
     """
 
     __slots__ = ()
@@ -728,7 +728,7 @@ class AsyncNodeCalls:
 
     The arguments are those of NodeCalls.
 
-    A subclass supplies `ask` and `tell`; what they raise, every method raises.
+    A subclass implements `ask` and `tell`; methods pass on their exceptions.
 
     Attributes:
         number: Address of the node, 1..16.

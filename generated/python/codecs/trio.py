@@ -83,7 +83,7 @@ __all__ = [
 class KeypadModeEnum(OpenEnum):
     """What a keypad sends for a key (Message types).
 
-    Numbers without a name are kept as they are.
+    Numbers without a name are preserved.
     """
 
     #: One character when the key goes down
@@ -206,7 +206,7 @@ class CharacterTransfer(Message):
         self.characters = characters
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             characters_raw = self.characters.encode("ascii")
             characters_count = len(characters_raw)
@@ -271,7 +271,7 @@ class DirectVariableTransfer(Message):
         self.value = value
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             number_raw = index(self.number)
             value_raw = _SCALE_VALUE.raw(self.value)
@@ -376,7 +376,7 @@ class KeypadOffset(Message):
         self.offset = offset
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             offset_raw = index(self.offset)
             if not 1 <= offset_raw <= 15:
@@ -430,7 +430,7 @@ class KeypadMode(Message):
         self.mode = mode
 
     def to_bytes(self) -> bytes:
-        """The payload alone. Raises EncodeError."""
+        """The payload. Raises EncodeError."""
         try:
             mode_raw = index(self.mode)
             if not 0 <= mode_raw <= 127:

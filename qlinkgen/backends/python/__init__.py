@@ -1,4 +1,4 @@
-"""Typed Python: a readable module for each protocol, with one support module beside them all."""
+"""Typed Python: a readable module for each protocol, and a common support module."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ A codec needs only the standard library and `_support` in this folder.
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
-    """The module of a protocol and the package around it, by path."""
+    """The module of a protocol and the files of its package, by path."""
     support = importlib.resources.files(__package__).joinpath("_support.py").read_text("utf-8")
     return {
         f"{options.package}/{file_stem(protocol.name)}.py": render(plan_of(protocol, options)),
@@ -36,21 +36,21 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
 
 
 def package(options: Options) -> Outputs:
-    """What makes the folder a typed package."""
+    """The files that make the folder a typed package."""
     initial = copied("__init__.py", _PACKAGE)
     return {f"{options.package}/__init__.py": initial, f"{options.package}/py.typed": ""}
 
 
 def load(protocol: Protocol, options: Options | None = None) -> ModuleType:
-    """The generated module, compiled in memory; no file is written.
+    """The generated module, compiled in memory without writing a file.
 
-    It runs in this process, so no text of the schema is in it. The units in its error messages come from the
-    model.
+    It runs in this process, so it is generated without text of the schema. Units in its error messages are
+    taken from the model.
     """
     plain = protocol.without_texts()
     text = render(plan_of(plain, options))
     module = ModuleType(f"{__package__}.{protocol.name}", None)
-    module.__package__ = __package__  # its support module is the one in this folder
+    module.__package__ = __package__  # it uses the support module in this folder
     name = f"<{protocol.name}.py generated from {plain.schema_file}>"
     linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)  # for tracebacks
     exec(compile(text, name, "exec"), module.__dict__)  # our own text
@@ -59,14 +59,14 @@ def load(protocol: Protocol, options: Options | None = None) -> ModuleType:
 
 
 def _tell_units(protocol: Protocol, classes: Mapping[str, type[BaseMessage]]) -> None:
-    """Let the rules of each message name the units of its values."""
+    """Add the units of values to the rules of each message."""
     for name, each in classes.items():
         units = {value.name: value.unit for value in protocol.by_name[name].values}
         each.RULES = tuple(_in_unit(rule, units.get(rule.name, "")) for rule in each.RULES)
 
 
 def _in_unit(rule: Rule, unit: str) -> Rule:
-    """A copy of a rule, as several messages may share it."""
+    """A copy of a rule with a unit; messages may share the original."""
     found = copy.copy(rule)
     found.legal += f" {unit}" if unit else ""
     return found

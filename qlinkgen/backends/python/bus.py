@@ -1,7 +1,7 @@
-"""Bus modules: a typed method for each command, for what a master or host asks and for what a slave does.
+"""Bus modules: a typed method for each command, for masters and hosts to call and for slaves to override.
 
-The module `X_bus` is written beside the codec `X`, whose classes it takes and hands out. A runtime supplies
-how a request is sent; the module knows no port, clock or thread.
+The module `X_bus` is generated next to the codec `X` and uses its classes. A runtime implements sending; the
+module does not depend on ports, clocks or threads.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from qlinkgen.plan.payload import Member, ValueStep
 
 __all__ = ["generate", "render"]
 
-#: Attribute of the commands of a host that says on which axis they act, and those of its values for which the
-#: axis has to be chosen: where it is not known, a host is on the safe side with the one that it means.
+#: Attribute for the axis that a command of a host acts on, and its values for which the axis must be
+#: selected. If it is unknown whether a command acts on an axis, selecting one is safe.
 _AXIS = "axis"
 _CHOSEN = ("current", "unknown")
 
 
 @dataclass(frozen=True)
 class Method:
-    """A method, ready to be placed: every entry is finished text."""
+    """A method as finished text."""
 
     head: list[str]
     doc: list[str]
@@ -50,15 +50,15 @@ class Caller:
     name: str
     doc: list[str]
     prefix: str
-    #: Its objects stand for one address or axis, and have its number.
+    #: Its objects represent one address or axis, and hold its number.
     one: bool
     methods: list[Method]
-    #: Name of the argument that chooses an axis, "" where there is none.
+    #: Name of the argument that selects an axis, "" if there is none.
     axis: str = ""
 
     @property
     def ask(self) -> list[str]:
-        """The head of the method that sends a request for an axis."""
+        """The signature of the method that sends a request for an axis."""
         arguments = f"self, request: Message, response: type[_R], {self.axis}: int | None = None"
         line = f"{self.prefix}def ask({arguments}) -> _R:"
         return (
@@ -67,13 +67,13 @@ class Caller:
 
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
-    """The module of a protocol and the package around it, by path; nothing if there are no commands."""
+    """The module of a protocol and the files of its package, by path; nothing without commands."""
     text = render(plan_of(protocol, options))
     return {f"{options.package}/{protocol.name}_bus.py": text, **package(options)} if text else {}
 
 
 def render(plan: Plan) -> str:
-    """The text of a protocol's module, "" where there is nothing to say."""
+    """The text of a protocol's module, "" if it would be empty."""
     bus = plan.protocol.bus
     if bus.kind == "ring" or (bus.kind == "host" and plan.role == "slave"):
         return ""
@@ -84,7 +84,7 @@ def render(plan: Plan) -> str:
 
 @dataclass(frozen=True)
 class Transaction:
-    """A command whose messages are all in the module of the codec."""
+    """A command with all its messages in the codec module."""
 
     command: Command
     request: MessagePlan
@@ -92,7 +92,7 @@ class Transaction:
 
     @classmethod
     def of(cls, plan: Plan, command: Command) -> Transaction | None:
-        """The transaction of a command, None where its response is left out."""
+        """The transaction of a command, None if its response is left out."""
         request = plan.by_name[command.request.name]
         if command.response is None:
             return cls(command, request, None)
@@ -101,13 +101,13 @@ class Transaction:
 
     @property
     def name(self) -> str:
-        """Name of the method: the command's own, or with an underscore where that means something else."""
+        """Name of the method: that of the command, with an underscore if it is reserved."""
         return method(self.command.name)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BusView:
-    """What the template places, each by its name."""
+    """The variables of the template."""
 
     doc: Sequence[str]
     table: Sequence[str]
@@ -120,10 +120,10 @@ class BusView:
 
 
 class BusModule:
-    """Collects what the template places."""
+    """Collects the variables of the template."""
 
     def __init__(self, plan: Plan, transactions: Sequence[Transaction]) -> None:
-        """``transactions`` are those that have all their messages in the module of the codec."""
+        """``transactions`` have all their messages in the codec module."""
         self._plan = plan
         self._protocol = plan.protocol
         self._transactions = transactions
@@ -160,12 +160,12 @@ class BusModule:
         return fitted(template.render(vars(view)).rstrip("\n") + "\n")
 
     def _class(self, message: MessagePlan) -> str:
-        """The class of a message, which the module has to import."""
+        """The class of a message; adds it to the imports."""
         name = class_name(message)
         self._classes.add(name)
         return name
 
-    # The side that asks
+    # Master and host
 
     def _taken(self, transaction: Transaction) -> list[str]:
         """Parameters for the values of a request."""
@@ -177,12 +177,12 @@ class BusModule:
 
     @staticmethod
     def _given(transaction: Transaction) -> list[str]:
-        """Arguments that hand the parameters on."""
+        """Arguments that pass the parameters on."""
         names = (attribute(each.name) for each in transaction.request.payload.settable)
         return [f"{name}={name}" for name in names]
 
     def _answer(self, transaction: Transaction, *, surely: bool = False) -> str:
-        """Type of the value that a method returns."""
+        """Return type of a method."""
         if transaction.response is None:
             return "None"
         name = self._class(transaction.response)
@@ -218,7 +218,7 @@ class BusModule:
         return Method(head, python_text.docstring(doc), body)
 
     def _head(self, call: Transaction, where: str, answer: str, *, asynchronous: bool) -> list[str]:
-        """The line that begins a method; ``where`` is the argument for an address or axis."""
+        """The signature of a method; ``where`` is the argument for an address or axis."""
         arguments = ["self", *([f"{where}: int"] if where else [])]
         taken = self._taken(call)
         arguments += ["*", *taken] if taken else []
@@ -244,7 +244,7 @@ class BusModule:
         ]
 
     def _arguments(self, call: Transaction, first: str) -> list[str]:
-        """The section on arguments; ``first`` is about the one that is not a field."""
+        """The section on arguments; ``first`` describes the one that is not a field."""
         entries = [first] if first else []
         pairs = zip(call.request.message.values, call.request.payload.settable, strict=True)
         entries += [f"{attribute(v.name)}: {values.description(v, each, self._place)}" for v, each in pairs]
@@ -252,20 +252,20 @@ class BusModule:
         return ["", "Args:", *lines] if lines else []
 
     def _all(self, command: Command) -> str:
-        """What the broadcast address means to a command."""
+        """The meaning of the broadcast address for a command."""
         everybody = self._protocol.bus.broadcast
         if command.addressing == "answered_broadcast":
-            return f"; or {everybody} for a node that is alone on the line, whatever its number"
+            return f"; or {everybody} for a single node on the line with any number"
         if command.addressing != "either":
             return ""
-        silent = ": there is no reply, None is returned" if command.response else ""
+        silent = ", which do not respond: returns None" if command.response else ""
         return f"; or {everybody} for all of them{silent}"
 
     def _nodes(self) -> str:
         nodes = self._protocol.bus.nodes
         return f"{nodes[0]}..{nodes[1]}" if nodes else ""
 
-    # The host of a device, which may have axes
+    # Host of a device with or without axes
 
     def _host_callers(self, *, asynchronous: bool) -> list[Caller]:
         on_axis = [each for each in self._transactions if _axis_of(each.command) in _CHOSEN]
@@ -282,7 +282,7 @@ class BusModule:
         self, name: str, calls: Sequence[Transaction], axis: str, *, asynchronous: bool, one: bool
     ) -> Caller:
         what = "calls to one axis" if one else "calls of a host"
-        more = ["", "Attributes:", "    number: Number of the axis, counted from 1."] if one else []
+        more = ["", "Attributes:", "    number: Number of the axis, from 1."] if one else []
         doc = _caller_doc(name, what, more, asynchronous=asynchronous)
         methods = [
             self._host_method(
@@ -296,7 +296,7 @@ class BusModule:
         head = self._head(call, axis, self._answer(call, surely=True), asynchronous=asynchronous)
         doc = [*_summary(call.command), *_attributes(call.command)]
         if not asynchronous:
-            entry = f"{axis}: Axis that it acts on, counted from 1." if axis else ""
+            entry = f"{axis}: Axis to act on, from 1." if axis else ""
             doc += self._arguments(call, entry)
         wait, chosen = "await " if asynchronous else "", f", {axis}" if axis else ""
         request = wrapped(f"_request = {self._class(call.request)}(", self._given(call), ")", 8)
@@ -305,7 +305,7 @@ class BusModule:
             ask = f"return {wait}self.ask(_request, {self._class(call.response)}{chosen})"
         return Method(head, python_text.docstring(doc), [*request, ask])
 
-    # The slave's side
+    # Slave
 
     def _handlers(self) -> list[Method]:
         return [self._handler(call) for call in self._transactions]
@@ -318,7 +318,7 @@ class BusModule:
         if command.echoes:
             doc += ["", f"The response repeats {' and '.join(command.echoes)} of the request."]
         if command.response and command.addressing == "either":
-            doc += ["", "A broadcast is not answered: return None then."]
+            doc += ["", "Return None for a broadcast, which is not answered."]
         return Method(head, python_text.docstring(doc), [])
 
 
@@ -329,13 +329,13 @@ def _summary(command: Command) -> list[str]:
 
 
 def _axis_of(command: Command) -> str:
-    """On which axis a command acts, "" where its protocol knows no axes."""
+    """The axis that a command acts on, "" in protocols without axes."""
     return str(command.attributes.get(_AXIS, ""))
 
 
 def _attributes(command: Command) -> list[str]:
-    """What a protocol alone says of a command, in a line; what does not apply is left out."""
-    told = {(_AXIS, "current")}  # the method of an axis, or the argument for one, says it
+    """The protocol-specific attributes of a command as a line; false ones are omitted."""
+    told = {(_AXIS, "current")}  # implied by the axis object or argument
     said = [pair for pair in command.attributes.items() if pair[1] is not False and pair not in told]
     words = [(key if value is True else f"{key} {value}").replace("_", " ") for key, value in said]
     return ["", *textwrap.wrap(one_line(f"{', '.join(words).capitalize()}."), WIDTH - 8)] if words else []
@@ -345,7 +345,7 @@ def _caller_doc(name: str, what: str, more: Sequence[str], *, asynchronous: bool
     doc = [f"The {what}, a method for each command{': coroutines' if asynchronous else ''}.", ""]
     if asynchronous:
         doc += [f"The arguments are those of {name}.", ""]
-    supplied = "A subclass supplies `ask` and `tell`; what they raise, every method raises."
+    supplied = "A subclass implements `ask` and `tell`; methods pass on their exceptions."
     return python_text.docstring([*doc, *textwrap.wrap(supplied, WIDTH - 8), *more])
 
 

@@ -1,4 +1,4 @@
-"""The classes of a module: what each message adds, and what several messages share."""
+"""The classes of a module: one for each message, and base classes for common layouts."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ from qlinkgen.plan.payload import (
 )
 from qlinkgen.plan.tree import MessagePlan, Plan
 
-#: A layout that so many messages have is in a class of its own.
+#: A layout of at least this many messages becomes a base class.
 SHARED = 4
 
 
 @dataclass(frozen=True)
 class ClassModel:
-    """A class, ready to be placed: every entry is finished text."""
+    """A class as finished text."""
 
     name: str
     base: str
@@ -55,13 +55,13 @@ class ClassModel:
 
     @property
     def refusable(self) -> bool:
-        """There is a value that the encoder may have to refuse."""
+        """Whether encoding can fail."""
         return list(self.encode) != ['return b""']
 
 
 @dataclass(frozen=True)
 class Shape:
-    """What messages of the same layout have in common; equal shapes share their code."""
+    """The layout of messages; messages with equal shapes share their code."""
 
     payload: PayloadPlan
     allowed: object
@@ -74,13 +74,13 @@ class ClassBuilder:
     """Builds the classes of one protocol."""
 
     def __init__(self, plan: Plan, place: Place) -> None:
-        """``place`` is what surrounds the payloads."""
+        """``place`` describes the frame around payloads."""
         self._plan = plan
         self._place = place
         bus = plan.protocol.bus
         self._default_address = bus.nodes[0] if bus.nodes else 0
         self._all_checked = all(message.checked for message in plan.messages)
-        #: Conversions by the name of their constant, in the order of their first use.
+        #: Conversions by the name of their constant, in order of first use.
         self._scales: dict[str, str] = {}
         self._shapes = self._shared_shapes()
 
@@ -94,7 +94,7 @@ class ClassBuilder:
         """Definitions of the conversions of scaled values; complete once the classes are built."""
         return [f"{name} = {call}" for name, call in self._scales.items()]
 
-    # Layouts that several messages have
+    # Common layouts
 
     def _shape_of(self, message: MessagePlan) -> Shape:
         return Shape(
@@ -107,7 +107,7 @@ class ClassBuilder:
 
     @property
     def _packets(self) -> bool:
-        """Request and response have frames of their own, so their classes have different bases."""
+        """Whether requests and responses have different frames, and their classes different bases."""
         envelopes = self._plan.frame.envelopes
         return envelopes["request"] is not envelopes["response"]
 
@@ -141,7 +141,7 @@ class ClassBuilder:
         return self._with_codec(message, head, constant_name(message.name), in_hex(message.id))
 
     def _with_codec(self, message: MessagePlan, head: ClassModel, title: str, number: str) -> ClassModel:
-        """A class with its code; ``title`` is in the names of its constants, ``number`` its id."""
+        """A class with its code; ``title`` is a part of the names of its constants, ``number`` is its id."""
         scales = self._scales_of(message)
         encoder = Encoder(message, self._place, title, number, scales)
         decoder = Decoder(message, self._place, title, scales)
@@ -162,7 +162,7 @@ class ClassBuilder:
 
     @property
     def _measured(self) -> bool:
-        """Nothing but its own counts tells where a message ends."""
+        """Whether only its counts determine the end of a message."""
         end = self._plan.frame.end
         match end:
             case ByMessage():
@@ -173,7 +173,7 @@ class ClassBuilder:
                 assert_never(end)
 
     def _body_size(self, message: MessagePlan) -> int | None:
-        """Bytes that the encoder packs, None if their number varies."""
+        """Number of bytes that the encoder packs, None if it varies."""
         if self._place.envelope is None or not message.payload.fixed:
             return None
         parts = (*self._place.front, *self._place.back)
@@ -183,14 +183,14 @@ class ClassBuilder:
         return message.direction.title() if self._packets and message.direction != "message" else "Message"
 
     def _checked(self, message: MessagePlan) -> list[str]:
-        """Whether the message carries a check value, where not all do."""
+        """The constant for a message with a check value, if only some have one."""
         marked = isinstance(self._plan.frame.end, ByMark)
         return ["CHECKED = True"] if marked and not self._all_checked and message.checked else []
 
     # Parts of a class
 
     def _scales_of(self, message: MessagePlan) -> dict[str, str]:
-        """The constant that converts each scaled value: named by its type, else by its field."""
+        """The constant that converts each scaled value, named after its type or else its field."""
         found = {}
         for each in message.payload.settable:
             if isinstance(each, ValueStep | Member) and each.number.scaling is not None:
@@ -220,7 +220,7 @@ class ClassBuilder:
 
     def _init(self, message: MessagePlan) -> list[str]:
         place, address = self._place, self._place.address if message.allowed is not None else ""
-        # There is no address by default, unless there is but one.
+        # The address has a default only if there is just one.
         spans = {end for span in message.message.addresses for end in span}
         default = f" = {message.message.default_address}" if len(spans) == 1 else ""
         arguments = [f"{address}: int{default}"] if address else []

@@ -1,4 +1,4 @@
-"""What docstrings say: texts of the schema in lines. `python_text` quotes them."""
+"""Formats text of the schema for docstrings. `python_text` quotes it."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import textwrap
 
 from qlinkgen.model.texts import one_line
 
-UNCONFIRMED = "UNCONFIRMED: the source is weak; check at the device before trusting it."
+UNCONFIRMED = "UNCONFIRMED: the source is weak; check it on the device."
 
 
 def opening(text: str, section: str, tail: str = "") -> str:
-    """What something is, a tail behind it, and the section that says so."""
+    """A description, followed by ``tail`` and the section of its source."""
     where = f" (section {section})" if section[:1].isdigit() else f" ({section})" if section else ""
     return one_line(f"{text.rstrip('.')}{tail}{where}.")
 
 
 def paragraph(text: str, width: int) -> list[str]:
-    """A text in lines; the first sentence stands alone if it is short enough for one."""
+    """A text in lines; the first sentence has its own line if it fits."""
     first, _, rest = text.partition(". ")
     if rest and len(first) < width - 4:
         return [f"{first}.", "", *textwrap.wrap(rest, width)]

@@ -1,4 +1,4 @@
-"""Integers in Python: how they get into a struct and out of it, and how conditions on them are spelt."""
+"""Integers in Python: packing, unpacking and conditions."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
 
-#: struct's letters for whole numbers by size; lower case is signed.
+#: Format letters of struct for integers by size; lower case is signed.
 _LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
 
 
 @dataclass(frozen=True)
 class Get:
-    """How an integer is taken from a struct.
+    """The code that unpacks an integer.
 
     Attributes:
         code: format of its bytes.
-        targets: what the struct is unpacked into; ``local`` stands for the number itself.
-        terms: the number put together from the targets, () where the only target is the number.
-        stray: targets that must not be greater than a mask.
+        targets: variables that the struct is unpacked to; ``local`` is the number itself.
+        terms: terms of the number over the targets, () if the only target is the number.
+        stray: targets that must not exceed a mask.
     """
 
     code: str
@@ -32,7 +32,7 @@ class Get:
 
 
 def letter(integer: Integer, byteorder: ByteOrder) -> str:
-    """The format letter, "" where struct has none for this integer in this byte order."""
+    """The format letter, "" if struct has none for this integer in this byte order."""
     known = _LETTERS.get(integer.size, "")
     if not known or integer.byteorder is None or (integer.size > 1 and integer.byteorder != byteorder):
         return ""
@@ -40,7 +40,7 @@ def letter(integer: Integer, byteorder: ByteOrder) -> str:
 
 
 def put(integer: Integer, number: str, byteorder: ByteOrder) -> tuple[str, tuple[str, ...]]:
-    """Format and arguments that pack a number; groups use it once a byte, so it must be a plain name."""
+    """Format and arguments that pack a number, which must be a plain name because groups repeat it."""
     if code := letter(integer, byteorder):
         return code, (number,)
     if integer.byteorder is not None:
@@ -49,12 +49,12 @@ def put(integer: Integer, number: str, byteorder: ByteOrder) -> tuple[str, tuple
 
 
 def to_bytes(integer: Integer, number: str) -> str:
-    """The bytes of an integer; OverflowError tells that it does not fit. ``number`` must be a primary."""
+    """The bytes of an integer; raises OverflowError if it does not fit. ``number`` must be a primary."""
     return f'{number}.to_bytes({integer.size}, "{integer.byteorder}"{_signed(integer)})'
 
 
 def from_bytes(integer: Integer, data: str) -> str:
-    """The integer in some bytes."""
+    """The integer of a byte string."""
     return f'int.from_bytes({data}, "{integer.byteorder}"{_signed(integer)})'
 
 
@@ -63,7 +63,7 @@ def _signed(integer: Integer) -> str:
 
 
 def get(integer: Integer, local: str, byteorder: ByteOrder) -> Get:
-    """How a number is unpacked; ``local`` begins the names of the variables that this takes."""
+    """The code that unpacks a number; names of its variables begin with ``local``."""
     if code := letter(integer, byteorder):
         return Get(code, (local,))
     if integer.byteorder is not None:
@@ -73,9 +73,9 @@ def get(integer: Integer, local: str, byteorder: ByteOrder) -> Get:
 
 
 def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
-    """The integer in some bytes; ``at`` spells the index of its first byte and of so many bytes further.
+    """The integer at an offset; ``at`` prints the offset plus a number of bytes.
 
-    Too few bytes give another number or an IndexError.
+    Too few bytes result in a wrong number or an IndexError.
     """
     if integer.size == 1:
         return f"{data}[{at(0)}]"
@@ -86,13 +86,13 @@ def read(integer: Integer, data: str, at: Callable[[int], str]) -> str:
 
 
 def own_bits(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
-    """The sources without the bits that belong to no chunk."""
+    """The sources with unused bits masked out."""
     pairs = zip(sources, integer.chunks, strict=True)
     return tuple(f"({source} & 0x{chunk.mask:02X})" if chunk.bits < 8 else source for source, chunk in pairs)
 
 
 def stray(integer: Integer, sources: Sequence[str]) -> tuple[tuple[tuple[str, ...], int], ...]:
-    """Sources that hold bits of no chunk where they are greater than a mask, by mask."""
+    """Sources grouped by the mask that they exceed if unused bits are set."""
     by_mask: dict[int, list[str]] = {}
     for source, chunk in zip(sources, integer.chunks, strict=True):
         if chunk.bits < 8:
@@ -101,13 +101,13 @@ def stray(integer: Integer, sources: Sequence[str]) -> tuple[tuple[tuple[str, ..
 
 
 def group_terms(integer: Integer, sources: Sequence[str]) -> tuple[str, ...]:
-    """The groups of an integer, each shifted to its place; bits of no chunk are left out by the caller."""
+    """The groups of an integer, each shifted into place; the caller masks unused bits."""
     pairs = zip(sources, integer.chunks, strict=True)
     return tuple(f"{source} << {chunk.shift}" if chunk.shift else source for source, chunk in pairs)
 
 
 def sign_extended(number: str, bits: int) -> str:
-    """A number of some bits as two's complement; ``number`` must be a primary."""
+    """The two's complement of a number of ``bits`` bits; ``number`` must be a primary."""
     sign = f"0x{1 << (bits - 1):X}"
     return f"({number} ^ {sign}) - {sign}"
 
@@ -122,7 +122,7 @@ def group_out(number: str, chunk: Chunk) -> str:
 
 
 def holds(condition: Condition, number: str) -> str:
-    """The expression that is true where a condition holds."""
+    """The expression that is true if a condition holds."""
     match condition:
         case Within() if condition.low == condition.high:
             return f"{number} == {condition.low}"
@@ -138,7 +138,7 @@ def holds(condition: Condition, number: str) -> str:
 
 
 def broken(condition: Condition, number: str) -> str:
-    """The expression that is true where a condition does not hold."""
+    """The expression that is true if a condition does not hold."""
     match condition:
         case Within() if condition.low == condition.high:
             return f"{number} != {condition.low}"
@@ -153,7 +153,7 @@ def broken(condition: Condition, number: str) -> str:
 
 
 def size_terms(size: Size) -> list[str]:
-    """The terms of a number of bytes, on the local variables that hold counts."""
+    """The terms of a size over the local variables of counts."""
     terms = [str(size.fixed)] if size.fixed or not size.terms else []
     for term in size.terms:
         count = f"{term.run}_count"
@@ -162,5 +162,5 @@ def size_terms(size: Size) -> list[str]:
 
 
 def size_text(size: Size) -> str:
-    """A number of bytes as an expression."""
+    """A size as an expression."""
     return " + ".join(size_terms(size))

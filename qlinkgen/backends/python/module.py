@@ -1,4 +1,4 @@
-"""A whole module: the render model of each part, and the templates in their order."""
+"""Renders a whole module from the views of its parts."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.tree import Plan
 
-#: Names of the support module that every module passes on.
+#: Names of the support module that every module re-exports.
 _PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
-#: Names of struct, of other modules, and of typing; all others are of the support module.
+#: Names of struct and of other modules; all others are imported from the support module.
 _STRUCT = ("Struct", "pack", "unpack_from")
 _ELSEWHERE = ("Decimal", "index", *_STRUCT)
 
@@ -37,7 +37,7 @@ def render(plan: Plan) -> str:
 
 @functools.cache
 def templates() -> jinja2.Environment:
-    """The templates of this back-end, with the one way for a text into them."""
+    """The templates of this back-end, with a filter that quotes text."""
     found = environment(__package__)
     found.filters["docstring"] = lambda text: "\n".join(python_text.docstring([text]))
     return found
@@ -45,7 +45,7 @@ def templates() -> jinja2.Environment:
 
 @dataclass(frozen=True)
 class MessageRow:
-    """A message of the table by names."""
+    """An entry of the table of messages."""
 
     message: str
     name: str
@@ -53,7 +53,7 @@ class MessageRow:
 
 @dataclass(frozen=True)
 class Imports:
-    """What a module imports: names of struct, of support, of typing, and whether others are used."""
+    """The imports of a module."""
 
     struct: Sequence[str]
     struct_error: bool
@@ -66,7 +66,7 @@ class Imports:
 
 @dataclass(frozen=True, kw_only=True)
 class ModuleView:
-    """What the templates of a module place, each by its name; `f` is its frame."""
+    """The variables of the templates of a module; `f` is its frame."""
 
     f: FrameView
     heard: Sequence[frames.Heard]
@@ -86,10 +86,10 @@ class ModuleView:
 
 
 class Module:
-    """Collects what the templates place."""
+    """Collects the variables of the templates."""
 
     def __init__(self, plan: Plan) -> None:
-        """Build what the module's parts share."""
+        """Prepare the parts common to all templates."""
         self.plan = plan
         self.place: Place = place_of(plan)
         self.builder = ClassBuilder(plan, self.place)
@@ -133,7 +133,7 @@ class Module:
     def _classes(self, models: Sequence[ClassModel], view: FrameView) -> str:
         template = templates().get_template("templates/class.j2")
         whole = self.place.envelope is not None
-        kind = "whole frame as it is on the wire" if whole else "payload alone"
+        kind = "whole frame as sent" if whole else "payload"
         texts = [
             template.render(
                 each=each,
@@ -159,7 +159,7 @@ class Module:
     # Names
 
     def _imports(self, view: FrameView, models: Sequence[ClassModel]) -> Imports:
-        """What the code of the classes has used, and what the templates of the frame use."""
+        """Imports used by the classes and by the templates of the frame."""
         plan, used = self.plan, {*self.place.used, *_PUBLIC, "BaseMessage", "as_bytes", "wrong_size"}
         used |= {"OpenEnum", "named"} if plan.enums else set()
         used |= (
@@ -213,7 +213,7 @@ class Module:
 
 
 def _stream_decoder(directions: Sequence[str]) -> list[str]:
-    """The head of a method that makes a stream decoder."""
+    """The signature of the method that creates a stream decoder."""
     default = f" = {directions[0]}" if len(directions) == 1 else ""
     argument = f"direction: Literal[{', '.join(directions)}]{default}"
     line = f"def StreamDecoder(self, {argument}) -> StreamDecoder:"
@@ -223,11 +223,11 @@ def _stream_decoder(directions: Sequence[str]) -> list[str]:
 
 
 def _tidy(text: str) -> str:
-    """Without blanks at line ends, and never more than two empty lines in a row."""
+    """Remove trailing blanks, and limit consecutive empty lines to two."""
     text = re.sub(r"[ \t]+$", "", text, flags=re.MULTILINE)
     return fitted(re.sub(r"\n{4,}", "\n\n\n", text).rstrip("\n") + "\n")
 
 
 def _placed(template: str, module: ModuleView, **parts: str) -> str:
-    """A template filled in; ``parts`` are texts made of other ones."""
+    """Render a template; ``parts`` are texts rendered from others."""
     return templates().get_template(f"templates/{template}").render(vars(module), **parts)

@@ -1,4 +1,4 @@
-"""What surrounds the payload in the bytes that the class of a message encodes and decodes."""
+"""The surroundings of a payload in the bytes that a message class encodes and decodes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Place:
     """The module and the frame around a payload.
 
     Attributes:
-        byteorder: of the structs.
+        byteorder: byte order of the structs.
         classes: class of each enum and flags.
-        envelope: the frame if classes handle whole frames; None where they handle payloads alone.
+        envelope: the frame if classes handle whole frames, None if they handle only payloads.
         address: attribute that holds the address, "" if there is none.
-        unique: the preamble is added by an encoder's last step and checked by the receiver.
-        texts: defaults that are text are spelt as text, not as numbers.
-        used: names of imports that the code so far has used.
+        unique: the last step of an encoder adds the preamble, and the receiver checks it.
+        texts: print text defaults as text, not as numbers.
+        used: names of imports used so far.
     """
 
     byteorder: ByteOrder
@@ -36,18 +36,18 @@ class Place:
     used: set[str] = field(default_factory=set, compare=False)
 
     def use(self, name: str) -> str:
-        """A name that the module has to import."""
+        """Add a name to the imports of the module and return it."""
         self.used.add(name)
         return name
 
     @property
     def prefix(self) -> str:
-        """Byte order of the structs as their formats begin."""
+        """The byte order character of struct formats."""
         return ">" if self.byteorder == "big" else "<"
 
     @property
     def skipped(self) -> int:
-        """Bytes at the front of the frame that are not in what classes handle."""
+        """Number of bytes at the start of the frame that classes do not handle."""
         return len(self.envelope.preamble) if self.envelope and self.unique else 0
 
     @property
@@ -62,7 +62,7 @@ class Place:
 
     @property
     def overhead(self) -> int:
-        """Bytes beside the payload."""
+        """Bytes before and after the payload."""
         return self.header + self.trailer
 
     @property
@@ -72,13 +72,13 @@ class Place:
 
     @property
     def back(self) -> tuple[Part, ...]:
-        """Parts after the payload that an encoder packs; a check value at the very end is added later."""
+        """Parts after the payload that an encoder packs; a check value at the end is added later."""
         back = self.envelope.back if self.envelope else ()
         return back[:-1] if back and isinstance(back[-1], CheckPart) else back
 
     @property
     def data(self) -> str:
-        """Name of what a decoder reads."""
+        """Name of the argument of a decoder."""
         return "payload" if self.envelope is None else "body" if self.unique else "frame"
 
     @property

@@ -38,7 +38,7 @@ def enum_model(enum: Enum, name: str) -> ConstantsModel:
     """Render model of an enum."""
     members = [Member(each.name.upper(), str(each.value), _comment(each)) for each in enum.members]
     return ConstantsModel(
-        name, _doc(enum.doc, enum.section, "Numbers without a name are kept as they are."), members
+        name, _doc(enum.doc, enum.section, "Numbers without a name are preserved."), members
     )
 
 
@@ -48,7 +48,7 @@ def flags_model(flags: Flags, name: str) -> ConstantsModel:
     members = [
         Member(each.name.upper(), f"{1 << each.value:#0{digits}x}", _comment(each)) for each in flags.members
     ]
-    rest = "Other bits must be zero." if flags.reserved_zero else "Other bits are kept as they are."
+    rest = "Other bits must be zero." if flags.reserved_zero else "Other bits are preserved."
     return ConstantsModel(name, _doc(flags.doc, flags.section, f"Masks. {rest}"), members)
 
 
@@ -67,7 +67,7 @@ def _doc(doc: str, section: str, more: str) -> list[str]:
 
 
 def bus(line: Bus) -> list[str]:
-    """The call that makes the description of the bus; what the schema does not say is left out."""
+    """The call that creates the description of the bus, without unknown facts."""
     facts = [("broadcast", line.broadcast), ("baud", line.baud), ("bits_per_byte", line.bits_per_byte)]
     if line.nodes:
         facts = [("first_node", line.nodes[0]), ("last_node", line.nodes[1]), *facts]
@@ -76,7 +76,7 @@ def bus(line: Bus) -> list[str]:
 
 
 def command_rows(plan: Plan) -> list[list[str]]:
-    """The rows of the transaction table, each over one line or several."""
+    """The rows of the transaction table, each in one or more lines."""
     return [_row(command, plan.by_name) for command in plan.commands]
 
 
@@ -107,7 +107,7 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
 
 
 def _repetition(command: Command) -> list[str]:
-    """What may be sent again, and what comes back as it was sent."""
+    """Arguments on repetition and echoes."""
     names = [f'"{attribute(name)}"' for name in command.echoes]
     echoes = f"{names[0]}," if len(names) == 1 else ", ".join(names)
     facts = {

@@ -1,7 +1,7 @@
-"""Test vectors: for every message a few choices of values and their bytes, and frames with one wrong part.
+"""Test vectors: for every message several sets of values with their bytes, and frames with one wrong part.
 
-`choice` decides which values, `faults` what is wrong. The bytes, and the kind of every fault, are those of
-the plan's interpreter.
+`choice` selects the values, `faults` the errors. The interpreter of the plan computes the bytes and the kind
+of every fault.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueSt
 
 __all__ = ["KINDS", "generate"]
 
-#: Kinds of vectors that every message has. Kinds that come to the same bytes share a line.
+#: Kinds of vectors of every message. Kinds with the same bytes share a line.
 KINDS = ("defaults", "minimum", "maximum", "a5", "random1", "random2")
 _RULES = {"minimum": choice.MINIMUM, "maximum": choice.MAXIMUM, "a5": choice.A5}
 
@@ -46,7 +46,7 @@ class _Vectors:
 
     def __init__(self, protocol: Protocol) -> None:
         self._protocol = protocol
-        # A response may be kept without the request that its packet answers.
+        # A response may be selected without its request, which its packet depends on.
         self._codec = Codec(plan_of(protocol))
 
     def of(self, message: MessagePlan) -> dict[str, Good]:
@@ -62,13 +62,13 @@ class _Vectors:
         return Good(message, address, values, pack(message.payload, values), wire, request)
 
     def _request(self, message: MessagePlan, kind: str) -> bytes:
-        """The packet that a response answers, where it means nothing without it."""
+        """The request of a response, b"" if its frame does not depend on it."""
         if not self._codec.plan.frame.needs_request or message.direction != "response":
             return b""
         return self._one(self._codec.plan.message(f"{message.message.command}.request"), kind).wire
 
     def faults(self, messages: Iterable[Mapping[str, Good]]) -> Iterator[Mapping[str, Json]]:
-        """The wrong frames; those that are alike for all messages are made of the first of a direction."""
+        """The wrong frames; those that are the same for all messages only for the first of each direction."""
         faults = Faults(self._codec)
         begun: set[Direction] = set()
         for good in messages:
@@ -77,7 +77,7 @@ class _Vectors:
             begun.add(one.message.direction)
 
     def rows(self, vectors: Mapping[str, Good]) -> Iterator[Mapping[str, Json]]:
-        """The lines of a message in the file; equal frames are one."""
+        """The lines of a message in the file, one for each distinct frame."""
         kinds: dict[tuple[bytes, bytes], list[str]] = {}
         for kind, good in vectors.items():
             kinds.setdefault((good.request, good.wire), []).append(kind)
@@ -95,7 +95,7 @@ class _Vectors:
 
 
 def _shown(good: Good) -> Mapping[str, Json]:
-    """Values as a decoder prints them, and the integers on the wire of those that differ from them."""
+    """Decoded values, and raw integers where they differ."""
     fields: dict[str, Json] = {}
     raw: dict[str, Json] = {}
     for value, step in zip(good.message.message.values, good.message.payload.settable, strict=True):
@@ -107,7 +107,7 @@ def _shown(good: Good) -> Mapping[str, Json]:
 
 
 def _native(step: ValueStep | Member | RunStep, raw: Raw) -> Native:
-    """A value on the wire as Python holds it."""
+    """The native Python value of a raw value."""
     match step:
         case ValueStep() | Member():
             assert isinstance(raw, int)

@@ -1,4 +1,4 @@
-"""Which values a vector carries: integers on the wire, chosen by one rule for each kind of vector."""
+"""Selects the raw values of vectors by one rule for each kind of vector."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from qlinkgen.plan.payload import (
 
 
 class Chance:
-    """Numbers that look random and are the same in every run: xorshift64*, seeded with a text (FNV-1a)."""
+    """Reproducible pseudo-random numbers: xorshift64*, seeded with a text (FNV-1a)."""
 
     def __init__(self, seed: str) -> None:
         """Different texts give different sequences."""
@@ -38,7 +38,7 @@ class Chance:
         self._state ^= self._state << 25 & _MASK
         self._state ^= self._state >> 27
         wide = self._state * 0x2545F4914F6CDD1D & _MASK
-        # The high bits are the good ones; a range of 2^64 takes them all.
+        # The high bits are of better quality.
         return first + (wide * (last - first + 1) >> 64)
 
 
@@ -46,7 +46,7 @@ _MASK = (1 << 64) - 1
 
 
 class Rule:
-    """How the values of one kind of vector are chosen."""
+    """The rule for the values of one kind of vector."""
 
     def __init__(
         self,
@@ -55,14 +55,14 @@ class Rule:
         octet: Callable[[int], int],
         pattern: bytes = b"\0",
     ) -> None:
-        """``octet`` is told its index; ``number`` the integer, and the bits of the pattern in its place."""
+        """``octet`` gets the index of the byte; ``number`` the integer and its bits of the pattern."""
         self._number = number
         self._count = count
         self._octet = octet
         self._pattern = pattern
 
     def values(self, plan: PayloadPlan) -> dict[str, Raw]:
-        """The values of a payload as they are on the wire."""
+        """The raw values of a payload."""
         found: dict[str, Raw] = {}
         for step in plan.steps:
             match step:
@@ -95,7 +95,7 @@ class Rule:
 
 
 def _fitting(scalar: Scalar, pattern: int) -> int:
-    """The pattern in as many low bytes as the range allows; the default where it allows none."""
+    """The pattern in as many low bytes as the range allows; the default if it does not fit at all."""
     for bits in range(scalar.bits, 0, -8):
         number = scalar.integer.signed_value(pattern & (1 << bits) - 1)
         if scalar.minimum <= number <= scalar.maximum:
@@ -104,7 +104,7 @@ def _fitting(scalar: Scalar, pattern: int) -> int:
 
 
 def filled(pattern: bytes) -> Rule:
-    """The pattern over and over, wherever the ranges allow it."""
+    """The repeated pattern where ranges allow it."""
     return Rule(_fitting, lambda length: length.maximum, lambda index: pattern[index % len(pattern)], pattern)
 
 
@@ -114,7 +114,7 @@ A5 = filled(b"\xa5")
 
 
 def random(chance: Chance) -> Rule:
-    """Anything that may be sent."""
+    """Random legal values."""
     return Rule(
         lambda scalar, _: chance.between(scalar.minimum, scalar.maximum),
         lambda length: chance.between(length.minimum, length.maximum),
@@ -123,7 +123,7 @@ def random(chance: Chance) -> Rule:
 
 
 def defaults(plan: PayloadPlan) -> dict[str, Raw]:
-    """What is sent when nothing is given; items that must be given have the default of an item."""
+    """Default values; required items have the default of an item."""
     found = {each.name: default_of(each) for each in plan.settable}
     for each in plan.settable:
         items = found[each.name]

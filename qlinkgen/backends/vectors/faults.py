@@ -1,8 +1,8 @@
-"""Frames that are wrong in one part each, and the kind that every decoder gives them.
+"""Frames with one wrong part each, and the kind of fault that every decoder reports.
 
-A fault is made of the parts of a right frame: one of them is changed, and what follows from it (a length, the
-check value, inserted bytes) is computed again. The kind is what the plan's interpreter says of exactly one
-frame. A change that leaves a right frame gives no vector.
+One part of a valid frame is changed, and parts that depend on it (length, check value, inserted bytes) are
+computed again. The interpreter of the plan determines the kind. A change that results in a valid frame does
+not become a vector.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ from qlinkgen.plan.tree import MessagePlan
 
 @dataclass(frozen=True, slots=True)
 class Good:
-    """A frame as it should be."""
+    """A valid frame."""
 
     message: MessagePlan
     address: int | None
     values: Mapping[str, Raw]
     payload: bytes
     wire: bytes
-    #: The packet that it answers, where frames are packets.
+    #: The packet that it answers, b"" if it does not depend on one.
     request: bytes
 
 
@@ -61,8 +61,8 @@ class Bad:
     """One wrong frame.
 
     Attributes:
-        part: the part of the frame that is wrong, or in which it breaks off.
-        what: what is wrong with it.
+        part: the wrong part of the frame, or the one in which it ends.
+        what: the error.
     """
 
     kind: str
@@ -84,19 +84,19 @@ class Bad:
         }
 
 
-#: Up to so many bytes a frame is cut after each.
+#: A frame of up to this size is cut after each byte.
 _ALL_CUTS = 512
 
 
 class Faults:
-    """Makes wrong frames of right ones."""
+    """Makes wrong frames from valid ones."""
 
     def __init__(self, codec: Codec) -> None:
-        """``codec`` says what is wrong with them."""
+        """``codec`` determines the kinds."""
         self._codec = codec
 
     def of(self, good: Good, *, first: bool) -> Iterator[Bad]:
-        """The faults of a message; the first one of its direction also has those that all have alike."""
+        """The faults of a message; ``first``: including those that are the same for its direction."""
         seen = {good.wire}
         for part, what, wire in _Frame(self._codec, good).changes(first=first):
             if wire not in seen and (kind := self._kind(good, wire)):
@@ -112,7 +112,7 @@ class Faults:
 
 
 class _Frame:
-    """A right frame, taken to its parts."""
+    """A valid frame, divided into parts."""
 
     def __init__(self, codec: Codec, good: Good) -> None:
         self._codec, self._good, self._message = codec, good, good.message
@@ -120,7 +120,7 @@ class _Frame:
         self._cells = self._made(good.payload)
 
     def changes(self, *, first: bool) -> Iterator[tuple[str, str, bytes]]:
-        """The name of a part, what is wrong with it, and the frame: everything that is tried."""
+        """All changes to try: name of the part, error, frame."""
         for part in self._envelope.parts:
             if first or not isinstance(part, ConstantPart | LengthPart | IdPart):
                 for what, cells in self._changed(part):
@@ -141,7 +141,7 @@ class _Frame:
     # Parts
 
     def _changed(self, part: Part) -> Iterator[tuple[str, Mapping[str, bytes]]]:
-        """What is wrong with a part, and all parts that are other ones."""
+        """Errors in a part, each with the changed parts."""
         name = part.name
         match part:
             case ConstantPart():
@@ -174,7 +174,7 @@ class _Frame:
                 assert_never(part)
 
     def _unused(self, most: int) -> Iterable[int]:
-        """A number that no message has, if there is one."""
+        """An unused message number, if there is one."""
         ends = {part.end_id for part in self._envelope.parts if isinstance(part, MarkPart)}
         taken = {message.id for message in self._codec.plan.messages} | ends
         return itertools.islice((number for number in range(1, most + 1) if number not in taken), 1)
@@ -207,7 +207,7 @@ class _Frame:
             for name, number, data in _spoilt(step, payload[at:]):
                 yield f"{name} is {number}", payload[:at] + data + payload[at + len(data) :]
         if length is None or length.integer.unpack(self._cells[length.name]) < length.integer.maximum:
-            yield "a byte too many", payload + b"\0"
+            yield "one byte too many", payload + b"\0"
         yield "the last byte is missing", payload[:-1]
         if isinstance(self._transparency, SevenBit) and payload:
             yield "a byte is marked", bytes((payload[0] | self._transparency.marker,)) + payload[1:]
@@ -215,7 +215,7 @@ class _Frame:
     # Stuffing
 
     def _misplaced(self) -> Iterator[tuple[str, str, bytes]]:
-        """Frames full of stuffed bytes, one of whose inserted bytes is wrong."""
+        """Frames with many stuffed bytes, one of the inserted bytes wrong."""
         plan, address = self._message.payload, self._good.address or 0
         match self._transparency:
             case FrameStuffing(rule):
@@ -236,14 +236,14 @@ class _Frame:
                 assert_never(self._transparency)
 
     def _inserted(self, wire: bytes) -> list[int]:
-        """Places of the bytes inserted into a stuffed frame."""
+        """Offsets of the bytes inserted into a stuffed frame."""
         if not isinstance(self._transparency, FrameStuffing):
             return []
         front, end = self._transparency.front, len(wire) - self._transparency.back
         return [front + at for at in self._transparency.rule.places(wire[front:end])]
 
     def _part_at(self, cells: Mapping[str, bytes], wire: bytes, at: int) -> str:
-        """The part to which a byte of a frame belongs."""
+        """The name of the part that a byte belongs to."""
         at -= sum(place < at for place in self._inserted(wire))
         for part in self._envelope.parts:
             at -= len(cells[part.name]) if isinstance(part, PayloadPart) else part.size
@@ -253,7 +253,7 @@ class _Frame:
 
 
 def _lone(rule: Insertion, sent: bytes, places: Iterable[int]) -> Iterable[int]:
-    """The first place of an inserted byte without which its neighbours are neither right nor a preamble."""
+    """The first inserted byte whose removal leaves neither a valid frame nor a preamble."""
     hidden = (rule.insert, rule.after[0])
     lone = (at for at in places if at + 1 < len(sent) and sent[at + 1] not in hidden)
     return itertools.islice(lone, 1)
@@ -261,15 +261,15 @@ def _lone(rule: Insertion, sent: bytes, places: Iterable[int]) -> Iterable[int]:
 
 def _damaged(rule: Insertion, sent: bytes, at: int) -> Iterator[tuple[str, bytes]]:
     other = next(byte for byte in (rule.insert ^ 1, rule.insert ^ 2) if byte not in rule.after[:1])
-    yield "an inserted byte is another one", sent[:at] + bytes((other,)) + sent[at + 1 :]
+    yield "an inserted byte is wrong", sent[:at] + bytes((other,)) + sent[at + 1 :]
     yield "an inserted byte is missing", sent[:at] + sent[at + 1 :]
 
 
-# Values that are not allowed --------------------------------------------------------------------------------
+# Illegal values ---------------------------------------------------------------------------------------------
 
 
 def _spoilt(step: Step, data: bytes) -> Iterator[tuple[str, int, bytes]]:
-    """Name, number and bytes of values that a step cannot have; ``data`` begins with the right ones."""
+    """Name, number and bytes of illegal values of a step; ``data`` begins with the legal bytes."""
     match step:
         case ValueStep() | ConstantStep():
             yield from _beside(step.name, step.integer, step.conditions)
@@ -301,7 +301,7 @@ def _beside(name: str, integer: Integer, rules: Iterable[Condition]) -> Iterator
 
 
 def _outside(rule: Condition | None, least: int, most: int) -> list[int]:
-    """A number from least to most for which a condition does not hold, if there is one."""
+    """A number from least to most that violates a condition, if there is one."""
     match rule:
         case Within():
             near = [rule.high + 1, rule.low - 1]
@@ -317,5 +317,5 @@ def _outside(rule: Condition | None, least: int, most: int) -> list[int]:
 
 
 def _cuts(size: int) -> Iterable[int]:
-    """After how many bytes a frame is cut: after each, or near both ends of a long one."""
+    """Sizes to which a frame is cut: all, or those near both ends of a long frame."""
     return range(size) if size <= _ALL_CUTS else (*range(_ALL_CUTS // 2), *range(size - _ALL_CUTS // 2, size))

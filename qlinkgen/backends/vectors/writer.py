@@ -1,4 +1,4 @@
-"""JSON that shows differences well: one vector a line, and every digit of a Decimal."""
+"""Writes JSON for readable diffs: one vector per line, and every digit of a Decimal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Json = str | int | float | Decimal | None | Sequence["Json"] | Mapping[str, "Jso
 
 
 def document(head: Mapping[str, Json], lists: Mapping[str, Iterable[Mapping[str, Json]]]) -> str:
-    """An object of a few plain entries and of lists, whose items get a line each."""
+    """An object with plain entries and lists, one line per list item."""
     lines = [f"  {text(key)}: {text(value)}" for key, value in head.items()]
     for key, items in lists.items():
         rows = ",\n".join(f"    {text(item)}" for item in items)
@@ -19,7 +19,7 @@ def document(head: Mapping[str, Json], lists: Mapping[str, Iterable[Mapping[str,
 
 
 def text(value: Json) -> str:
-    """A value as JSON in one line."""
+    """A value as one line of JSON."""
     if isinstance(value, Decimal):
         return str(value)
     if isinstance(value, Mapping):
