@@ -1546,7 +1546,7 @@ static inline int mc1231a_set_jerk_response_from_frame(uint16_t request_sum, con
 }
 
 /* ---- set_ratio.request, id 0x14 (section Host commands): Load electronic gear ratio.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
@@ -1595,7 +1595,7 @@ static inline int mc1231a_set_ratio_request_to_frame(
 }
 
 /* ---- set_ratio.response, id 0x14 (section Host commands): Load electronic gear ratio.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_RATIO_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_RATIO_RESPONSE_MAX_SIZE 0U
@@ -1718,7 +1718,7 @@ static inline int mc1231a_synch_prfl_response_from_frame(uint16_t request_sum, c
 }
 
 /* ---- get_pos.request, id 0x4A (section Host commands): Read back buffered destination position.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_POS_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_POS_REQUEST_MAX_SIZE 0U
@@ -1735,7 +1735,7 @@ static inline int mc1231a_get_pos_request_to_frame(uint8_t *wire, size_t capacit
 }
 
 /* ---- get_pos.response, id 0x4A (section Host commands): Read back buffered destination position.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
@@ -1788,7 +1788,7 @@ static inline int mc1231a_get_pos_response_from_frame(
 }
 
 /* ---- get_vel.request, id 0x4B (section Host commands): Read back buffered velocity.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_VEL_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_VEL_REQUEST_MAX_SIZE 0U
@@ -1805,7 +1805,7 @@ static inline int mc1231a_get_vel_request_to_frame(uint8_t *wire, size_t capacit
 }
 
 /* ---- get_vel.response, id 0x4B (section Host commands): Read back buffered velocity.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 4 bytes:
  *      0  u32 be  value
  */
@@ -1848,7 +1848,7 @@ static inline int mc1231a_get_vel_response_from_frame(
 }
 
 /* ---- get_acc.request, id 0x4C (section Host commands): Read back buffered acceleration.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_ACC_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_ACC_REQUEST_MAX_SIZE 0U
@@ -1865,7 +1865,7 @@ static inline int mc1231a_get_acc_request_to_frame(uint8_t *wire, size_t capacit
 }
 
 /* ---- get_acc.response, id 0x4C (section Host commands): Read back buffered acceleration.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
@@ -2147,7 +2147,7 @@ static inline int mc1231a_get_trgt_pos_response_from_frame(
 }
 
 /* ---- get_trgt_vel.request, id 0x1E (section Host commands): Read instantaneous profile target velocity.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_TRGT_VEL_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_TRGT_VEL_REQUEST_MAX_SIZE 0U
@@ -2164,7 +2164,7 @@ static inline int mc1231a_get_trgt_vel_request_to_frame(uint8_t *wire, size_t ca
 }
 
 /* ---- get_trgt_vel.response, id 0x1E (section Host commands): Read instantaneous profile target velocity.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 4 bytes:
  *      0  i32 be  value
  */
@@ -2392,7 +2392,7 @@ static inline int mc1231a_set_ki_response_from_frame(uint16_t request_sum, const
 }
 
 /* ---- set_kvff.request, id 0x2B (section Host commands): Load velocity feed-forward gain.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -2431,7 +2431,7 @@ static inline int mc1231a_set_kvff_request_to_frame(
 }
 
 /* ---- set_kvff.response, id 0x2B (section Host commands): Load velocity feed-forward gain.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_KVFF_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_KVFF_RESPONSE_MAX_SIZE 0U
@@ -2634,7 +2634,7 @@ static inline int mc1231a_set_mtr_bias_response_from_frame(uint16_t request_sum,
 
 /* ---- set_pos_err.request, id 0x29 (section Host commands): Set position-error limit that raises motion
  * error.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -2674,7 +2674,7 @@ static inline int mc1231a_set_pos_err_request_to_frame(
 
 /* ---- set_pos_err.response, id 0x29 (section Host commands): Set position-error limit that raises motion
  * error.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_POS_ERR_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_POS_ERR_RESPONSE_MAX_SIZE 0U
@@ -2692,7 +2692,7 @@ static inline int mc1231a_set_pos_err_response_from_frame(uint16_t request_sum, 
 }
 
 /* ---- get_kp.request, id 0x50 (section Host commands): Read back buffered proportional gain.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_KP_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_KP_REQUEST_MAX_SIZE 0U
@@ -2709,7 +2709,7 @@ static inline int mc1231a_get_kp_request_to_frame(uint8_t *wire, size_t capacity
 }
 
 /* ---- get_kp.response, id 0x50 (section Host commands): Read back buffered proportional gain.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -2762,7 +2762,7 @@ static inline int mc1231a_get_kp_response_from_frame(
 }
 
 /* ---- get_kd.request, id 0x52 (section Host commands): Read back buffered derivative gain.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_KD_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_KD_REQUEST_MAX_SIZE 0U
@@ -2779,7 +2779,7 @@ static inline int mc1231a_get_kd_request_to_frame(uint8_t *wire, size_t capacity
 }
 
 /* ---- get_kd.response, id 0x52 (section Host commands): Read back buffered derivative gain.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -3107,7 +3107,7 @@ static inline int mc1231a_get_mtr_bias_response_from_frame(
 }
 
 /* ---- get_pos_err.request, id 0x55 (section Host commands): Read back position-error limit.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_POS_ERR_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_POS_ERR_REQUEST_MAX_SIZE 0U
@@ -3124,7 +3124,7 @@ static inline int mc1231a_get_pos_err_request_to_frame(uint8_t *wire, size_t cap
 }
 
 /* ---- get_pos_err.response, id 0x55 (section Host commands): Read back position-error limit.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -3167,7 +3167,7 @@ static inline int mc1231a_get_pos_err_response_from_frame(
 }
 
 /* ---- get_intgr.request, id 0x2E (section Host commands): Read the accumulated integral term.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_INTGR_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_INTGR_REQUEST_MAX_SIZE 0U
@@ -3184,7 +3184,7 @@ static inline int mc1231a_get_intgr_request_to_frame(uint8_t *wire, size_t capac
 }
 
 /* ---- get_intgr.response, id 0x2E (section Host commands): Read the accumulated integral term.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
@@ -3237,7 +3237,7 @@ static inline int mc1231a_get_intgr_response_from_frame(
 }
 
 /* ---- get_actl_pos_err.request, id 0x60 (section Host commands): Read instantaneous position error.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_ACTL_POS_ERR_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_ACTL_POS_ERR_REQUEST_MAX_SIZE 0U
@@ -3254,7 +3254,7 @@ static inline int mc1231a_get_actl_pos_err_request_to_frame(uint8_t *wire, size_
 }
 
 /* ---- get_actl_pos_err.response, id 0x60 (section Host commands): Read instantaneous position error.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
@@ -3342,7 +3342,7 @@ static inline int mc1231a_set_auto_stop_on_response_from_frame(uint16_t request_
 }
 
 /* ---- set_auto_stop_off.request, id 0x44 (section Host commands): Keep motor on after motion error.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_AUTO_STOP_OFF_REQUEST_MAX_SIZE 0U
@@ -3359,7 +3359,7 @@ static inline int mc1231a_set_auto_stop_off_request_to_frame(uint8_t *wire, size
 }
 
 /* ---- set_auto_stop_off.response, id 0x44 (section Host commands): Keep motor on after motion error.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_AUTO_STOP_OFF_RESPONSE_MAX_SIZE 0U
@@ -3377,7 +3377,7 @@ static inline int mc1231a_set_auto_stop_off_response_from_frame(uint16_t request
 }
 
 /* ---- set_time_brk.request, id 0x17 (section Host commands): Arm time breakpoint.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_TIME_BRK_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_TIME_BRK_REQUEST_MAX_SIZE 0U
@@ -3394,7 +3394,7 @@ static inline int mc1231a_set_time_brk_request_to_frame(uint8_t *wire, size_t ca
 }
 
 /* ---- set_time_brk.response, id 0x17 (section Host commands): Arm time breakpoint.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_TIME_BRK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_TIME_BRK_RESPONSE_MAX_SIZE 0U
@@ -3413,7 +3413,7 @@ static inline int mc1231a_set_time_brk_response_from_frame(uint16_t request_sum,
 
 /* ---- set_pos_brk.request, id 0x18 (section Host commands): Arm breakpoint on target position reached
  * going positive.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_POS_BRK_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_POS_BRK_REQUEST_MAX_SIZE 0U
@@ -3431,7 +3431,7 @@ static inline int mc1231a_set_pos_brk_request_to_frame(uint8_t *wire, size_t cap
 
 /* ---- set_pos_brk.response, id 0x18 (section Host commands): Arm breakpoint on target position reached
  * going positive.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_POS_BRK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_POS_BRK_RESPONSE_MAX_SIZE 0U
@@ -3450,7 +3450,7 @@ static inline int mc1231a_set_pos_brk_response_from_frame(uint16_t request_sum, 
 
 /* ---- set_neg_brk.request, id 0x19 (section Host commands): Arm breakpoint on target position reached
  * going negative.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_NEG_BRK_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_NEG_BRK_REQUEST_MAX_SIZE 0U
@@ -3468,7 +3468,7 @@ static inline int mc1231a_set_neg_brk_request_to_frame(uint8_t *wire, size_t cap
 
 /* ---- set_neg_brk.response, id 0x19 (section Host commands): Arm breakpoint on target position reached
  * going negative.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_NEG_BRK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_NEG_BRK_RESPONSE_MAX_SIZE 0U
@@ -3487,7 +3487,7 @@ static inline int mc1231a_set_neg_brk_response_from_frame(uint16_t request_sum, 
 
 /* ---- set_actl_pos_brk.request, id 0x1B (section Host commands): Arm breakpoint on actual position reached
  * going positive.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_ACTL_POS_BRK_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_ACTL_POS_BRK_REQUEST_MAX_SIZE 0U
@@ -3505,7 +3505,7 @@ static inline int mc1231a_set_actl_pos_brk_request_to_frame(uint8_t *wire, size_
 
 /* ---- set_actl_pos_brk.response, id 0x1B (section Host commands): Arm breakpoint on actual position
  * reached going positive.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_ACTL_POS_BRK_RESPONSE_MAX_SIZE 0U
@@ -3524,7 +3524,7 @@ static inline int mc1231a_set_actl_pos_brk_response_from_frame(uint16_t request_
 
 /* ---- set_actl_neg_brk.request, id 0x1C (section Host commands): Arm breakpoint on actual position reached
  * going negative.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_ACTL_NEG_BRK_REQUEST_MAX_SIZE 0U
@@ -3542,7 +3542,7 @@ static inline int mc1231a_set_actl_neg_brk_request_to_frame(uint8_t *wire, size_
 
 /* ---- set_actl_neg_brk.response, id 0x1C (section Host commands): Arm breakpoint on actual position
  * reached going negative.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_ACTL_NEG_BRK_RESPONSE_MAX_SIZE 0U
@@ -3561,7 +3561,7 @@ static inline int mc1231a_set_actl_neg_brk_response_from_frame(uint16_t request_
 
 /* ---- set_mtn_cmplt_brk.request, id 0x35 (section Host commands): Arm breakpoint on motion complete,
  * without a compare value.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_MTN_CMPLT_BRK_REQUEST_MAX_SIZE 0U
@@ -3579,7 +3579,7 @@ static inline int mc1231a_set_mtn_cmplt_brk_request_to_frame(uint8_t *wire, size
 
 /* ---- set_mtn_cmplt_brk.response, id 0x35 (section Host commands): Arm breakpoint on motion complete,
  * without a compare value.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_MTN_CMPLT_BRK_RESPONSE_MAX_SIZE 0U
@@ -3598,7 +3598,7 @@ static inline int mc1231a_set_mtn_cmplt_brk_response_from_frame(uint16_t request
 
 /* ---- set_ext_brk.request, id 0x5E (section Host commands): Arm breakpoint on an external signal, without
  * a compare value.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_EXT_BRK_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_EXT_BRK_REQUEST_MAX_SIZE 0U
@@ -3616,7 +3616,7 @@ static inline int mc1231a_set_ext_brk_request_to_frame(uint8_t *wire, size_t cap
 
 /* ---- set_ext_brk.response, id 0x5E (section Host commands): Arm breakpoint on an external signal, without
  * a compare value.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_EXT_BRK_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_EXT_BRK_RESPONSE_MAX_SIZE 0U
@@ -3856,7 +3856,7 @@ static inline int mc1231a_set_auto_update_on_response_from_frame(uint16_t reques
 
 /* ---- set_auto_update_off.request, id 0x5D (section Host commands): Stop breakpoints from causing an
  * update.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_AUTO_UPDATE_OFF_REQUEST_MAX_SIZE 0U
@@ -3874,7 +3874,7 @@ static inline int mc1231a_set_auto_update_off_request_to_frame(uint8_t *wire, si
 
 /* ---- set_auto_update_off.response, id 0x5D (section Host commands): Stop breakpoints from causing an
  * update.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_AUTO_UPDATE_OFF_RESPONSE_MAX_SIZE 0U
@@ -4219,7 +4219,7 @@ static inline int mc1231a_clr_status_response_from_frame(uint16_t request_sum, c
 }
 
 /* ---- rst_status.request, id 0x34 (section Host commands): Clear chosen event bits.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  mask
  */
@@ -4258,7 +4258,7 @@ static inline int mc1231a_rst_status_request_to_frame(
 }
 
 /* ---- rst_status.response, id 0x34 (section Host commands): Clear chosen event bits.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_RST_STATUS_RESPONSE_MIN_SIZE 0U
 #define MC1231A_RST_STATUS_RESPONSE_MAX_SIZE 0U
@@ -4333,7 +4333,7 @@ static inline int mc1231a_get_status_response_from_frame(
 }
 
 /* ---- get_mode.request, id 0x48 (section Host commands): Read profile and breakpoint mode flags.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_MODE_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_MODE_REQUEST_MAX_SIZE 0U
@@ -4350,7 +4350,7 @@ static inline int mc1231a_get_mode_request_to_frame(uint8_t *wire, size_t capaci
 }
 
 /* ---- get_mode.response, id 0x48 (section Host commands): Read profile and breakpoint mode flags.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -4393,7 +4393,7 @@ static inline int mc1231a_get_mode_response_from_frame(
 }
 
 /* ---- set_capt_index.request, id 0x64 (section Host commands): Capture position on index pulse.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_CAPT_INDEX_REQUEST_MIN_SIZE 0U
 #define MC1231A_SET_CAPT_INDEX_REQUEST_MAX_SIZE 0U
@@ -4410,7 +4410,7 @@ static inline int mc1231a_set_capt_index_request_to_frame(uint8_t *wire, size_t 
 }
 
 /* ---- set_capt_index.response, id 0x64 (section Host commands): Capture position on index pulse.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_CAPT_INDEX_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_CAPT_INDEX_RESPONSE_MAX_SIZE 0U
@@ -4610,7 +4610,7 @@ static inline int mc1231a_mtr_on_response_from_frame(uint16_t request_sum, const
 
 /* ---- mtr_off.request, id 0x42 (section Host commands): Open the loop: manual motor command drives the
  * motor.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_MTR_OFF_REQUEST_MIN_SIZE 0U
 #define MC1231A_MTR_OFF_REQUEST_MAX_SIZE 0U
@@ -4628,7 +4628,7 @@ static inline int mc1231a_mtr_off_request_to_frame(uint8_t *wire, size_t capacit
 
 /* ---- mtr_off.response, id 0x42 (section Host commands): Open the loop: manual motor command drives the
  * motor.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_MTR_OFF_RESPONSE_MIN_SIZE 0U
 #define MC1231A_MTR_OFF_RESPONSE_MAX_SIZE 0U
@@ -4758,7 +4758,7 @@ static inline int mc1231a_get_mtr_cmd_response_from_frame(
 
 /* ---- set_buf_mtr_cmd.request, id 0x77 (section Host commands): Load the buffered motor command, also the
  * drive level of algorithmic phase initialisation.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  i16 be  value
  */
@@ -4798,7 +4798,7 @@ static inline int mc1231a_set_buf_mtr_cmd_request_to_frame(
 
 /* ---- set_buf_mtr_cmd.response, id 0x77 (section Host commands): Load the buffered motor command, also the
  * drive level of algorithmic phase initialisation.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_BUF_MTR_CMD_RESPONSE_MAX_SIZE 0U
@@ -5116,7 +5116,7 @@ static inline int mc1231a_get_actl_pos_response_from_frame(
 }
 
 /* ---- set_lmt_sense.request, id 0x66 (section Host commands): Set active level of limit inputs.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5166,7 +5166,7 @@ static inline int mc1231a_set_lmt_sense_request_to_frame(
 }
 
 /* ---- set_lmt_sense.response, id 0x66 (section Host commands): Set active level of limit inputs.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_LMT_SENSE_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_LMT_SENSE_RESPONSE_MAX_SIZE 0U
@@ -5241,7 +5241,7 @@ static inline int mc1231a_get_lmt_swtch_response_from_frame(
 }
 
 /* ---- lmts_on.request, id 0x70 (section Host commands): Enable limit-switch handling.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_LMTS_ON_REQUEST_MIN_SIZE 0U
 #define MC1231A_LMTS_ON_REQUEST_MAX_SIZE 0U
@@ -5258,7 +5258,7 @@ static inline int mc1231a_lmts_on_request_to_frame(uint8_t *wire, size_t capacit
 }
 
 /* ---- lmts_on.response, id 0x70 (section Host commands): Enable limit-switch handling.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_LMTS_ON_RESPONSE_MIN_SIZE 0U
 #define MC1231A_LMTS_ON_RESPONSE_MAX_SIZE 0U
@@ -5276,7 +5276,7 @@ static inline int mc1231a_lmts_on_response_from_frame(uint16_t request_sum, cons
 }
 
 /* ---- lmts_off.request, id 0x71 (section Host commands): Disable limit-switch handling.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_LMTS_OFF_REQUEST_MIN_SIZE 0U
 #define MC1231A_LMTS_OFF_REQUEST_MAX_SIZE 0U
@@ -5293,7 +5293,7 @@ static inline int mc1231a_lmts_off_request_to_frame(uint8_t *wire, size_t capaci
 }
 
 /* ---- lmts_off.response, id 0x71 (section Host commands): Disable limit-switch handling.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_LMTS_OFF_RESPONSE_MIN_SIZE 0U
 #define MC1231A_LMTS_OFF_RESPONSE_MAX_SIZE 0U
@@ -5311,7 +5311,7 @@ static inline int mc1231a_lmts_off_response_from_frame(uint16_t request_sum, con
 }
 
 /* ---- get_home.request, id 0x05 (section Host commands): Read home inputs.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_HOME_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_HOME_REQUEST_MAX_SIZE 0U
@@ -5328,7 +5328,7 @@ static inline int mc1231a_get_home_request_to_frame(uint8_t *wire, size_t capaci
 }
 
 /* ---- get_home.response, id 0x05 (section Host commands): Read home inputs.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5371,7 +5371,7 @@ static inline int mc1231a_get_home_response_from_frame(
 }
 
 /* ---- set_smpl_time.request, id 0x38 (section Host commands): Set servo loop time.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5410,7 +5410,7 @@ static inline int mc1231a_set_smpl_time_request_to_frame(
 }
 
 /* ---- set_smpl_time.response, id 0x38 (section Host commands): Set servo loop time.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_SMPL_TIME_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_SMPL_TIME_RESPONSE_MAX_SIZE 0U
@@ -5428,7 +5428,7 @@ static inline int mc1231a_set_smpl_time_response_from_frame(uint16_t request_sum
 }
 
 /* ---- get_smpl_time.request, id 0x61 (section Host commands): Read servo loop time.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_SMPL_TIME_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_SMPL_TIME_REQUEST_MAX_SIZE 0U
@@ -5445,7 +5445,7 @@ static inline int mc1231a_get_smpl_time_request_to_frame(uint8_t *wire, size_t c
 }
 
 /* ---- get_smpl_time.response, id 0x61 (section Host commands): Read servo loop time.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5519,7 +5519,7 @@ static inline int mc1231a_reset_response_from_frame(uint16_t request_sum, const 
 }
 
 /* ---- get_vrsn.request, id 0x6C (section Host commands): Read product and software version.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_VRSN_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_VRSN_REQUEST_MAX_SIZE 0U
@@ -5536,7 +5536,7 @@ static inline int mc1231a_get_vrsn_request_to_frame(uint8_t *wire, size_t capaci
 }
 
 /* ---- get_vrsn.response, id 0x6C (section Host commands): Read product and software version.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5579,7 +5579,7 @@ static inline int mc1231a_get_vrsn_response_from_frame(
 }
 
 /* ---- get_time.request, id 0x3E (section Host commands): Read cycle counter since reset.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_TIME_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_TIME_REQUEST_MAX_SIZE 0U
@@ -5596,7 +5596,7 @@ static inline int mc1231a_get_time_request_to_frame(uint8_t *wire, size_t capaci
 }
 
 /* ---- get_time.response, id 0x3E (section Host commands): Read cycle counter since reset.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 4 bytes:
  *      0  u32 be  value
  */
@@ -5649,7 +5649,7 @@ static inline int mc1231a_get_time_response_from_frame(
 }
 
 /* ---- set_phase_cnts.request, id 0x75 (section Host commands): Set counts per electrical cycle.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5704,7 +5704,7 @@ static inline int mc1231a_set_phase_cnts_request_to_frame(
 }
 
 /* ---- set_phase_cnts.response, id 0x75 (section Host commands): Set counts per electrical cycle.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_PHASE_CNTS_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_PHASE_CNTS_RESPONSE_MAX_SIZE 0U
@@ -5723,7 +5723,7 @@ static inline int mc1231a_set_phase_cnts_response_from_frame(uint16_t request_su
 
 /* ---- set_phase_offset.request, id 0x76 (section Host commands): Set the phase offset from the index
  * pulse.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5773,7 +5773,7 @@ static inline int mc1231a_set_phase_offset_request_to_frame(
 
 /* ---- set_phase_offset.response, id 0x76 (section Host commands): Set the phase offset from the index
  * pulse.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_PHASE_OFFSET_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_PHASE_OFFSET_RESPONSE_MAX_SIZE 0U
@@ -5792,7 +5792,7 @@ static inline int mc1231a_set_phase_offset_response_from_frame(uint16_t request_
 
 /* ---- set_phase_time.request, id 0x72 (section Host commands): Set duration of algorithmic phase
  * initialisation.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5842,7 +5842,7 @@ static inline int mc1231a_set_phase_time_request_to_frame(
 
 /* ---- set_phase_time.response, id 0x72 (section Host commands): Set duration of algorithmic phase
  * initialisation.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_PHASE_TIME_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_PHASE_TIME_RESPONSE_MAX_SIZE 0U
@@ -5860,7 +5860,7 @@ static inline int mc1231a_set_phase_time_response_from_frame(uint16_t request_su
 }
 
 /* ---- set_phase.request, id 0x84 (section Host commands): Set phase angle directly.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */
@@ -5899,7 +5899,7 @@ static inline int mc1231a_set_phase_request_to_frame(
 }
 
 /* ---- set_phase.response, id 0x84 (section Host commands): Set phase angle directly.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_SET_PHASE_RESPONSE_MIN_SIZE 0U
 #define MC1231A_SET_PHASE_RESPONSE_MAX_SIZE 0U
@@ -5918,7 +5918,7 @@ static inline int mc1231a_set_phase_response_from_frame(uint16_t request_sum, co
 
 /* ---- init_phase.request, id 0x7A (section Host commands): Start phase initialisation (algorithmic or
  * Hall).
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_INIT_PHASE_REQUEST_MIN_SIZE 0U
 #define MC1231A_INIT_PHASE_REQUEST_MAX_SIZE 0U
@@ -5936,7 +5936,7 @@ static inline int mc1231a_init_phase_request_to_frame(uint8_t *wire, size_t capa
 
 /* ---- init_phase.response, id 0x7A (section Host commands): Start phase initialisation (algorithmic or
  * Hall).
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_INIT_PHASE_RESPONSE_MIN_SIZE 0U
 #define MC1231A_INIT_PHASE_RESPONSE_MAX_SIZE 0U
@@ -6135,7 +6135,7 @@ static inline int mc1231a_get_phase_time_response_from_frame(
 }
 
 /* ---- get_phase_offset.request, id 0x7B (section Host commands): Read back phase offset.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  */
 #define MC1231A_GET_PHASE_OFFSET_REQUEST_MIN_SIZE 0U
 #define MC1231A_GET_PHASE_OFFSET_REQUEST_MAX_SIZE 0U
@@ -6152,7 +6152,7 @@ static inline int mc1231a_get_phase_offset_request_to_frame(uint8_t *wire, size_
 }
 
 /* ---- get_phase_offset.response, id 0x7B (section Host commands): Read back phase offset.
- * NOT CONFIRMED: its source is weak; check it at the device.
+ * NOT CONFIRMED: its source is weak; check it on the device.
  * Payload, 2 bytes:
  *      0  u16 be  value
  */

@@ -930,7 +930,7 @@ static inline int qlink_node_sync_request_to_frame(
 
 /* ---- node_program_load.request, id 0x06 (section 7.6): Load a program. The first request carries no
  * program data and its answer says that the node is ready; then the Intel HEX text follows in pieces.
- * A payload of no bytes is decoded as the defaults.
+ * An empty payload is decoded as the defaults.
  * Payload, 1..26 bytes:
  *      0  u8            counter
  *      1  bytes[0..25]  program_data

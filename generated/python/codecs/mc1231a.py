@@ -770,7 +770,7 @@ class SetPosRequest(Request):
 
     Attributes:
         value: Destination position; -1073741824..1073741823 counts; UNCONFIRMED: check
-            at the device.
+            it on the device.
     """
 
     __slots__ = ("value",)
@@ -2465,8 +2465,8 @@ class MultiUpdateRequest(Request):
     """Update several axes at the same instant: request (Host commands).
 
     Attributes:
-        axes: Axes to update; bit 0 is axis 1; masks of Axes; UNCONFIRMED: check at the
-            device.
+        axes: Axes to update; bit 0 is axis 1; masks of Axes; UNCONFIRMED: check it on
+            the device.
     """
 
     __slots__ = ("axes",)
@@ -2609,7 +2609,7 @@ class SetIntrptMaskRequest(Request):
 
     Attributes:
         mask: Events that may interrupt: 1 lets one through; masks of EventMask;
-            UNCONFIRMED: check at the device.
+            UNCONFIRMED: check it on the device.
     """
 
     __slots__ = ("mask",)
@@ -4062,7 +4062,7 @@ class GetPhaseInfoResponse(_ValueU16Response):
 
     Attributes:
         value: Commutation flags; their layout was not found; 0..65535; UNCONFIRMED:
-            check at the device.
+            check it on the device.
     """
 
     __slots__ = ()

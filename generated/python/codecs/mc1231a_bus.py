@@ -311,7 +311,7 @@ class HostCalls:
         Args:
             axis: Axis to act on, from 1.
             value: Destination position; -1073741824..1073741823 counts; UNCONFIRMED:
-                check at the device.
+                check it on the device.
         """
         _request = SetPosRequest(value=value)
         return self.ask(_request, SetPosResponse, axis)
@@ -826,8 +826,8 @@ class HostCalls:
         Axis by mask.
 
         Args:
-            axes: Axes to update; bit 0 is axis 1; masks of Axes; UNCONFIRMED: check at
-                the device.
+            axes: Axes to update; bit 0 is axis 1; masks of Axes; UNCONFIRMED: check it
+                on the device.
         """
         _request = MultiUpdateRequest(axes=axes)
         return self.ask(_request, MultiUpdateResponse)
@@ -867,7 +867,7 @@ class HostCalls:
         Args:
             axis: Axis to act on, from 1.
             mask: Events that may interrupt: 1 lets one through; masks of EventMask;
-                UNCONFIRMED: check at the device.
+                UNCONFIRMED: check it on the device.
         """
         _request = SetIntrptMaskRequest(mask=mask)
         return self.ask(_request, SetIntrptMaskResponse, axis)
@@ -1359,7 +1359,7 @@ class AxisCalls:
 
         Args:
             value: Destination position; -1073741824..1073741823 counts; UNCONFIRMED:
-                check at the device.
+                check it on the device.
         """
         _request = SetPosRequest(value=value)
         return self.ask(_request, SetPosResponse)
@@ -1769,7 +1769,7 @@ class AxisCalls:
 
         Args:
             mask: Events that may interrupt: 1 lets one through; masks of EventMask;
-                UNCONFIRMED: check at the device.
+                UNCONFIRMED: check it on the device.
         """
         _request = SetIntrptMaskRequest(mask=mask)
         return self.ask(_request, SetIntrptMaskResponse)

@@ -1,4 +1,4 @@
-"""Limits of a protocol, its enums and flags, as macros."""
+"""Macros for limits of a protocol, enums and flags."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from qlinkgen.plan import Plan
 
 
 def limits(whole: Plan, kept: Plan) -> list[tuple[str, str]]:
-    """Names and values of what holds for the whole protocol, whatever is kept of it."""
+    """Names and values of limits of the whole protocol, regardless of selected messages."""
     bus, most = whole.protocol.bus, whole.frame.max_payload
     longest = max(message.frame_size for message in whole.messages)
     values = [

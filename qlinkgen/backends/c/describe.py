@@ -1,4 +1,4 @@
-"""Comments: what a firmware engineer wants to know of a message without opening its specification."""
+"""Comments that describe messages, so that firmware can be written without the specification."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from qlinkgen.plan.payload import (
     ValueStep,
 )
 
-#: Characters of a line of a comment.
+#: Length of a comment line.
 WIDTH = 100
 
 
 def message_head(command: Command | None, message: Message) -> list[str]:
-    """The first lines of a message's comment: name, id, section, purpose, warnings."""
+    """The first lines of the comment of a message: name, id, section, purpose, warnings."""
     section = message.section or (command.section if command else "")
     doc = message.doc or (command.doc if command else "")
     title = f"{message.name}, id 0x{message.id:02X}" + (f" (section {section})" if section else "")
     lines = [title + (f": {doc}" if doc else "")]
     if not message.confirmed or (command and not command.confirmed):
-        lines.append("NOT CONFIRMED: its source is weak; check it at the device.")
+        lines.append("NOT CONFIRMED: its source is weak; check it on the device.")
     if message.empty_is_default:
-        lines.append("A payload of no bytes is decoded as the defaults.")
+        lines.append("An empty payload is decoded as the defaults.")
     return [piece for line in lines for piece in c_text.comment(line, WIDTH)]
 
 
@@ -90,7 +90,7 @@ def _order(integer: Integer) -> str:
 
 
 def member_note(value: Value, step: ValueStep | Member | RunStep) -> str:
-    """What stands behind a struct member: purpose, unit, range, meaning."""
+    """The comment of a struct member: purpose, unit, range, meaning."""
     parts = [value.doc] if value.doc else []
     match step:
         case ValueStep() | Member() | ItemsStep():

@@ -1,4 +1,4 @@
-"""Packets: nothing marks one; an answer is checked over the request it belongs to."""
+"""Packets: frames without a delimiter; the check value of a response covers its request."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PacketCheckView:
-    """The check value of an answer."""
+    """The check value of a response."""
 
     sum_type: str
     word_type: str
@@ -32,7 +32,7 @@ class PacketCheckView:
 
 @dataclass(frozen=True, slots=True)
 class PacketView:
-    """What the templates of packets place."""
+    """Variables of the templates of packets."""
 
     buffer_size: int
     count_type: str
@@ -41,14 +41,14 @@ class PacketView:
 
 @dataclass(frozen=True, slots=True)
 class Sized:
-    """Requests whose payload has the same size."""
+    """Requests with the same payload size."""
 
     size: int
     constants: list[str]
 
 
 def packet_view(plan: Plan) -> PacketView:
-    """Describe packets to their templates."""
+    """The view of packets."""
     check, most = plan.frame.check, plan.frame.max_payload
     return PacketView(
         max(1, most), unsigned_type(max(8, most.bit_length())), _check(check) if check else None
@@ -56,14 +56,14 @@ def packet_view(plan: Plan) -> PacketView:
 
 
 def sum_type(check: Check) -> str:
-    """The C type of a sum over request and answer."""
+    """The C type of a sum over request and response."""
     return unsigned_type(check.algorithm.width)
 
 
 def _check(check: Check) -> PacketCheckView:
     algorithm, kind = check.algorithm, sum_type(check)
     if not isinstance(algorithm, Sum):
-        raise GenerationError(f"{algorithm.name}: the check value of a packet is a sum")
+        raise GenerationError(f"{algorithm.name}: the check value of a packet must be a sum")
     return PacketCheckView(
         sum_type=kind,
         word_type=unsigned_type(max(algorithm.width, 8 * check.word)),
@@ -79,7 +79,7 @@ def _check(check: Check) -> PacketCheckView:
 
 
 def packet_to_frame(names: Names, message: MessagePlan) -> Function:
-    """The function that makes a packet."""
+    """The function that encodes a packet."""
     stated, upper, check = message.message, names.upper, message.envelope.check
     struct = struct_parameter(names, stated, const=True)
     encode, call = f"{names.function(stated)}_encode", "message, " if struct else ""
@@ -103,7 +103,7 @@ def packet_to_frame(names: Names, message: MessagePlan) -> Function:
 
 
 def packet_from_frame(names: Names, message: MessagePlan) -> Function:
-    """The function that takes an answer apart; schemas allow answers of fixed size alone."""
+    """The function that decodes a response; schemas allow only responses of fixed size."""
     stated, check = message.message, message.envelope.check
     struct = struct_parameter(names, stated, const=False)
     request = "request_sum, " if check else ""

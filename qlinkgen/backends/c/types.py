@@ -1,4 +1,4 @@
-"""C types of numbers: those that the schema names, each with its conversions once, and the plain ones."""
+"""C types of numbers: named types with their conversions, and plain types."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from qlinkgen.plan.tree import Plan
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """The numbers of a conversion, and what the function is called that rounds."""
+    """The numbers of a conversion, and the name of the rounding function."""
 
     factor: str
     bias: str
@@ -34,10 +34,10 @@ class Kind:
     """A named type, or a scaled value of a type without a name.
 
     Attributes:
-        stem: what its functions and its C type begin with.
+        stem: prefix of its functions and its C type.
         title: text of its comment.
-        number: what a raw value is.
-        named: it has a C type of its own.
+        number: the scalar of raw values.
+        named: whether it has its own C type.
     """
 
     stem: str
@@ -47,7 +47,7 @@ class Kind:
 
     @property
     def plain(self) -> str:
-        """The C type of a raw value where it is not named."""
+        """The plain C type of a raw value."""
         return scalar_type(self.number)
 
     @property
@@ -57,12 +57,12 @@ class Kind:
 
     @property
     def constant(self) -> str:
-        """What its macros begin with."""
+        """Prefix of its macros."""
         return self.stem.upper()
 
     @property
     def scale(self) -> Scale | None:
-        """Its conversions, None where raw values are the physical ones."""
+        """Its conversion, None without scaling."""
         number = self.number
         if number.scaling is None:
             return None
@@ -80,15 +80,15 @@ class Types:
     """The C types of the numbers of one header."""
 
     def __init__(self, plan: Plan, names: Names) -> None:
-        """Note what the kept messages have."""
+        """Use the selected messages of the plan."""
         self._plan = plan
         self._names = names
 
     @cached_property
     def named(self) -> Mapping[str, Kind]:
-        """The types that the schema names, by name, in order of their first use.
+        """The named types, by name, in order of first use.
 
-        A field may narrow its type: the type is what most of its fields make of it.
+        Fields may narrow a type; the most frequent variant becomes the C type.
         """
         found: dict[str, Counter[Scalar]] = {}
         for number in self._numbers():
@@ -109,7 +109,7 @@ class Types:
         return kind.type if kind and kind.plain == plain else plain
 
     def conversions(self, message: Message, value: str, number: Scalar) -> Kind | None:
-        """What converts a scaled value: its type, or functions of its own where it differs from that."""
+        """The conversion of a scaled value: that of its type, or its own if it differs."""
         if number.scaling is None:
             return None
         kind = self.named.get(number.type_name)
@@ -135,7 +135,7 @@ class Types:
 
 
 def _kept(number: Scalar) -> Scalar:
-    """What conversions depend on."""
+    """The properties that conversions depend on."""
     return Scalar(
         bits=number.bits, signed=number.signed, chunks=(), minimum=number.minimum, maximum=number.maximum,
         scaling=number.scaling, unit=number.unit,
@@ -147,7 +147,7 @@ def _title(name: str, number: Scalar) -> str:
 
 
 def _whole(value: int) -> str:
-    """An integer constant of the least type that holds it everywhere."""
+    """An integer constant of the smallest type that holds it on all platforms."""
     size = abs(value).bit_length()
     suffix = "" if size < 16 else "L" if size < 32 else "LL" if size < 64 else "ULL"
     return bracketed(f"{value}{suffix}")

@@ -32,7 +32,7 @@ class CheckView:
 
 @dataclass(frozen=True, slots=True)
 class KindView:
-    """A kind of vectors, and the bit of a row's first byte that says so."""
+    """A kind of vectors, and its bit in the first byte of a row."""
 
     name: str
     bit: str
@@ -40,11 +40,11 @@ class KindView:
 
 @dataclass(frozen=True, kw_only=True)
 class KitView:
-    """What the templates place, each by its name. Types are the least that hold every number of the kit.
+    """The variables of the templates. Types are the smallest that hold every number of the kit.
 
     Attributes:
-        place_type: holds the places of a struct's members; 16 bits where they do, for small targets.
-        empty_wires: an answer has no payload, and nothing frames or checks it.
+        place_type: holds the offsets of struct members; 16 bits if possible, for small targets.
+        empty_wires: a response is empty: without payload, frame and check value.
     """
 
     about: list[str]
@@ -96,10 +96,10 @@ class KitView:
 
 
 class Kit:
-    """Lowers the vectors of a protocol to the tables of a C file."""
+    """Converts the vectors of a protocol to the tables of a C file."""
 
     def __init__(self, plan: Plan, sources: Sources) -> None:
-        """``plan`` has what the header has."""
+        """``plan`` has the messages of the header."""
         self._plan = plan
         self._header = sources.header
         self._rows = rows_of(plan, sources)
@@ -107,7 +107,7 @@ class Kit:
         self._entries = Entries(plan, sources.header, self._rows)
 
     def view(self) -> KitView:
-        """What the templates place."""
+        """The variables of the templates."""
         header, entries = self._header, self._entries.views()
         check, kinds, noise = self._check(), self._kinds(), streams.noise(self._plan)
         tests = bool(check) + sum(each.tests + each.asked_tests + each.told_tests for each in entries)
@@ -169,12 +169,12 @@ class Kit:
         kinds = tuple(kinds_in(self._rows))
         if len(kinds) > _KINDS:
             raise GenerationError(
-                f"{self._plan.protocol.name}: {len(kinds)} kinds of vectors; a kit holds {_KINDS}"
+                f"{self._plan.protocol.name}: {len(kinds)} kinds of vectors; a kit holds at most {_KINDS}"
             )
         return kinds
 
     def _check(self) -> CheckView | None:
-        """The check value of the nine characters 123456789, where it is a CRC."""
+        """The check value of the nine characters 123456789, None if it is not a CRC."""
         check, bits = self._plan.frame.check, self._header.check_bits
         if check is None or not bits or not isinstance(check.algorithm, Algorithm):
             return None

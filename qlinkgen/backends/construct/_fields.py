@@ -1,9 +1,9 @@
-"""Payloads: what a described protocol needs beside construct's own classes.
+"""Payloads: classes that protocols need in addition to those of construct.
 
-A Message consists of integers, which are construct's own or Groups, wrapped in Ranged, Clear, Boolean, Scaled
-and OpenFlags; of BitFields, whose fields are Bits; of ArrayField, BytesField and TextField, which a Count may
-count. Construct's Enum and FlagsEnum name numbers and bits; its Default, Const and Rebuild say what is sent
-when nothing is given. All errors are ConstructErrors.
+A Message consists of integers, from construct or Groups, wrapped in Ranged, Clear, Boolean, Scaled and
+OpenFlags; of BitFields, whose fields are Bits; of ArrayField, BytesField and TextField, which a Count may
+count. Enum and FlagsEnum of construct name numbers and bits; its Default, Const and Rebuild provide values
+that are not given. All errors are ConstructErrors.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from construct import (
 
 _EXACT = Context(prec=100)
 
-#: What is sent and received, by name. Any: each field has values of its own, and checks them.
+#: Values by name. Any: each field checks its own values.
 Values = Mapping[str, Any]
-#: The items of a run: a list, bytes or text.
+#: A value of several items: a list, bytes or text.
 Row = Sequence[object]
 
 
@@ -52,7 +52,7 @@ class Groups(Construct):
         self.signed = signed
 
     def number(self, data: bytes) -> int:
-        """The integer in these bytes; bits outside of the groups are ignored."""
+        """The integer of wire bytes; bits outside of the groups are ignored."""
         pairs = zip(data, self.chunks, strict=True)
         value = sum((byte & (1 << bits) - 1) << shift for byte, (shift, bits) in pairs)
         return _signed(value, self.bits) if self.signed else value
@@ -79,7 +79,7 @@ class Groups(Construct):
 
 
 class Bits(Construct):
-    """Bits first..last of the integer around it; 0 is the least significant one."""
+    """Bits first..last of the surrounding integer; 0 is the least significant one."""
 
     def __init__(self, first: int, last: int, *, signed: bool = False) -> None:
         super().__init__()
@@ -99,7 +99,7 @@ class Bits(Construct):
 
 
 class BitFields(Construct):
-    """An integer divided into fields; bits of no field are sent as zero and ignored when received."""
+    """An integer divided into fields; other bits are sent as zero and ignored when received."""
 
     def __init__(self, integer: Construct, *fields: Renamed) -> None:
         super().__init__()
@@ -139,7 +139,7 @@ def _signed(value: int, bits: int) -> int:
 def _unsigned(value: object, bits: int, signed: bool, path: str) -> int:
     low = -(1 << bits - 1) if signed else 0
     if not isinstance(value, int) or not low <= value < low + (1 << bits):
-        raise IntegerError(f"{value!r} is no integer of {bits} bits", path=path)
+        raise IntegerError(f"{value!r} is not an integer of {bits} bits", path=path)
     return value & (1 << bits) - 1
 
 
@@ -162,7 +162,7 @@ class Ranged(Adapter):
 
 
 class Clear(Adapter):
-    """Bits of which none of the mask may be set."""
+    """An integer in which all bits of the mask must be zero."""
 
     def __init__(self, subcon: Construct, mask: int) -> None:
         super().__init__(subcon)
@@ -170,7 +170,7 @@ class Clear(Adapter):
 
     def _decode(self, obj: object, context: Container, path: str) -> int:
         if not isinstance(obj, int) or obj & self.mask:
-            raise ValidationError(f"{obj!r} has bits of {self.mask:#x}", path=path)
+            raise ValidationError(f"{obj!r} has illegal bits of {self.mask:#x}", path=path)
         return obj
 
     _encode = _decode
@@ -194,14 +194,14 @@ class Member(NamedTuple):
 
 
 def like(named: Construct, subcon: Construct) -> Construct:
-    """The Enum or FlagsEnum with another integer."""
+    """A copy of an Enum or FlagsEnum with another integer."""
     other = copy.copy(named)
     other.subcon = subcon
     return other
 
 
 class Flags(Container):
-    """Flags by name; `int` gives the whole number, with the bits that have no name."""
+    """Flags by name; `int` gives the whole number, including unnamed bits."""
 
     def __int__(self) -> int:
         named = sum(bit for name, bit in self["_bits"].items() if self[name])
@@ -209,7 +209,7 @@ class Flags(Container):
 
 
 class OpenFlags(Adapter):
-    """A FlagsEnum that keeps bits without a name: it is parsed to Flags."""
+    """A FlagsEnum that preserves unnamed bits: it is parsed to Flags."""
 
     def __init__(self, named: FlagsEnum) -> None:
         super().__init__(named.subcon)
@@ -228,8 +228,8 @@ class OpenFlags(Adapter):
 class Scaled(Adapter):
     """A value in a unit: (integer * factor + bias) / divisor.
 
-    It is built to the nearest step, a tie to the even one, exactly. With ``exact`` it is parsed to a Decimal,
-    for integers of more bits than a float can carry.
+    Building rounds exactly to the nearest step, ties to even. With ``exact`` it is parsed to a Decimal, for
+    integers of more bits than a float can represent.
     """
 
     def __init__(
@@ -260,11 +260,11 @@ class Scaled(Adapter):
             raise ValidationError(f"{obj!r} is not a number", path=path) from None
 
 
-# Items in a row
+# Arrays, bytes and text
 
 
 class Count(Subconstruct):
-    """How many items the field ``of`` has; ``step`` is the size of an item where bytes are counted."""
+    """The number of items of the field ``of``; ``step`` is the size of an item if bytes are counted."""
 
     def __init__(self, subcon: Construct, of: str, step: int = 1) -> None:
         super().__init__(subcon)
@@ -273,7 +273,7 @@ class Count(Subconstruct):
         self.flagbuildnone = True
 
     def number(self, data: bytes) -> int:
-        """The integer in these bytes; whether each byte is one of it shows later."""
+        """The integer of wire bytes; unused bits are checked later."""
         return int(
             self.subcon.number(data)
             if isinstance(self.subcon, Groups)
@@ -289,7 +289,7 @@ class Count(Subconstruct):
 
 
 class ArrayField(Construct):
-    """A list of minimum to maximum items. It takes all bytes: the Message knows how many these are."""
+    """A list of minimum to maximum items. It takes all bytes, which the Message limits."""
 
     def __init__(self, item: Construct, minimum: int, maximum: int) -> None:
         super().__init__()
@@ -299,10 +299,10 @@ class ArrayField(Construct):
         self.maximum = maximum
 
     def checked(self, number: int, path: str) -> int:
-        """The number of items, if it is one that is allowed."""
+        """The number of items, checked against the limits."""
         if not self.minimum <= number <= self.maximum:
             raise RangeError(
-                f"{number} items are not {self.minimum}..{self.maximum}", path=path
+                f"{number} items, expected {self.minimum}..{self.maximum}", path=path
             )
         return number
 
@@ -341,27 +341,27 @@ class TextField(BytesField):
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:
         data: bytes = stream_read_entire(stream, path)
         if not data.isascii():
-            raise StringError(f"{data!r} is not of 7-bit characters", path=path)
+            raise StringError(f"{data!r} is not 7-bit text", path=path)
         return data.decode("ascii")
 
     def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
         if not isinstance(obj, str) or not obj.isascii():
-            raise StringError(f"{obj!r} is not text of 7-bit characters", path=path)
+            raise StringError(f"{obj!r} is not 7-bit text", path=path)
         super()._build(obj.encode("ascii"), stream, context, path)
         return obj
 
 
 def _run(field: Renamed) -> ArrayField | None:
-    """The items of a field, None where it is of fixed size."""
+    """The array, bytes or text of a field, None for other fields."""
     inner = field.subcon.subcon if isinstance(field.subcon, Default) else field.subcon
     return inner if isinstance(inner, ArrayField) else None
 
 
 class Message(Construct):
-    """One message: its name, its id on the wire, and the payload, which it takes whole.
+    """A message: its name, its id on the wire, and the whole payload.
 
-    Fields that are not given are sent with their defaults; those inside a BitFields are set and read beside
-    the others. Sizes are checked before values.
+    Missing fields are sent with their defaults. Values inside BitFields are on the same level as other
+    values. Sizes are checked before values.
     """
 
     def __init__(
@@ -382,7 +382,7 @@ class Message(Construct):
         self.empty_is_default = empty_is_default
         self.defaults = {field.name: field.subcon.value for field in self._settable()}
         self.runs = {field.name: run for field in fields if (run := _run(field))}
-        #: Numbers of items that are always the same.
+        #: Constant numbers of items.
         self.known = {
             name: run.minimum
             for name, run in self.runs.items()
@@ -403,11 +403,11 @@ class Message(Construct):
         return (field for field in self.fields if isinstance(field.subcon, Count))
 
     def fits(self, size: int) -> bool:
-        """A payload may have so many bytes, as far as they alone tell."""
+        """Whether a payload may have this size, regardless of its counts."""
         return self.least <= size <= self.most or (size == 0 and self.empty_is_default)
 
     def size(self, counts: Mapping[str, int]) -> int:
-        """Bytes of payload; a run that has no number of items yet is left out."""
+        """Size of the payload; runs with an unknown number of items count as empty."""
         return sum(self._size(field, counts) for field in self.fields)
 
     def _size(self, field: Renamed, counts: Mapping[str, int]) -> int:
@@ -415,7 +415,7 @@ class Message(Construct):
         return run.size * counts.get(field.name, 0) if run else int(field.sizeof())
 
     def measured(self, take: Callable[[int], bytes]) -> bytes:
-        """The payload from the bytes that ``take`` gives; its counts alone tell its size."""
+        """Read a payload with ``take``; its size follows from its counts."""
         data, at, counts = b"", 0, dict(self.known)
         for field in self.fields:
             size = self._size(field, counts)
@@ -426,17 +426,17 @@ class Message(Construct):
         return data + take(at - len(data))
 
     def _learned(self, field: Renamed, data: bytes, path: str) -> int:
-        """How many items a count tells."""
+        """The number of items from a count."""
         cell, of = data[: field.sizeof()], field.subcon.of
         if len(cell) < field.sizeof():
             raise RangeError(f"{field.name} is missing", path=path)
         number, rest = divmod(field.subcon.number(cell), field.subcon.step)
         if rest:
-            raise RangeError(f"{field.name} is no whole number of {of}", path=path)
+            raise RangeError(f"{field.name} is not a multiple of the item size of {of}", path=path)
         return self.runs[of].checked(number, path)
 
     def _cells(self, data: bytes, path: str) -> list[tuple[Renamed, bytes]]:
-        """The fields with their bytes. All sizes are right, or RangeError is raised."""
+        """The fields with their bytes. Raises RangeError for wrong sizes."""
         if not self.least <= len(data) <= self.most:
             raise RangeError(
                 f"{len(data)} bytes, {self.name} has {self.least}..{self.most}",
@@ -455,7 +455,7 @@ class Message(Construct):
                 number, rest = divmod(len(data) - self.size(counts), run.size)
                 if rest:
                     raise RangeError(
-                        f"{len(data)} bytes are no whole number of {field.name}",
+                        f"{len(data)} bytes do not divide into items of {field.name}",
                         path=path,
                     )
                 counts[field.name] = run.checked(number, path)
@@ -464,7 +464,7 @@ class Message(Construct):
             at += size
         if at != len(data):
             raise RangeError(
-                f"{len(data)} bytes, the counts of {self.name} tell {at}", path=path
+                f"{len(data)} bytes, the counts of {self.name} require {at}", path=path
             )
         return cells
 
@@ -500,6 +500,6 @@ class Message(Construct):
                 field._build(whole, stream, values, path)
         except TypeError as error:
             raise ValidationError(
-                f"{self.name} has a value of a wrong type: {error}", path=path
+                f"{self.name} has a value of the wrong type: {error}", path=path
             ) from None
         return obj

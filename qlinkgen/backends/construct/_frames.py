@@ -1,8 +1,8 @@
-"""Frames: from the bytes on the wire to a Container of message, address and fields, and back.
+"""Frames: parses wire bytes to a Container of message, address and fields, and builds them.
 
-The address has the name that the protocol gives it. A frame is a list of parts; a DelimitedFrame ends by its
-length or its message, a MarkedFrame by a byte with a marker bit, and a Packet has no bounds. This code alone
-fills in and checks lengths, inserted bytes and check values.
+The address has its name in the protocol. A frame is a list of parts. The end of a DelimitedFrame follows from
+its length or its message, that of a MarkedFrame from a byte with a marker bit; a Packet has no delimiter.
+Frames compute and check lengths, inserted bytes and check values.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ._fields import Message, Values
 
 
 class FrameError(ConstructError):
-    """Bytes that are not a frame.
+    """Bytes are not a valid frame.
 
     Attributes:
         kind: crc, stuffing, length, range, unknown, truncated, frame, or illegal for a refused command.
@@ -36,7 +36,7 @@ class FrameError(ConstructError):
 
 
 class CRC(NamedTuple):
-    """A cyclic redundancy check by its catalogue parameters, computed bit by bit as they are defined."""
+    """A CRC with the parameters of the catalogue, computed bit by bit according to their definition."""
 
     width: int
     poly: int
@@ -46,7 +46,7 @@ class CRC(NamedTuple):
     xorout: int
 
     def compute(self, data: Iterable[int]) -> int:
-        """The check value of some bytes."""
+        """The check value of bytes."""
         register = self.init
         for byte in data:
             for bit in range(8) if self.refin else reversed(range(8)):
@@ -60,13 +60,13 @@ class CRC(NamedTuple):
 
 
 class Sum(NamedTuple):
-    """The sum of bytes or words, cut to a number of bits, inverted at last if it is a complement."""
+    """The sum of bytes or words modulo 2**width, inverted if it is a complement."""
 
     width: int
     complement: bool = False
 
     def compute(self, data: Iterable[int]) -> int:
-        """The check value of some bytes or words."""
+        """The check value of bytes or words."""
         total = sum(data)
         return (~total if self.complement else total) & (1 << self.width) - 1
 
@@ -75,14 +75,14 @@ class Sum(NamedTuple):
 
 
 class Constant(NamedTuple):
-    """Bytes that are always the same."""
+    """Constant bytes."""
 
     name: str
     data: bytes
 
 
 class Length(NamedTuple):
-    """The payload's bytes as they are sent, plus ``bias``; from ``least`` to ``most``."""
+    """The size of the payload as sent, plus ``bias``; from ``least`` to ``most``."""
 
     name: str
     integer: Construct
@@ -131,7 +131,7 @@ class Mark(NamedTuple):
 
 
 class Payload(NamedTuple):
-    """The payload, of ``most`` bytes at most."""
+    """The payload, at most ``most`` bytes."""
 
     name: str
     most: int
@@ -140,8 +140,8 @@ class Payload(NamedTuple):
 class Check(NamedTuple):
     """A check value over other parts; bits outside of ``mask`` are neither sent nor compared.
 
-    With ``word`` it is a sum over the answered packet too: its id, then words of so many bytes of both.
-    ``rejected`` is the value that refuses a command.
+    With ``word`` it is a sum that includes the request: its id, then the words of this size of both packets.
+    ``rejected`` is the value that rejects a command.
     """
 
     name: str
@@ -153,18 +153,18 @@ class Check(NamedTuple):
     rejected: int | None = None
 
     def packed(self, value: int) -> bytes:
-        """A check value as it is sent."""
+        """The wire bytes of a check value."""
         return bytes(self.integer.build(value & self.mask))
 
     def value(self, cells: Mapping[str, bytes], request: bytes) -> bytes:
-        """The check value of a frame in cells, as it is sent."""
+        """The wire bytes of the check value of a frame in cells."""
         runs = [cells[name] for name in self.over]
         if not self.word:
             return self.packed(self.algorithm.compute(b"".join(runs)))
         if not request:
             raise FrameError(
                 "unknown",
-                "an answer needs its request: pass request=packet to build and parse",
+                "a response needs its request: pass request=packet to build and parse",
             )
         words = [
             run[at : at + self.word]
@@ -182,7 +182,7 @@ Part = Constant | Length | Id | Address | Mark | Payload | Check
 
 
 def _size(part: Part) -> int:
-    """Bytes before stuffing, 0 for the payload."""
+    """Size before stuffing, 0 for the payload."""
     match part:
         case Constant():
             return len(part.data)
@@ -195,9 +195,9 @@ def _size(part: Part) -> int:
 
 
 class Stuffing(NamedTuple):
-    """A byte inserted after each occurrence of others, in the parts ``over``.
+    """Inserts a byte after each occurrence of a pattern, in the parts ``over``.
 
-    Without ``over`` it is inserted in the payload before length and check value are computed.
+    Without ``over`` the payload is stuffed before length and check value are computed.
     """
 
     after: bytes
@@ -205,11 +205,11 @@ class Stuffing(NamedTuple):
     over: Sequence[str] = ()
 
     def add(self, data: bytes) -> bytes:
-        """With the inserted bytes."""
+        """Add inserted bytes."""
         return data.replace(self.after, self.after + self.insert)
 
     def remove(self, data: bytes) -> bytes:
-        """Without them."""
+        """Remove and check inserted bytes."""
         plain = data.replace(self.after + self.insert, self.after)
         if self.add(plain) != data:
             raise FrameError(
@@ -223,7 +223,7 @@ class Stuffing(NamedTuple):
 
 
 class Frame(Construct):
-    """Takes all bytes that it is given as one frame of one of its messages."""
+    """One frame with one of its messages; it takes all bytes."""
 
     def __init__(
         self,
@@ -247,7 +247,7 @@ class Frame(Construct):
         self.check = next((part for part in parts if isinstance(part, Check)), None)
 
     def overhead(self, message: Message) -> int:
-        """Bytes beside the payload of a message."""
+        """Size of the frame of a message without its payload."""
         return sum(
             _size(part)
             for part in self.parts
@@ -262,7 +262,7 @@ class Frame(Construct):
         request: bytes = b"",
         number: int | None = None,
     ) -> bytes:
-        """The frame of a payload, whatever it is; ``number`` replaces the id of the message."""
+        """A frame around a payload, which is not checked; ``number`` replaces the message id."""
         stuffing, shown = self.stuffing, message.id if number is None else number
         sent = stuffing.add(payload) if stuffing and not stuffing.over else payload
         cells = {
@@ -301,12 +301,12 @@ class Frame(Construct):
         message = self.by_name.get(obj["message"])
         if message is None:
             raise ValidationError(
-                f"there is no message {obj['message']!r} in this direction", path=path
+                f"unknown message {obj['message']!r} in this direction", path=path
             )
         address = obj[self.address] if self.address else 0
         if not _allowed(message, address):
             raise ValidationError(
-                f"{message.name} cannot be sent to {self.address} {address!r}",
+                f"{message.name} cannot have {self.address} {address!r}",
                 path=path,
             )
         payload = message.build(obj.get("fields") or {})
@@ -317,7 +317,7 @@ class Frame(Construct):
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
         wire = stream_read_entire(stream, path)
         if not wire:
-            raise FrameError("truncated", "there are no bytes")
+            raise FrameError("truncated", "no data")
         return self._frame(wire, context._params.get("request", b""))
 
     def _frame(self, wire: bytes, request: bytes) -> Container:
@@ -325,7 +325,7 @@ class Frame(Construct):
 
     def _known(self, number: int) -> Message:
         if number not in self.by_id:
-            raise FrameError("unknown", f"no message has the id {number:#04x}")
+            raise FrameError("unknown", f"unknown message id {number:#04x}")
         return self.by_id[number]
 
     def _judged(
@@ -336,7 +336,7 @@ class Frame(Construct):
         address: int = 0,
         request: bytes = b"",
     ) -> Container:
-        """The message of a frame in cells: check value, message, sizes, values, address."""
+        """Check a frame in cells: check value, message, sizes, values, address. Returns its message."""
         found = self.by_id.get(number)
         if self.check and (found is None or found.checksum):
             sent, expected = cells[self.check.name], self.check.value(cells, request)
@@ -345,20 +345,20 @@ class Frame(Construct):
                 refused = rejected is not None and sent == self.check.packed(rejected)
                 kind = "illegal" if refused else "crc"
                 raise FrameError(
-                    kind, f"{sent.hex()} was sent, {expected.hex()} expected"
+                    kind, f"received {sent.hex()}, expected {expected.hex()}"
                 )
         message = self._known(number)
         try:
             fields = message.parse(payload)
         except RangeError as error:
             raise FrameError(
-                "length", f"{len(payload)} bytes are not a payload; {error}"
+                "length", f"invalid payload of {len(payload)} bytes; {error}"
             ) from None
         except ConstructError as error:
             raise FrameError("range", f"{message.name}; {error}") from None
         if not _allowed(message, address):
             raise FrameError(
-                "range", f"{message.name} is never sent to {self.address} {address}"
+                "range", f"{message.name} cannot have {self.address} {address}"
             )
         place = {self.address: address} if self.address else {}
         return Container(message=message.name, **place, fields=fields)
@@ -380,7 +380,7 @@ def _allowed(message: Message, address: object) -> bool:
 
 
 class _Wire:
-    """Takes the bytes of parts off the wire, without the inserted ones."""
+    """Reads the bytes of parts, without inserted ones."""
 
     def __init__(self, data: bytes, stuffing: Stuffing | None, *, hunt: bool) -> None:
         self.data = data
@@ -391,7 +391,7 @@ class _Wire:
         self.recent = b""
 
     def take(self, part: Part, size: int) -> bytes:
-        """The next bytes, which belong to a part."""
+        """The next bytes, as those of a part."""
         taken = b""
         while len(taken) < size:
             if self.due and self.stuffing:
@@ -406,7 +406,7 @@ class _Wire:
 
     def _byte(self) -> bytes:
         if self.at == len(self.data):
-            raise FrameError("truncated", f"{self.at} bytes are not a whole frame")
+            raise FrameError("truncated", f"incomplete frame of {self.at} bytes")
         self.at += 1
         return self.data[self.at - 1 : self.at]
 
@@ -421,7 +421,7 @@ class _Wire:
         self.due, self.recent = False, b""
 
     def end(self) -> None:
-        """Only an inserted byte may follow."""
+        """Check that at most an inserted byte follows."""
         due = self.stuffing.insert if self.stuffing and self.due else b""
         if self.data[self.at :] not in (b"", due):
             raise FrameError(
@@ -432,8 +432,8 @@ class _Wire:
 class DelimitedFrame(Frame):
     """A frame whose end follows from its length, or from its message.
 
-    With ``hunt`` its first bytes are found nowhere else; with ``bare`` no constant begins it, so an id or an
-    address that is not known shows first.
+    With ``hunt`` its first bytes occur nowhere else; with ``bare`` it does not begin with a constant, so an
+    unknown id or an illegal address is detected first.
     """
 
     def _frame(self, wire: bytes, request: bytes) -> Container:
@@ -472,7 +472,7 @@ class DelimitedFrame(Frame):
             message = self._known(numbers[Id])
             if Address in numbers and not _allowed(message, numbers[Address]):
                 raise FrameError(
-                    "range", f"{message.name} is never sent to {numbers[Address]}"
+                    "range", f"{message.name} cannot have address {numbers[Address]}"
                 )
 
     def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
@@ -499,13 +499,13 @@ class DelimitedFrame(Frame):
         if len(payload) > self.payload.most:
             raise FrameError(
                 "length",
-                f"{len(payload)} bytes of payload, at most {self.payload.most} are",
+                f"payload of {len(payload)} bytes, expected at most {self.payload.most}",
             )
         return payload
 
 
 class MarkedFrame(Frame):
-    """A frame between a header and an end byte that carry a marker bit, which no other byte has."""
+    """A frame between a header and an end byte, which have a marker bit that other bytes lack."""
 
     def _frame(self, wire: bytes, request: bytes) -> Container:
         header, end = self.parts[0], self.parts[-1]
@@ -514,7 +514,7 @@ class MarkedFrame(Frame):
         number, address = header.split(wire[0])
         marks = [at for at, byte in enumerate(wire) if byte & header.marker]
         if marks == [0] and number != end.end:
-            raise FrameError("truncated", f"{wire[-1]:#04x} is not an end")
+            raise FrameError("truncated", f"{wire[-1]:#04x} is not an end byte")
         if (
             marks != [0, len(wire) - 1]
             or end.end == number
@@ -532,7 +532,7 @@ class MarkedFrame(Frame):
         ):
             raise FrameError(
                 "frame",
-                f"no message has the id {number}, {self.address} {address}, {len(wire)} bytes",
+                f"no message with id {number}, {self.address} {address}, {len(wire)} bytes",
             )
         size = len(wire) - self.overhead(message)
         cells = {self.payload.name: wire[1 : 1 + size]}
@@ -544,7 +544,7 @@ class MarkedFrame(Frame):
 class Packet(Frame):
     """A message id and a payload, or a payload and a check value over both packets.
 
-    Without an id it is an answer: parse and build are given ``request``, the packet that is answered.
+    Without an id it is a response: parse and build need ``request``, the packet that it answers.
     """
 
     def _frame(self, wire: bytes, request: bytes) -> Container:
@@ -552,7 +552,7 @@ class Packet(Frame):
         if not has_id and not request:
             raise FrameError(
                 "unknown",
-                "an answer needs its request: pass request=packet to build and parse",
+                "a response needs its request: pass request=packet to build and parse",
             )
         first = (wire if has_id else request)[0]
         message = self._known(first)
@@ -561,12 +561,12 @@ class Packet(Frame):
         if len(wire) < least + beside:
             raise FrameError(
                 "truncated",
-                f"{len(wire)} bytes, {message.name} has {least + beside} at least",
+                f"{len(wire)} bytes, {message.name} has at least {least + beside}",
             )
         if len(wire) > message.most + beside:
             raise FrameError(
                 "length",
-                f"{len(wire)} bytes, {message.name} has {message.most + beside} at most",
+                f"{len(wire)} bytes, {message.name} has at most {message.most + beside}",
             )
         cells, at = {}, 0
         for part in self.parts:

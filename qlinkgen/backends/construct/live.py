@@ -1,4 +1,4 @@
-"""Live structures: the tree evaluated. Construct is imported here alone, and only when this is asked for."""
+"""Live structures: the evaluated tree. Only this module imports construct, when it is called."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from qlinkgen.plan import Options, plan_of
 
 
 class Live:
-    """What a generated module defines, and short ways to use it as the reference.
+    """The definitions of a generated module, with methods for its use as a reference.
 
     Attributes:
-        names: everything that the module defines, under the names that its source has.
+        names: the definitions by their names in the source.
         messages: payload structures by full name.
         frames: frame structures by direction.
     """
@@ -28,13 +28,13 @@ class Live:
         self.frames = {direction: names[name] for direction, name in known.items() if name in names}
 
     def payload(self, message: str, fields: Mapping[str, Value]) -> bytes:
-        """The payload of a message; fields that are not given have their defaults."""
+        """The payload of a message, with defaults for missing fields."""
         return bytes(self.messages[message].build(fields))
 
     def wrap(
         self, message: str, payload: bytes, address: int = 0, request: bytes = b"", number: int | None = None
     ) -> bytes:
-        """The frame around a payload, whatever the payload is; ``number`` replaces the message id."""
+        """A frame around a payload, which is not checked; ``number`` replaces the message id."""
         frame = next(each for each in self.frames.values() if message in each.by_name)
         return bytes(frame.wrap(self.messages[message], payload, address, request, number))
 

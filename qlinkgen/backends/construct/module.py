@@ -1,4 +1,4 @@
-"""From a plan to the definitions of a module: types, one for each message, then the frames."""
+"""Builds the definitions of a module from a plan: types, messages, then frames."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from qlinkgen.plan.framing import (
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
-#: Names of what is defined beside messages and types.
+#: Names of definitions other than messages and types.
 _OWN_NAMES = ("ALGORITHM", "LAYOUT", "MESSAGES", "REQUEST_FRAME", "RESPONSE_FRAME", "FRAME", "CRC")
 
 
 def definitions(plan: Plan) -> tuple[Definition, ...]:
-    """Everything that the module of a protocol defines."""
+    """The definitions of the module of a protocol."""
     return tuple(_definitions(plan))
 
 

@@ -1,4 +1,4 @@
-"""From the steps of a payload to the constructor calls of its fields."""
+"""Builds the constructor calls of the fields of a payload from its steps."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from qlinkgen.plan.payload import (
 )
 from qlinkgen.plan.tree import MessagePlan, Plan
 
-#: Bytes of the integers that construct has a name for.
+#: Sizes of the integers that construct has names for.
 _NAMED_SIZES = (1, 2, 3, 4, 8)
 _UNCONFIRMED = "NOT CONFIRMED by a second source."
 
 
 def integer(kind: Integer, *, signed: bool | None = None) -> Node:
-    """The integer of construct that has these bytes, or Groups where it has none."""
+    """The construct of an integer, Groups if construct does not provide one."""
     signed = kind.signed if signed is None else signed
     if kind.byteorder is None:
         pairs = tuple((chunk.shift, chunk.bits) for chunk in kind.chunks)
@@ -46,14 +46,14 @@ def integer(kind: Integer, *, signed: bool | None = None) -> Node:
 
 
 class Names:
-    """Names of what a module defines: that of the schema in capitals, with a suffix where it is taken."""
+    """Names of the definitions of a module: schema names in capitals, with a suffix if they are taken."""
 
     def __init__(self, taken: Iterable[str]) -> None:
-        """``taken`` are names that the module has itself."""
+        """``taken`` are names used by the module."""
         self._taken = set(taken)
 
     def of(self, name: str, suffix: str) -> str:
-        """A name that nothing else has."""
+        """A unique name."""
         upper = naming.upper(name)
         while upper in self._taken:
             upper += f"_{suffix}"
@@ -62,13 +62,13 @@ class Names:
 
 
 class Types:
-    """The types that the schema names: each is defined once, and used by every field that has its integer.
+    """The named types: each is defined once, and used by every field with the same integer.
 
-    Enums and flags are named by their labels; a type of another name is that of its conversion.
+    Enums and flags have the names of their labels; other types have the names of their conversions.
     """
 
     def __init__(self, plan: Plan, groups: Mapping[str, str], names: Names) -> None:
-        """``groups`` are the names of enums and flags, ``names`` gives those of other types."""
+        """``groups`` are the names of enums and flags, ``names`` creates those of other types."""
         self._plan = plan
         found: dict[str, Counter[Node]] = {}
         for number, raw in self._numbers():
@@ -84,7 +84,7 @@ class Types:
         )
 
     def definitions(self) -> Iterator[Definition]:
-        """The enums and flags of the plan, and the other types that its messages use."""
+        """Definitions of enums, flags and other types in use."""
         for enum in self._plan.enums:
             members = tuple((each.name, each.value) for each in enum.members)
             yield self._labelled("Enum", enum, members)
@@ -123,7 +123,7 @@ class Types:
                         assert_never(step)
 
     def of(self, number: Scalar, raw: Node) -> Node:
-        """What turns an integer into the native value."""
+        """The adapter from an integer to the native value."""
         node, meaning = _converted(number, raw), number.meaning
         same = self._usual.get(name := _name(number)) == node
         match meaning:
@@ -142,7 +142,7 @@ class Types:
 
 
 def comment(doc: str, section: str, *, confirmed: bool = True) -> str:
-    """Purpose and section; what is not confirmed says so."""
+    """Purpose and section, with a remark if not confirmed."""
     words = [doc.strip(), f"({section})" if section else "", "" if confirmed else _UNCONFIRMED]
     return " ".join(filter(None, words))
 
@@ -212,7 +212,7 @@ def _decimal(number: Decimal) -> Call:
 
 
 def _name(number: Scalar) -> str:
-    """Name of a number's type, "" where it has none."""
+    """Name of the type of a number, "" if it has none."""
     meaning = number.meaning
     match meaning:
         case Enum() | Flags():
@@ -229,7 +229,7 @@ def _bits(member: Member) -> Node:
 
 
 def _converted(number: Scalar, raw: Node) -> Node:
-    """An integer with its conditions and its conversion, labels left out."""
+    """An integer with its conditions and its conversion, without labels."""
     node = raw
     for each in conditions(number):
         node = _limited(node, each)
@@ -253,6 +253,6 @@ def _limited(node: Node, limit: Limit) -> Node:
 
 
 def _steps(number: int) -> Node:
-    """Fractions of fixed point numbers are read as powers of two."""
+    """A number, printed as a power of two for fixed-point fractions."""
     is_power = number >= 1 << 10 and number.bit_count() == 1
     return Number(number, f"2**{number.bit_length() - 1}") if is_power else number

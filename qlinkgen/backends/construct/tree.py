@@ -1,6 +1,6 @@
-"""A tree of constructor calls: evaluated it is live structures, printed it is their source.
+"""A tree of constructor calls, which can be evaluated to live structures or printed as source.
 
-There is one tree for both, so what a reader reviews is what the tests run.
+Both use the same tree, so the tests run the structures that readers review.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ from typing import Any
 from qlinkgen.backends import python_text
 from qlinkgen.model.texts import one_line
 
-#: Characters of a line of source.
+#: Line length of the source.
 WIDTH = 88
 
 
 @dataclass(frozen=True, slots=True)
 class Ref:
-    """A name: of a class or of something defined further up."""
+    """The name of a class or of an earlier definition."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """An integer, and how it is best read."""
+    """An integer, and its most readable form."""
 
     value: int
     text: str
@@ -42,7 +42,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """``"name" / node``, construct's way of naming a field; the doc is printed beside it."""
+    """``"name" / node``, a named field in construct; the doc is printed as a comment."""
 
     name: str
     node: Node
@@ -56,16 +56,16 @@ class Sequence:
     items: tuple[Node, ...]
 
 
-#: Besides these, what `repr` prints as it is written: numbers, text, bytes, and tuples of them.
+#: Numbers, text, bytes and tuples of them are printed by `repr`.
 Node = Ref | Number | Call | Named | Sequence | int | float | str | bytes | bool | None | tuple["Node", ...]
 
 
-#: What a node comes to. Any: construct tells no types of its classes, nor of what they make.
+#: An evaluated node. Any: construct has no type hints.
 Value = Any
 
 
 def hexadecimal(value: int, digits: int = 2) -> Number:
-    """An integer in so many hexadecimal digits."""
+    """An integer in ``digits`` hexadecimal digits."""
     return Number(value, f"0x{value:0{digits}X}")
 
 
@@ -76,7 +76,7 @@ class Definition:
     name: str
     node: Node
     comment: str = ""
-    #: It belongs to the definition above and stands directly below it.
+    #: It is printed directly below the definition above, without an empty line.
     attached: bool = False
 
 
@@ -84,7 +84,7 @@ class Definition:
 
 
 def evaluate(definitions: tuple[Definition, ...], names: Mapping[str, Value]) -> dict[str, Value]:
-    """What the definitions define, given what they may refer to."""
+    """Evaluate the definitions; they may refer to ``names``."""
     known = dict(names)
     return {each.name: known.setdefault(each.name, _value(each.node, known)) for each in definitions}
 
@@ -107,7 +107,7 @@ def _value(node: Node, known: Mapping[str, Value]) -> Value:
 
 
 def used(node: Node) -> Iterator[str]:
-    """Every name that a node refers to."""
+    """All names that a node refers to."""
     if isinstance(node, Ref | Call):
         yield node.name
     for child in _children(node):
@@ -130,7 +130,7 @@ def _children(node: Node) -> tuple[Node, ...]:
 
 
 def printed(definition: Definition) -> str:
-    """The source of a definition, its comment above, and an empty line above that."""
+    """The source of a definition, preceded by an empty line and its comment."""
     lines = python_text.comment(definition.comment, WIDTH - 4)
     comment = "".join(f"# {line}\n" for line in lines)
     gap = "" if definition.attached else "\n"
@@ -138,7 +138,7 @@ def printed(definition: Definition) -> str:
 
 
 def _text(node: Node, column: int, indent: int) -> str:
-    """The source of a node that begins in a column; where it does not fit, each part gets a line."""
+    """The source of a node that begins in a column; if it does not fit, each part gets a line."""
     flat = _flat(node)
     if column + len(flat) < WIDTH and not _documented(node):
         return flat
@@ -192,7 +192,7 @@ def _flat(node: Node) -> str:
 
 
 def _literal(value: Node) -> str:
-    """As `repr`, in double quotes."""
+    """Like `repr`, in double quotes."""
     if isinstance(value, tuple):
         return f"({', '.join(map(_literal, value))}{',' if len(value) == 1 else ''})"
     if isinstance(value, str):

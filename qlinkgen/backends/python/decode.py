@@ -1,4 +1,4 @@
-"""The statements that turn bytes into a message: sizes, a struct for each row of steps, then every value."""
+"""Generates the statements that decode a message: sizes, a struct for consecutive steps, then each value."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _INDENT = 8
 
 @dataclass
 class Row:
-    """Steps of fixed size in a row: where they begin, formats, and what they are unpacked into."""
+    """Consecutive steps of fixed size: offset, formats, and the variables that they are unpacked to."""
 
     start: Size
     codes: list[str] = field(default_factory=list)
@@ -56,7 +56,7 @@ class Row:
 
     @property
     def starred(self) -> bool:
-        """A target takes several items; one assignment can have one such."""
+        """Whether a target takes several items; an assignment can have only one of these."""
         return any(target.startswith("*") for target in self.targets)
 
 
@@ -66,7 +66,7 @@ class Decoder:
 
     Attributes:
         message: the plan.
-        place: what surrounds the payload.
+        place: the surroundings of the payload.
         title: the message in the names of its constants.
         scales: constant that converts each scaled value.
         constants: definitions that precede the class.
@@ -84,7 +84,7 @@ class Decoder:
     _values: list[str] = field(default_factory=list)
 
     def statements(self) -> list[str]:
-        """Lines of the function's body."""
+        """Lines of the function body."""
         payload = self.message.payload
         self._tabled = tabled(payload, self.place.byteorder)
         at = Size(-self.place.header)
@@ -111,18 +111,18 @@ class Decoder:
         return f"    raise {self.place.use('LayoutError')}"
 
     def _at(self, size: Size) -> str:
-        """A place in the payload as an index of what is read."""
+        """An offset in the payload as an index of the argument."""
         return integers.size_text(size + self.place.header)
 
     def _start(self, size: Size) -> list[str]:
-        """The statement that binds a place, where it is not always the same."""
+        """The statement that assigns an offset that varies."""
         return [f"start = {self._at(size)}"] if size.terms else []
 
     def _from(self, size: Size) -> str:
-        """A place that has been bound, as an index."""
+        """An assigned offset as an index."""
         return "start" if size.terms else self._at(size)
 
-    # A payload of no bytes
+    # Empty payload
 
     def _empty(self) -> list[str]:
         place, chosen = self.place, values.required_defaults(self.message, self.place)
@@ -135,7 +135,7 @@ class Decoder:
             lines += self._address_check(address, raw, _INDENT + 4)
             chosen = [f"{place.address}={raw}", *chosen]
         elif place.address and self.message.allowed is not None:
-            # The caller of `_read` puts in the right one.
+            # The caller sets the real address.
             chosen = [f"{place.address}={self.message.message.default_address}", *chosen]
         lines += wrapped("return cls(", chosen, ")", _INDENT + 4)
         return [f"if {test}:", *indented(lines)]
@@ -150,7 +150,7 @@ class Decoder:
                 self._values += self._address_check(part, number, _INDENT)
                 self._values.append(f"message.{self.place.address} = {number}")
             case LengthPart() if self.place.unique:
-                # The receiver relies on it, so nothing but this compares the length with the size.
+                # The receiver relies on this comparison of length and size.
                 number = self._size(part.integer, f"{part.name}_part", at)
                 self._sizes += [f"if {number} != {self._length(part)}:", self._bad_layout]
             case LengthPart() | IdPart() | ConstantPart():
@@ -179,14 +179,14 @@ class Decoder:
     # Rows
 
     def _row(self, at: Size, *, starred: bool = False) -> Row:
-        """The row that goes on at a place, or a new one."""
+        """The row that continues at an offset, or a new one."""
         if not self._open or (starred and self._rows[-1].starred):
             self._rows.append(Row(at))
             self._open = True
         return self._rows[-1]
 
     def _get(self, integer: Integer, local: str, at: Size, target: str = "") -> str:
-        """Unpack an integer, directly into ``target`` if struct knows it; the name of the number."""
+        """Unpack an integer, directly to ``target`` if struct supports it. Returns the name of the number."""
         taken = integers.get(integer, local, self.place.byteorder)
         row = self._row(at)
         row.codes.append(taken.code)
@@ -194,7 +194,7 @@ class Decoder:
         return local if taken.terms or not target else target
 
     def _put_together(self, integer: Integer, local: str, name: str = "", offset: str = "") -> None:
-        """Make the number of several targets, and refuse bits that are not its own."""
+        """Combine several targets to a number, and check unused bits."""
         taken = integers.get(integer, local, self.place.byteorder)
         if not taken.terms:
             return
@@ -204,7 +204,7 @@ class Decoder:
             self._values.append(f"{local} = {integers.sign_extended(local, integer.bits)}")
 
     def _size(self, integer: Integer, local: str, at: Size, name: str = "", offset: str = "") -> str:
-        """Unpack a number that sizes are compared with, before any value is judged."""
+        """Unpack a number for comparison with sizes, before values are checked."""
         number = self._get(integer, local, at)
         taken = integers.get(integer, local, self.place.byteorder)
         if taken.terms:
@@ -230,7 +230,7 @@ class Decoder:
         alone = len(self._rows) == 1 and len(rows) == 1 and not self._slices
         lines: list[str] = []
         for number, row in enumerate(rows):
-            # Before the title, as a message may be called like another one with a number after it.
+            # The number precedes the title, because the name of a message may end in a number.
             name = f"_UNPACK_{number + 1}_{self.title}" if len(rows) > 1 else f"_UNPACK_{self.title}"
             if alone and (payload.fixed or self._tabled):
                 lines += self._whole(name, row)
@@ -251,7 +251,7 @@ class Decoder:
         return lines
 
     def _whole(self, name: str, row: Row) -> list[str]:
-        """Unpack everything at once: struct, or the table of structs, checks the size too."""
+        """Unpack everything at once; the struct, or the table of structs, also checks the size."""
         place, run = self.place, self._tabled
         trailer = [f"{place.trailer}x"] if place.trailer else []
         text = place.prefix + format_of([*row.codes, *trailer])
@@ -267,7 +267,7 @@ class Decoder:
     # Sizes
 
     def _counted(self) -> list[str]:
-        """The statements that find how many items each run has."""
+        """The statements that determine the number of items of each run."""
         payload, lines = self.message.payload, list[str]()
         for each in payload.sizing:
             lines += self._sizing(each)
@@ -295,7 +295,7 @@ class Decoder:
                 assert_never(sizing)
 
     def _count(self, count: CountStep) -> tuple[list[str], str]:
-        """Statements that find a count, and its expression."""
+        """Statements that read a count, and its expression."""
         front = count.place.front
 
         def at(more: int) -> str:
@@ -355,7 +355,7 @@ class Decoder:
         self._values += assigned(target, step.number, raw, self.scales.get(step.name, ""), self.place)
 
     def _count_step(self, step: CountStep, at: Size) -> None:
-        """A count has been read with the sizes, but for a payload that one struct holds."""
+        """A count has been read with the sizes, except in a payload with a single struct."""
         local, offset = f"{step.name}_raw", _offset(step)
         if self._tabled:
             number = self._size(step.integer, local, at, step.name, offset)
@@ -405,12 +405,12 @@ class Decoder:
             self._values.append(f'{target} = {raw}.decode("ascii")')
 
     def _slice(self, step: RunStep, target: str) -> None:
-        """Take the bytes of a run of variable size."""
+        """Assign the bytes of a run of variable size."""
         front, size, data = step.place.front, step.item_size, self.place.data
         count = f"{size} * {step.name}_count" if size > 1 else f"{step.name}_count"
         start = self._from(front)
         taken = slice_of(data, start, f"{start} + {count}" if start != "0" else count)
-        # What a caller hands in may be a memoryview.
+        # The argument may be a memoryview.
         value = f"bytes({taken})" if self.place.unique else taken
         self._slices += [*self._start(front), f"{target} = {value}"]
         self._open = False
@@ -437,7 +437,7 @@ class Decoder:
             self._refuse(test, step.name, target, _offset(step))
 
     def _odd_items(self, step: ItemsStep, target: str, at: Size) -> None:
-        """Items that struct does not know, or not in this byte order."""
+        """Unpack items that struct does not support, or not in this byte order."""
         raw, item, size = f"{step.name}_raw", step.item, step.item_size
         if step.fixed:
             row = self._row(at)
@@ -461,7 +461,7 @@ class Decoder:
 
 
 def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) -> list[str]:
-    """The attribute's value from the number on the wire."""
+    """Statements that assign an attribute from a raw number."""
     meaning, scaling = number.meaning, number.scaling
     match meaning:
         case Enum():
@@ -485,7 +485,7 @@ def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) ->
 
 
 def _is_plain(number: Scalar) -> bool:
-    """The attribute holds the number on the wire."""
+    """Whether the attribute holds the raw number."""
     match number.meaning:
         case Flags() | None:
             return number.scaling is None
@@ -500,7 +500,7 @@ def _expected(count: CountStep) -> str:
 
 
 def _divided(run: RunStep, number: str, unit: int, otherwise: str) -> list[str]:
-    """The count of a run from a number of units, if it is a legal one."""
+    """Statements that derive the count of a run from a number of units and check it."""
     count, odd = f"{run.name}_count", ""
     bounds = integers.broken(Within(run.length.minimum, run.length.maximum), count)
     if unit > 1:
@@ -512,7 +512,7 @@ def _divided(run: RunStep, number: str, unit: int, otherwise: str) -> list[str]:
 
 
 def _offset(step: Step) -> str:
-    """Where a step begins in the payload: from its front, negative from its end, or computed."""
+    """The offset of a step in the payload: from its beginning, negative from its end, or computed."""
     if step.place.offset is not None:
         return str(step.place.offset)
     return str(-step.place.back) if step.place.back is not None else integers.size_text(step.place.front)

@@ -1,4 +1,4 @@
-"""Frames for the templates: names, numbers and expressions, one view for each way to receive."""
+"""Views of frames for the templates: names, numbers and expressions, one for each kind of receiver."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 @dataclass(frozen=True)
 class Heard:
-    """A direction that is decoded: its function, its word in texts, and the names of its tables."""
+    """A decoded direction: its function, its word in texts, and the names of its tables."""
 
     direction: Direction
     function: str
@@ -54,10 +54,10 @@ class CheckView:
 
     Attributes:
         definition: statement that defines the algorithm.
-        size: bytes that are sent.
-        order: byte order of a value that is sent whole, "" where bits are left out.
+        size: size on the wire.
+        order: byte order of a value that is sent whole, "" if bits are omitted.
         bytes: expression for the bytes of the number ``crc``.
-        selectable: another algorithm of the catalogue can take its place.
+        selectable: another algorithm of the catalogue can replace it.
         maker: function of the support module that the definition calls.
     """
 
@@ -76,8 +76,8 @@ class AddressView:
     Attributes:
         name: attribute of the messages.
         parameter: name of the parameter of ``from_bytes``.
-        bytes: expression for the bytes of ``number``, "" where the address shares a byte.
-        default: the address that is meant where none is given.
+        bytes: expression for the bytes of ``number``, "" if the address shares a byte.
+        default: the default address.
     """
 
     name: str
@@ -88,7 +88,7 @@ class AddressView:
 
 @dataclass(frozen=True)
 class UniqueView:
-    """A frame whose preamble is found nowhere else."""
+    """A frame with a preamble that occurs nowhere else."""
 
     title: str
     check: CheckView
@@ -116,10 +116,10 @@ class UniqueView:
 
 @dataclass(frozen=True)
 class HeadCheck:
-    """A test that holds where no frame begins, in wire order, and what ``_split`` then gives.
+    """A condition for bytes that do not begin a frame, in wire order, and the result of ``_split``.
 
     Attributes:
-        fault: "number", "address" or "constant" where only a decoder of one whole frame reports it.
+        fault: "number", "address" or "constant" if only a decoder of one whole frame reports it.
     """
 
     test: str
@@ -129,7 +129,7 @@ class HeadCheck:
 
 @dataclass(frozen=True)
 class LengthView:
-    """The length of a frame: bounds, place, its value in ``head`` and the bytes of ``number``."""
+    """The length of a frame: bounds, offsets, its value in ``head`` and the bytes of ``number``."""
 
     bias: int
     least: int
@@ -142,7 +142,7 @@ class LengthView:
 
 @dataclass(frozen=True)
 class StuffingView:
-    """The inserted bytes: ``whole`` frames but for their first and last bytes, or payloads alone."""
+    """Stuffing of ``whole`` frames except their first and last bytes, or of payloads only."""
 
     whole: bool
     after: str
@@ -153,7 +153,7 @@ class StuffingView:
 
 @dataclass(frozen=True)
 class PlacedCheck:
-    """A check value, where it is in the frame, and the expression for the bytes that it covers."""
+    """A check value, its offsets in the frame, and the expression for the bytes that it covers."""
 
     view: CheckView
     start: str
@@ -164,7 +164,7 @@ class PlacedCheck:
 
 @dataclass(frozen=True)
 class PartsView:
-    """Any other frame of parts."""
+    """Any other delimited frame."""
 
     title: str
     placed: PlacedCheck | None
@@ -190,18 +190,18 @@ class PartsView:
 
     @property
     def check(self) -> CheckView | None:
-        """The check value, None where there is none."""
+        """The check value, None if there is none."""
         return self.placed.view if self.placed else None
 
     @property
     def astray(self) -> Sequence[HeadCheck]:
-        """Tests of which one holds where no frame begins."""
+        """The conditions for bytes that do not begin a frame."""
         return [each for each in self.head_checks if each.fault]
 
 
 @dataclass(frozen=True)
 class MarkedView:
-    """A frame whose header and end are marked by a bit."""
+    """A frame whose header and end have a marker bit."""
 
     title: str
     check: CheckView | None
@@ -220,7 +220,7 @@ class MarkedView:
 
 @dataclass(frozen=True)
 class PacketView:
-    """Packets: nothing marks where one begins."""
+    """Packets, which have no delimiter."""
 
     title: str
     requests: str
@@ -239,7 +239,7 @@ FrameView = UniqueView | PartsView | MarkedView | PacketView
 
 
 def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
-    """The view of a protocol's frame; ``sizes`` are those of bodies that never vary."""
+    """The view of the frame of a protocol; ``sizes`` are those of bodies of constant size."""
     receiver = plan.frame.receiver
     match receiver:
         case Hunt():
@@ -258,7 +258,7 @@ def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
 
 
 def heard(plan: Plan) -> list[Heard]:
-    """Functions and tables for each direction that is decoded."""
+    """Functions and tables for each decoded direction."""
     return [_heard(plan, direction) for direction in plan.heard]
 
 
@@ -278,7 +278,7 @@ def _heard(plan: Plan, direction: Direction) -> Heard:
 
 
 def _by_id(messages: Sequence[MessagePlan], attribute: str = "") -> str:
-    """A dict of the classes of messages, or of an attribute of each, by message id."""
+    """A dict of message classes, or of one of their attributes, by message id."""
     rows = (f"{in_hex(each.id)}: {class_name(each)}{attribute}" for each in messages)
     return f"{{{', '.join(rows)}}}"
 
@@ -319,7 +319,7 @@ def _definition(algorithm: Algorithm | Sum, maker: str) -> list[str]:
 
 
 def _check_bytes(check: Check, number: str = "crc") -> str:
-    """Expression for the bytes of a check value; bits that are not sent are dropped."""
+    """Expression for the wire bytes of a check value."""
     if check.regular:
         return f'{number}.to_bytes({check.size}, "{check.regular}")'
     pieces = [integers.group_out(number, chunk) for chunk in check.value.chunks]
@@ -340,7 +340,7 @@ def _address_view(plan: Plan) -> AddressView | None:
 
 
 def _blank_header(envelope: Envelope, start: int, address: AddressView | None) -> str:
-    """A header of which only the address counts; the rest is not looked at once a frame was found."""
+    """A header for decoding a payload; only its address is used."""
     part = envelope.address
     if part is None or address is None:
         return f"bytes({envelope.header_size - start})"
@@ -387,14 +387,14 @@ def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> Uni
 
 
 def _check_letter(check: Check, byteorder: ByteOrder) -> str:
-    """Format of the check value in the module's byte order, "" where struct has none."""
+    """Format of the check value in the byte order of the module, "" if struct has none."""
     if check.size > 1 and check.regular != byteorder:
         return ""
     return {1: "B", 2: "H", 4: "I"}.get(check.size, "")
 
 
 def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
-    """The last step of an encoder; ``fixed`` is the size of the body where that is always the same."""
+    """The last step of an encoder; ``fixed`` is the size of the body if it is constant."""
     size = view.check.size
     parts = [f"crc >> {8 * index}" if index else "crc" for index in range(size)]
     tests = [
@@ -412,7 +412,7 @@ def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
     ]
 
 
-# Any other frame of parts
+# Any other delimited frame
 
 
 def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
@@ -484,7 +484,7 @@ def _stuffing(plan: Plan) -> StuffingView | None:
 
 
 def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[HeadCheck]:
-    """What a header must hold, part by part, as far as its bytes are there."""
+    """The checks of a header, part by part, as far as received."""
     astray = '"astray", start, b""'
     for part in envelope.front:
         start, end = envelope.offset(part), envelope.offset(part) + part.size
@@ -533,7 +533,7 @@ def _placed(envelope: Envelope) -> PlacedCheck | None:
 
 
 def _edge(envelope: Envelope, part: Part, *, after: bool = False) -> str:
-    """Where a part begins or ends in a slice of the frame."""
+    """The beginning or end of a part in a slice of the frame."""
     if part is envelope.payload:
         place = -envelope.trailer_size if after else envelope.header_size
     elif part in envelope.front:
@@ -544,7 +544,7 @@ def _edge(envelope: Envelope, part: Part, *, after: bool = False) -> str:
     return str(place) if place else ""
 
 
-# Frames that a bit marks, and packets
+# Marked frames and packets
 
 
 def _marked(plan: Plan, title: str) -> MarkedView:

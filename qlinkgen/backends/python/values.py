@@ -1,4 +1,4 @@
-"""What a value is in Python: its type, default, rule and description."""
+"""Values in Python: type, default, rule and description."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Settable = ValueStep | Member | RunStep
 
 
 def is_required(each: Settable) -> bool:
-    """The caller has to choose the value."""
+    """Whether the caller must provide the value."""
     match each:
         case ValueStep() | Member():
             return each.number.required
@@ -67,7 +67,7 @@ def _number_type(number: Scalar, place: Place) -> str:
 
 
 def argument(each: Settable, place: Place) -> str:
-    """Parameter of a function that takes the value, with its default where it has one."""
+    """Parameter of a function for the value, with its default if it has one."""
     kind, name = annotation(each, place), attribute(each.name)
     if is_required(each):
         return f"{name}: {kind}"
@@ -77,7 +77,7 @@ def argument(each: Settable, place: Place) -> str:
 
 
 def assignment(each: Settable) -> str:
-    """The statement that stores an argument; the default of a list is made anew for each message."""
+    """The statement that stores an argument; each message gets a new list as a default."""
     name = attribute(each.name)
     if isinstance(each, ItemsStep) and not each.required:
         return f"self.{name} = {list(each.default)} if {name} is None else {name}"
@@ -85,7 +85,7 @@ def assignment(each: Settable) -> str:
 
 
 def required_defaults(message: MessagePlan, place: Place) -> list[str]:
-    """Arguments for what has no default in the class."""
+    """Arguments for values without a default in the class."""
     return [f"{attribute(e.name)}={default(e, place)}" for e in message.payload.settable if is_required(e)]
 
 
@@ -200,13 +200,13 @@ def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, 
 
 
 def description(value: Value, each: Settable, place: Place) -> str:
-    """What a value is, its range and unit, and whether its source is weak; one paragraph."""
+    """Description, range and unit of a value, and whether its source is weak, as one paragraph."""
     text = value.doc.rstrip(".")
     facts = [_facts(each, place)]
     if value.field.section:
         facts.append(f"section {value.field.section}")
     if not value.field.confirmed:
-        facts.append("UNCONFIRMED: check at the device")
+        facts.append("UNCONFIRMED: check it on the device")
     detail = "; ".join(fact for fact in facts if fact)
     return f"{text}; {detail}." if text and detail else f"{text or detail}."
 
@@ -245,5 +245,5 @@ def _of(number: Scalar) -> str:
 
 
 def span(low: int, high: int) -> str:
-    """``low..high``, or one number where they are the same."""
+    """``low..high``, or one number if they are equal."""
     return str(low) if low == high else f"{low}..{high}"
