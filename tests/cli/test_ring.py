@@ -140,7 +140,7 @@ def test_ring_sends_on_and_prints() -> None:
         "? damaged (frame) payload bytes outside a message: 05",
         'address 3 character_transfer characters="HELLO YOU\\r\\n"',
     ]
-    assert told[2].startswith("? damaged (frame) no message has the number 7")
+    assert told[2].startswith("? damaged (frame) unknown message number 7")
     assert told[2].endswith("97 01 90 [forwarded]")
     assert told[3] == "address 1, here direct_variable_transfer number=3 value=2"
     assert told[4].startswith("? damaged (crc) ")

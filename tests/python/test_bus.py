@@ -117,7 +117,7 @@ def test_docstrings_say_unit_range_section_and_broadcast() -> None:
     text = " ".join(made.MasterCalls.node_setup.__doc__.split())
     assert "section" in text
     assert "0.0..25.5 s in steps of 1/10" in text
-    assert "1..16; or 0 for a node that is alone on the line, whatever its number" in text
+    assert "1..16; or 0 for a single node on the line with any number" in text
     assert "node:" not in made.NodeCalls.node_setup.__doc__
     assert "1..16; or 0 for all of them." in made.MasterCalls.node_start.__doc__
     assert "repeats counter of the request" in made.SlaveHandlers.motion.__doc__
@@ -133,7 +133,7 @@ def test_nobody_answers_a_broadcast() -> None:
         assert result(calls.write_single_register(0, number=4, value=5)) is None
         assert notes == [(codec.WriteSingleRegisterRequest(address=0, number=4, value=5), None)]
         assert result(calls.write_single_register(7, number=4, value=5)) is not None
-    assert "None is returned" in modbus.MasterCalls.write_single_register.__doc__
+    assert "which do not respond: returns None" in " ".join(modbus.MasterCalls.write_single_register.__doc__.split())
 
 
 @pytest.mark.parametrize("caller", CALLERS)
@@ -203,7 +203,7 @@ def test_a_host_has_to_say_how_packets_are_sent(caller: str) -> None:
 def test_docstrings_of_a_host_say_what_the_schema_says() -> None:
     calls = bus_of("mc1231a").HostCalls
     assert "Double buffered." in calls.set_pos.__doc__
-    assert "axis: Axis that it acts on, counted from 1." in calls.set_pos.__doc__
+    assert "axis: Axis to act on, from 1." in calls.set_pos.__doc__
     assert "Axis by mask." in calls.multi_update.__doc__
     assert "Axis current" not in calls.set_kp.__doc__
     assert "Axis unknown." in calls.lmts_on.__doc__

@@ -170,7 +170,9 @@ class Clear(Adapter):
 
     def _decode(self, obj: object, context: Container, path: str) -> int:
         if not isinstance(obj, int) or obj & self.mask:
-            raise ValidationError(f"{obj!r} has illegal bits of {self.mask:#x}", path=path)
+            raise ValidationError(
+                f"{obj!r} has illegal bits of {self.mask:#x}", path=path
+            )
         return obj
 
     _encode = _decode
@@ -432,7 +434,9 @@ class Message(Construct):
             raise RangeError(f"{field.name} is missing", path=path)
         number, rest = divmod(field.subcon.number(cell), field.subcon.step)
         if rest:
-            raise RangeError(f"{field.name} is not a multiple of the item size of {of}", path=path)
+            raise RangeError(
+                f"{field.name} is not a multiple of the item size of {of}", path=path
+            )
         return self.runs[of].checked(number, path)
 
     def _cells(self, data: bytes, path: str) -> list[tuple[Renamed, bytes]]:
