@@ -1,4 +1,4 @@
-"""Protocols, headers and drivers, each made once in a session."""
+"""Protocols, headers and drivers, each built once per session."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from tests.support.cdriver import WARNINGS, Driver, build
 SHIPPED = ("qlink", "trio", "mc1231a")
 OTHERS = ("kitchen_sink", "modbus_rtu", "dynamixel")
 PROTOCOLS = SHIPPED + OTHERS
-#: Every warning an error, and every wrong access the end of the program.
-#: Without the optimiser: it could remove what a sanitizer is to see, and takes four times as long.
+#: Warnings are errors, and a wrong access ends the program. Not optimised: the optimiser could remove errors
+#: that a sanitizer should find, and takes four times as long.
 SANITIZED = (
     *("-O0", "-g1", "-std=c99", *WARNINGS),
     *("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),

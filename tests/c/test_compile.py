@@ -1,4 +1,4 @@
-"""Every header is clean under every compiler, in every form, for every kind of target."""
+"""Every header compiles without warnings with every compiler, in every form, for every kind of target."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The corpus reaches every line and branch of each shipped header, but for those listed with a reason."""
+"""The corpus reaches every line and branch of each shipped header, except those listed with a reason."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LIST = Path(__file__).parent / "corpus" / "unreached.yaml"
 
 @dataclass(frozen=True)
 class Entry:
-    """Places of one header that are not reached, and why not."""
+    """Unreached places of one header, and the reasons."""
 
     header: str
     functions: tuple[str, ...]
@@ -71,7 +71,7 @@ def _line(function: str, count: int, *branches: int) -> Line:
 
 
 def test_a_gap_is_seen() -> None:
-    """A function that nobody calls, and a condition that only went one way."""
+    """A function that is never called, and a condition with only one outcome."""
     lines = {1: _line("f", 0), 2: _line("g", 3, 3, 0), 3: _line("g", 1, 1, 2)}
     coverage = Coverage(lines, ["int x_f(void)", "    if (a)", "    if (b)"], "x")
     assert coverage.gaps() == [Gap("f", "int f(void)", "line"), Gap("g", "if (a)", "1 of 2 branches")]

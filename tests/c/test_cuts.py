@@ -1,8 +1,8 @@
-"""No function reads past the end of what it is given, wherever a frame breaks off.
+"""No function reads past the end of its input, wherever a frame is cut.
 
 The family: messages of random fields with counts, in frames with and without a length, preamble, stuffing,
-check value and end. Their bytes are put together here, by nothing but the meaning of a count, and laid at the
-end of memory of exactly their size, so that the address sanitizer sees each byte that is read past them.
+check value and end. The test itself builds their bytes, and places them in memory of exactly their size, so
+that the address sanitizer detects each byte read past the end.
 """
 
 from __future__ import annotations
@@ -96,14 +96,14 @@ class Made:
 
     rng: random.Random
     order: str
-    #: Name, YAML and for a count its field, for a field its bytes of an item and its bounds.
+    #: Name and YAML; for a count its field, for a field the size of an item and its bounds.
     fields: list[tuple[str, str]] = field(default_factory=list)
     counts: dict[str, tuple[str, int, bool, str]] = field(default_factory=dict)
     runs: dict[str, tuple[int, int, int]] = field(default_factory=dict)
     plain: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Counts anywhere before what they count, plain fields anywhere."""
+        """Counts anywhere before their field, plain fields anywhere."""
         for number in range(self.rng.randint(1, 4)):
             self._add_run(f"r{number}")
         for number in range(self.rng.randint(0, 2)):
@@ -163,7 +163,7 @@ def made(shape: str, seed: int, folder: Path) -> tuple[Protocol, list[Made]]:
 
 
 def hostile(frame: bytes, rng: random.Random) -> bytes:
-    """The frame with some bytes that may be counts changed, and something behind it."""
+    """The frame with some possible counts changed, followed by other bytes."""
     data = bytearray(frame)
     for _ in range(rng.randint(1, 3)):
         at = rng.randrange(min(len(data), 12))

@@ -1,4 +1,4 @@
-"""What a slave answers, and what it does not."""
+"""Responses of a slave, and requests that it does not answer."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_dispatch(name: str, tmp_path: Path, require_tool: Callable[..., str]) -
 
 
 def test_transactions_are_told_in_full(tmp_path: Path) -> None:
-    """Each command has what holds for it, and none what does not."""
+    """Each command has the constants that apply to it, and no others."""
     for name in PROTOCOLS:
         text, protocol = header(name, tmp_path), protocol_of(name)
         assert ("_ADDRESSING_EITHER 2 " in text) == bool(protocol.address_name and protocol.commands)

@@ -1,8 +1,7 @@
 """libFuzzer with sanitizers on three targets: the receiver, the decoders, dispatch.
 
-In the first two, any bytes are taken apart, and what could be taken apart is made again and compared. In the
-third, functions that fill in any answer at all are called through a slave's table: what comes out has to be a
-frame that can be taken apart.
+The first two decode any bytes, and encode and compare the decoded messages. The third calls functions with
+any response through a slave's table: the result must be a frame that can be decoded.
 """
 
 from __future__ import annotations
@@ -24,10 +23,10 @@ from tests.support.ccoverage import Refuted, replay
 from tests.support.cfuzz import FUZZER, TARGETS, compiled, program
 from tests.support.planted import Fault
 
-#: Seconds for each target, over all shipped protocols; the schemas of the tests get a little beside.
+#: Seconds for each target, over all shipped protocols; the schemas of the tests get less.
 SECONDS = int(os.environ.get("QLINKGEN_FUZZ_SECONDS", "20" if os.environ.get("CI") else "5"))
 OTHER_SECONDS = 2
-#: The fuzzers run beside other tests, and give way to them.
+#: The fuzzers run in parallel with other tests, at lower priority.
 NICE = ("nice", "-n", "15")
 Missing = Callable[..., NoReturn]
 
@@ -41,7 +40,7 @@ def build(compiler: str, folder: Path, name: str, missing_tool: Missing) -> Path
 
 
 def fuzz(fuzzer: Path, seconds: int, *corpus: Path) -> int:
-    """Fuzz for so long; how many inputs were run."""
+    """Fuzz for a number of seconds; returns the number of inputs."""
     options = [
         f"-max_total_time={seconds}",
         "-max_len=300",
@@ -61,7 +60,7 @@ def fuzz(fuzzer: Path, seconds: int, *corpus: Path) -> int:
 
 @pytest.mark.slow
 def test_shipped_protocols(tmp_path: Path, require_tool: Callable[..., str], missing_tool: Missing) -> None:
-    """Side by side in one test, so that together they hold up one worker for as long as one of them takes."""
+    """Run all fuzzers in parallel in one test, which occupies one worker for the time of one fuzzer."""
     compiler = require_tool("clang", package="clang")
 
     def run(target: str) -> tuple[int, int]:
@@ -108,7 +107,7 @@ def test_the_corpus_finds_a_planted_fault(
     text = header("qlink", tmp_path)
     (tmp_path / f"{target}.c").write_text(program([protocol_of("qlink")], (target,)))
     flags = ("-std=gnu99", "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DREPLAY")
-    # The first byte chooses the protocol, where there are several.
+    # The first byte selects the protocol if there are several.
     inputs = [each for each in cfuzz_corpus.read(target) if each[0] % len(cfuzz_corpus.SHIPPED) == 0]
     assert compiled(compiler, tmp_path, target, *flags).returncode == 0
     replay(tmp_path / target, inputs)

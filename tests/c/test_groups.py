@@ -1,4 +1,4 @@
-"""Signed integers of a few bits, sent in groups: the sign takes no bit that the wire does not have."""
+"""Signed integers of a few bits, sent in groups: sign extension does not reach the wire."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Protocols without commands: messages go either way, so neither frames nor receivers know a direction."""
+"""Protocols without commands: both sides send messages, so frames and receivers have no direction."""
 
 from __future__ import annotations
 

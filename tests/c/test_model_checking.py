@@ -1,8 +1,8 @@
-"""cbmc proves what tests can only try: each receiver is memory-safe on any stream, each message on any bytes.
+"""cbmc proves that each receiver is memory-safe on any stream, and each message on any bytes.
 
-The proofs and the invariants stand in tests/c/proofs. A step of a receiver is proven with the payload that
-its schema says. Streams from reset and messages are proven with payloads cut to a few bytes, so that their
-ends are reached.
+The proofs and invariants are in tests/c/proofs. A step of a receiver is proven with the payload size of its
+schema. Streams from reset and messages are proven with payloads cut to a few bytes, so that their ends are
+reached.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from tests.support.planted import Fault, one_more
 
 pytestmark = pytest.mark.optional_tool("cbmc")
 
-#: Bytes of a payload in a proof from reset: few enough that sixteen bytes fill the receiver's buffer.
+#: Payload size in a proof from reset: small enough that sixteen bytes fill the buffer of the receiver.
 SMALL = {"qlink": 4, "trio": 12, "mc1231a": 4}
 STREAM = 16
-#: Loops of the header run once for each byte of a frame, those of the check value once for each bit of one.
+#: Loops of the header run once per byte of a frame, those of the check value once per bit of a byte.
 UNWIND = STREAM + 2
 SMALL_MESSAGE = 12
 
@@ -65,7 +65,7 @@ def test_the_invariant_is_not_empty(name: str, tmp_path: Path, cbmc: str) -> Non
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_bytes_from_reset(name: str, tmp_path: Path, cbmc: str) -> None:
-    """Any sixteen are memory-safe; the longest frame, and two frames, are among what they can bring."""
+    """Any sixteen bytes are memory-safe; they can contain the longest frame, or two frames."""
     protocol = shrunk(protocol_of(name), SMALL[name])
     write_header(protocol, tmp_path)
     proof = write_receiver_proof(protocol, tmp_path)
@@ -73,7 +73,7 @@ def test_bytes_from_reset(name: str, tmp_path: Path, cbmc: str) -> None:
     assert not reach(cbmc, proof, "stream", UNWIND).failed()
 
 
-#: The bound that each receiver has, and the same bound off by one.
+#: A bound of each receiver, and the bound off by one.
 FAULTS = {
     "qlink": Fault("qlink_receive", r"(> )(\d+)U", one_more),
     "trio": Fault("trio_receive", r"(count == )(\d+)U", one_more),
@@ -83,7 +83,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_an_off_by_one_is_found(name: str, tmp_path: Path, cbmc: str) -> None:
-    """From reset, as a byte beyond the buffer: the proof is one that can fail."""
+    """From reset, as a byte beyond the buffer: the proof can fail."""
     protocol = shrunk(protocol_of(name), SMALL[name])
     file = write_header(protocol, tmp_path)
     file.write_text(FAULTS[name].planted(file.read_text("utf-8")), "utf-8")
@@ -95,7 +95,7 @@ def test_an_off_by_one_is_found(name: str, tmp_path: Path, cbmc: str) -> None:
 @pytest.mark.parametrize("what", ["decoding", "encoding"])
 @pytest.mark.parametrize("name", SHIPPED)
 def test_messages(name: str, what: str, tmp_path: Path, cbmc: str) -> None:
-    """Decoding any bytes of any number, encoding any values into any room."""
+    """Decoding any number of any bytes, encoding any values to a buffer of any size."""
     protocol = shrunk(protocol_of(name), SMALL_MESSAGE)
     write_header(protocol, tmp_path)
     holds(prove(cbmc, write_message_proof(protocol, tmp_path), what, SMALL_MESSAGE + 2))

@@ -1,7 +1,7 @@
 """Payloads of every kind in C against the interpreter of the plan: the same fault, or the same values.
 
-The family: messages of every kind of step and every way to learn a count. Payloads are right ones, all their
-cuts, and right ones with bytes changed, added and left out.
+The family: messages of every kind of step and every way to determine a count. Payloads are valid ones, all
+their cuts, and valid ones with bytes changed, added and removed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tests.c.test_shapes import EMPTY, FIELDS
 from tests.support.cdriver import Driver, build
 
 SEVEN = "groups: {bits: 7, first: least}"
-#: More ways to be counted than shapes need, and faults of two kinds in one payload.
+#: More kinds of counts than in test_shapes, and faults of two kinds in one payload.
 COUNTED = {
     "value before size": '{a: {type: u8, range: 1..3}, n: {type: u8, counts: v}, v: "u16[1..4]"}',
     "open before counted": (
@@ -85,7 +85,7 @@ def protocol() -> Protocol:
 
 
 def values(message: MessagePlan, chance: random.Random) -> dict[str, Raw]:
-    """Values that can be sent, most of them at a bound."""
+    """Legal values, mostly bounds."""
     found: dict[str, Raw] = {}
     for each in message.payload.settable:
         match each:
@@ -148,7 +148,7 @@ def payloads(message: MessagePlan) -> Iterator[bytes]:
 
 
 def told(message: MessagePlan, payload: bytes) -> str:
-    """The answer that the driver has to give."""
+    """The expected answer of the driver."""
     try:
         found = unpack(message.payload, payload)
     except BadContent as bad:

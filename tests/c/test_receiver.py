@@ -1,7 +1,7 @@
-"""Receiver and decoder of whole frames say what the interpreter of the plan says, whatever the damage.
+"""Receiver and decoder of whole frames agree with the interpreter of the plan for any damage.
 
-The family: the shipped protocols and those for tests, and shapes of frames from `test_shapes`. What is
-delivered, what is reported and with which byte is the same.
+The family: the shipped protocols and those for tests, and shapes of frames from `test_shapes`. Messages,
+faults and the bytes that complete them are equal.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def test_every_shape_agrees(shared: Path, require_tool: Callable[..., str]) -> N
 def test_answers_of_packets_agree(
     name: str, shared: Path, drivers: Callable[[str], Driver], require_tool: Callable[..., str]
 ) -> None:
-    """The plan alone tells what is wrong with an answer, right or damaged, to a request of its command."""
+    """The decoder of responses agrees with the plan for valid and damaged responses to a request."""
     if name == "mc1231a":
         _answers(plan_of(protocol_of(name)), drivers(name))
         return
@@ -88,7 +88,7 @@ def _answers(plan: Plan, driver: Driver) -> None:
 def test_no_receiver_waits_for_the_byte_after_a_stuffed_end(
     shared: Path, require_tool: Callable[..., str]
 ) -> None:
-    """A frame comes with its last byte, and a fault with the first byte that shows it."""
+    """A frame is delivered with its last byte, a fault with the first wrong byte."""
     shape = {key: next(iter(test_shapes.AXES[key])) for key in test_shapes.AXES}
     shape |= {"start": "start", "length": "u8 length", "check": "sum", "stuffing": "stuffing"}
     shape |= {"fields": "one byte", "traffic": "command"}

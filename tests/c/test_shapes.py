@@ -1,8 +1,8 @@
 """Headers of every shape are clean under strict warnings, as C99 and as C++17, for each role.
 
-The family is a product: options of a frame, kinds of messages, who hears what. As many of its members are
-compiled, in one run of each compiler, as it takes for every pair of options to occur. A back-end refuses none
-of them: what it cannot do, the schema refuses, with a place.
+The family is a product of options of a frame, kinds of messages, and roles. One run of each compiler compiles
+enough members to include every pair of options. Back-ends must support all of them: unsupported ones are
+schema errors with a location.
 """
 
 from __future__ import annotations
@@ -164,14 +164,14 @@ def _fields(name: str, fields: str) -> str:
 
 
 def built(shape: Shape, name: str) -> Protocol | None:
-    """The protocol of a shape, None where the schema refuses it."""
+    """The protocol of a shape, None if lint rejects it."""
     protocol, faults = loads(schema(shape, name), "shape.yaml")
     assert protocol or any(fault.severity == "error" for fault in faults)
     return protocol
 
 
 def pairs() -> Iterator[tuple[Shape, Protocol]]:
-    """Shapes that schemas accept, until each pair of options has occurred, or was refused a dozen times."""
+    """Valid shapes, until each pair of options has occurred or was rejected a dozen times."""
     rng, keys = random.Random(1), tuple(AXES)
     missing = {
         ((a, one), (b, other))
@@ -199,7 +199,7 @@ def _pairs_of(shape: Shape) -> set[tuple[tuple[str, str], tuple[str, str]]]:
 
 
 GROUPS = "groups: {bits: 7, first: least}"
-#: Frames of the other two kinds, with kinds of messages that they can carry.
+#: Frames of the other two kinds, with kinds of messages that fit them.
 OTHERS = {
     "marked": (
         "frame: {marked: {marker: 0x80, header: {message: 0..2, address: 3..6}, end: 7, payload: 0..40}}",
@@ -276,6 +276,6 @@ def test_clean(compiler: str, language: str, headers: Path, require_tool: Callab
 
 
 def test_every_option_is_there(headers: Path) -> None:
-    """No option of an axis is one that schemas refuse always."""
+    """Every option of every axis occurs in a valid schema."""
     text = "".join(path.read_text("utf-8").splitlines()[0] for path in headers.glob("*.h"))
     assert not [option for options in AXES.values() for option in options if f"'{option}'" not in text]

@@ -1,7 +1,7 @@
-"""Headers of long frames: every index holds every size, and a target whose int does not is told so.
+"""Headers of long frames: every index holds every size, and targets with a too small int get an error.
 
-The family: payloads whose frames lie around 8, 15 and 16 bits, up to the longest that a schema may describe;
-with a length, with stuffing that doubles each byte, and with an end that follows from a count.
+The family: payloads whose frame sizes need about 8, 15 and 16 bits, up to the longest legal payload; with a
+length, with stuffing that doubles each byte, and with an end that follows from a count.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ LENGTH = "len: {role: length, type: u24, counts: [data]}"
 STUFFING = "stuffing: {after: 0xDC, insert: 0x00, exempt: [start]}"
 KINDS = {"length": (LENGTH, ""), "stuffed": (LENGTH, STUFFING), "counted": ("", "")}
 SIZES = (250, 32767, 65529, 65535)
-#: A receiver of stuffed frames reads a frame again with every byte, which for the longest takes minutes.
+#: A receiver of stuffed frames scans a frame again with every byte, which takes minutes for the longest.
 FRAMES = [(kind, most) for kind in KINDS for most in (SIZES if kind != "stuffed" else (250, 4000))]
 
 
@@ -87,7 +87,7 @@ def test_the_longest_frame_is_delivered(longest: Driver, most: int) -> None:
 def test_a_target_whose_int_is_too_narrow_is_told_so(
     kind: str, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
-    """An int of 16 bits counts 32,767 bytes: functions return sizes in one."""
+    """Functions return sizes as an int, which with 16 bits holds 32,767 bytes."""
     compiler = require_tool("avr-gcc", package="gcc-avr")
 
     def said(most: int) -> str:
@@ -97,7 +97,7 @@ def test_a_target_whose_int_is_too_narrow_is_told_so(
         words = [compiler, "-mmcu=atmega328p", "-std=c99", *WARNINGS, "-c", "use.c", "-o", "use.o"]
         return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False).stderr
 
-    # Where the sizes fit an int, the memory of the receiver may still be too much for the compiler.
+    # Even if sizes fit an int, the receiver may be too large for the compiler.
     longest = {"length": 32767 - 7, "stuffed": 32767 // 2 - 6, "counted": 32767 - 4}[kind]
     assert "big_needs_sizes_in_int_" not in said(longest)
     assert "big_needs_sizes_in_int_" in said(longest + 1)

@@ -1,4 +1,4 @@
-"""cppcheck with MISRA and clang-tidy find nothing in a header but what deviations.yaml gives a reason for."""
+"""cppcheck with MISRA and clang-tidy find only deviations justified in deviations.yaml."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.c.test_compile import header
 
 DEVIATIONS = Path(__file__).with_name("deviations.yaml")
 
-#: One form of the CRC for each header: all together they have them all, and each run takes seconds.
+#: One form of the CRC for each header, together all forms, because each run takes seconds.
 FORMS = {
     "qlink": "LOOP",
     "trio": "TABLE",
@@ -28,7 +28,7 @@ CPPCHECK = (
     *("--suppress=missingIncludeSystem", "-q", "--template={file}:{line}: [{id}]"),
 )
 GROUPS = "bugprone-*,cert-*,clang-analyzer-*,misc-*,performance-*,portability-*,readability-*"
-#: Without the filter findings in a header are not shown; without the option no path through it is looked at.
+#: The filter enables findings in headers, the option analysis of paths through them.
 CLANG_TIDY = (
     *("-header-filter=.*", f"-checks=-*,{GROUPS}", "--quiet"),
     *("--extra-arg=-Xclang", "--extra-arg=-analyzer-opt-analyze-headers"),
@@ -39,14 +39,14 @@ Analyse = Callable[[str, Path], dict[str, str]]
 
 
 def defines(name: str) -> list[str]:
-    """Everything that is optional."""
+    """All options enabled."""
     upper = name.upper()
     form = [f"-D{upper}_CRC_FORM={upper}_CRC_FORM_{FORMS[name]}"] if name in FORMS else []
     return [f"-D{upper}_ENABLE_FLOAT=1", f"-D{upper}_ENABLE_NAMES=1", *form]
 
 
 def findings(*command: str | Path) -> dict[str, str]:
-    """Rules that are broken, each with the first place; a run that went wrong is no clean one."""
+    """Violated rules, each with the first location; raises if the tool fails."""
     done = subprocess.run(
         [str(word) for word in command], capture_output=True, text=True, timeout=300, check=False
     )
@@ -120,7 +120,7 @@ PLANTED = {
 
 
 def test_a_planted_violation_is_found(tool: str, analyse: Analyse, tmp_path: Path) -> None:
-    """In a function that nobody calls: the tools look into the header, and the list does not hide it."""
+    """The tools report an error in an unused function of the header, and the list does not hide it."""
     body, rule = PLANTED[tool]
     text = header("trio", tmp_path)
     planted = f"static inline int trio_planted_(int a)\n{{\n    {body}\n}}\n"

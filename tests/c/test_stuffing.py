@@ -1,9 +1,8 @@
-"""Stuffed frames go round, whatever parts of them are exempt: in C, Python, construct and by definition.
+"""Round trips of stuffed frames with any exempt parts: in C, Python, construct and by definition.
 
-The family: a frame between two marks as DLE STX and DLE ETX are, with every set of exempt parts that the
-schema allows (at the front and at the end), with and without a length, stuffed after one byte and after two;
-and with a payload that is stuffed before its length and check value are known.
-The values are made of the bytes that matter.
+The family: a frame between two marks like DLE STX and DLE ETX, with every legal set of exempt parts (at the
+beginning and at the end), with and without a length, stuffed after one byte and after two; and with a payload
+that is stuffed before length and check value are computed. Values consist of significant bytes.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ class Stuffed:
     exempt: tuple[str, ...]
     length: bool
     after: str
-    #: Length and checksum are of the stuffed payload.
+    #: Length and checksum apply to the stuffed payload.
     late: bool = False
 
     @property
@@ -73,7 +72,7 @@ class Stuffed:
         )
 
     def wire(self, payload: bytes) -> bytes:
-        """The frame, by the meaning of the words alone."""
+        """The frame according to the definition."""
         _, after, insert = MARKS[self.after]
         payload = payload.replace(after, after + insert) if self.late else payload
         check = bytes([sum(b"\x10" + payload) & 0xFF])
@@ -85,7 +84,7 @@ class Stuffed:
 
     @property
     def in_one_piece(self) -> bool:
-        """The stuffed parts follow one another."""
+        """Whether the stuffed parts are adjacent."""
         stuffed = [part not in self.exempt for part in self.parts]
         return sum(kind for kind, _ in itertools.groupby(stuffed)) == 1
 
@@ -101,7 +100,7 @@ EVERY = [
     for exempt in _exempt(length=length)
     for after in MARKS
 ]
-#: One byte and two take turns.
+#: One byte and two alternate.
 ALLOWED = [
     *(each for each in EVERY if each.in_one_piece and list(MARKS)[len(each.exempt) % 2] == each.after),
     *(Stuffed((), length=True, after=after, late=True) for after in MARKS),

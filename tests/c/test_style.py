@@ -1,4 +1,4 @@
-"""How a header reads: nothing to scroll, one way to wrap, no step that does nothing."""
+"""Style of headers: no long lines, uniform wrapping, no statements without effect."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_no_line_has_to_be_scrolled(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_signatures_are_wrapped_in_one_way(name: str, tmp_path: Path) -> None:
-    """On one line where it fits, otherwise all parameters on the next, on several where they do not fit."""
+    """On one line if it fits, otherwise all parameters on the next line or on several."""
     text = header(name, tmp_path)
     signatures = re.findall(r"^static inline [^{]*?\n\{$", text, re.MULTILINE)
     assert len(signatures) > 10

@@ -64,7 +64,7 @@ def test_big_endian_agrees(
 
 
 def require(require_tool: Tool, missing_tool: Missing, *targets: Target) -> None:
-    """The compilers, and what runs the programs of an AVR."""
+    """The compilers, and the simulator for AVR programs."""
     for target in targets:
         require_tool(f"{target.prefix}-gcc", package=target.package)
     require_tool("gcc", package="gcc")
@@ -74,7 +74,7 @@ def require(require_tool: Tool, missing_tool: Missing, *targets: Target) -> None
 
 
 def test_budget_and_page(require_tool: Tool, missing_tool: Missing) -> None:
-    # One test: what is measured is built once, some 150 programs.
+    # One test, because the 150 measured programs are built once.
     require(require_tool, missing_tool, *TARGETS)
     measured = measure()
     assert complaints(measured) == []
@@ -93,7 +93,7 @@ def test_budget_and_page(require_tool: Tool, missing_tool: Missing) -> None:
     assert not stale, "run python -m benchmarks.firmware --write"
 
 
-# What is put into a header, behind what, and which figure must leave the budget by it.
+# Code inserted into a header, the text before it, and the figure that must exceed the budget.
 GROWTH = "static volatile uint8_t grown; " + "grown = (uint8_t)(grown + 1u); " * 20
 BLOWN = {
     "receiver": ("qlink", "uint8_t position = receiver->position;", GROWTH, "one message"),

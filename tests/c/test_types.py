@@ -1,6 +1,6 @@
-"""C types of members: those that the schema names, each with one pair of conversions, whatever its name is.
+"""C types of members: one for each named type, with one pair of conversions, for any name.
 
-The family: names that messages, enums and the header itself have too; types that fields use as they are and
+The family: names that messages, enums and the header itself use too; types that fields use unchanged and
 narrowed, in bits and arrays, without a scale; enums and flags in integers of their own width and of another.
 """
 
@@ -19,7 +19,7 @@ from qlinkgen.schema import loads
 from tests.support.cdriver import WARNINGS
 
 STRICT = (*WARNINGS, "-Wshadow", "-Wstrict-prototypes", "-std=c99", "-DHOST_ENABLE_FLOAT=1")
-#: What the type is called, and what its C type has to be called.
+#: Names of the type and of its C type.
 NAMES = {
     "speed": "speed",
     "frame": "frame_type",
@@ -114,7 +114,7 @@ def test_every_name_is_clean(compiler: str, tmp_path: Path, require_tool: Callab
 
 
 def test_what_is_alike_is_there_once() -> None:
-    """A struct and its code; but members of another type stay apart, and every text stays."""
+    """Equal messages share a struct and its code, but not with other member types; all texts are kept."""
     text = header("speed")
     assert "/* p: Said.; in V; 0..9 */\ntypedef host_get_request_t host_get_response_t;" in text
     assert "#define HOST_GET_RESPONSE_INIT HOST_GET_REQUEST_INIT" in text

@@ -1,4 +1,4 @@
-"""Kits of every protocol, written once in a session and run."""
+"""Kits of every protocol, built once per session and run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Write = Callable[[str], Path]
 
 @pytest.fixture(scope="session")
 def kit(shared: Path) -> Write:
-    """Give the kit of a protocol, with its header beside it; nobody changes them."""
+    """Give the kit of a protocol, next to its header; tests must not change them."""
 
     def get(name: str) -> Path:
         folder = shared / "kits" / name

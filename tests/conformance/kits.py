@@ -1,4 +1,4 @@
-"""Kits as their users have them: written beside their header, compiled, run, and their TAP read."""
+"""Kits as users have them: written next to their header, compiled, run, and their TAP parsed."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def compiled(program: Path, *command: str | Path) -> Path:
 
 @dataclass(frozen=True)
 class Report:
-    """What a kit printed, and how it ended."""
+    """The output and exit code of a kit."""
 
     status: int
     planned: int
@@ -48,18 +48,18 @@ class Report:
 
     @property
     def by_verb(self) -> Counter[str]:
-        """Number of tests by what they do: the last word of their names."""
+        """Number of tests by verb, the last word of their names."""
         return Counter(name.rsplit(" ", 1)[1] for name in self.names)
 
     def check(self) -> None:
-        """Everything that was planned is there and passed."""
+        """Whether all planned tests ran and passed."""
         assert not self.failed, self.diagnoses[:3]
         assert len(self.names) == self.planned
         assert self.status == 0
 
 
 def report(status: int, text: str) -> Report:
-    """Read TAP, strictly: version, plan, numbers without a gap, a YAML block behind each failure alone."""
+    """Parse TAP strictly: version, plan, consecutive numbers, and a YAML block only after failures."""
     version, plan, *lines = text.replace("\r\n", "\n").splitlines()
     assert version == "TAP version 14"
     assert plan.startswith("1..")
@@ -89,7 +89,7 @@ def report(status: int, text: str) -> Report:
 
 
 def ran(*command: str | Path, most: Sequence[int] = (0, 1)) -> Report:
-    """Run a kit to its end; the limit is there against one that hangs."""
+    """Run a kit to its end, with a time limit in case it hangs."""
     words = [str(word) for word in command]
     done = subprocess.run(
         words, capture_output=True, text=True, timeout=300, check=False, stdin=subprocess.DEVNULL
@@ -99,6 +99,6 @@ def ran(*command: str | Path, most: Sequence[int] = (0, 1)) -> Report:
 
 
 def output(*command: str | Path) -> str:
-    """What a program prints that has to succeed."""
+    """The output of a program, which must succeed."""
     words = [str(word) for word in command]
     return subprocess.run(words, capture_output=True, text=True, timeout=300, check=True).stdout

@@ -1,4 +1,4 @@
-"""The kit on the machine that the tests run on: it holds every vector, and everything passes."""
+"""The kit on the host: it contains every vector, and all tests pass."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.conformance import kits
 from tests.conformance.conftest import Write
 from tests.proof import cases
 
-#: The sanitizer stops the program at the first undefined thing; three kinds of frame have addresses watched.
+#: The sanitizer stops the program at undefined behaviour; three kinds of frame have addresses checked.
 UNDEFINED = ("-O0", "-std=c11", "-fsanitize=undefined", "-fno-sanitize-recover=all")
 ADDRESSES = (*UNDEFINED, "-fsanitize=address")
 RUNS = [
@@ -36,12 +36,12 @@ RUNS = [
 
 
 def hears(plan: Plan, message: Message) -> Direction:
-    """The direction in which a receiver hears a message."""
+    """The direction in which a message is received."""
     return plan.hears(plan.message(message.name))
 
 
 def vectors_of(name: str) -> Counter[str]:
-    """How often each verb has to be there, counted from the vectors themselves."""
+    """The expected number of tests of each verb, counted from the vectors."""
     protocol, good, wrong = cases.protocol(name), cases.cases(name), cases.refusals(name)
     packets = isinstance(protocol.frame, PacketFrame)
     ring = protocol.directions == ("message",)
@@ -100,7 +100,7 @@ def test_in_another_form_of_the_header(kit: Write, tmp_path: Path, require_tool:
 
 
 def test_parts_are_the_whole(kit: Write, tmp_path: Path, require_tool: Callable[..., str]) -> None:
-    """Behind an answer nothing gets lost; between a request and its answer nobody can be asked for it."""
+    """Without a response no test is lost; tests of a response need its request in the same part."""
     program = require_tool("clang", package="clang")
     names = [message.name for message in cases.protocol("modbus_rtu").messages]
     for end, lost in (("read_input_registers.response", set()), ("read_input_registers.request", {"ask"})):
@@ -163,7 +163,7 @@ def test_what_is_left_out_has_no_vectors(tmp_path: Path, require_tool: Callable[
 def test_it_needs_nothing_but_the_header(
     kit: Write, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
-    """What the compiler calls itself is no library of ours."""
+    """Functions that the compiler calls do not count as a library."""
     gcc, nm = require_tool("gcc", package="gcc"), require_tool("nm", package="binutils")
     for name in cases.SHIPPED:
         text = kit(name).read_text()
@@ -176,7 +176,7 @@ def test_it_needs_nothing_but_the_header(
 
 
 def test_it_can_be_called(kit: Write, tmp_path: Path, require_tool: Callable[..., str]) -> None:
-    """Two kits in one program, whose main calls them, one after the other and twice."""
+    """Two kits in one program, whose main calls each of them twice."""
     user = tmp_path / "user.c"
     user.write_text(
         "#include <stdio.h>\nvoid conformance_put(char character);\nint trio_conformance(void);\n"

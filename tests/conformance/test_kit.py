@@ -1,4 +1,4 @@
-"""What is in a kit, and how it reads."""
+"""Contents and style of a kit."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_it_reads_like_the_header(name: str) -> None:
 
 
 def test_values_out_of_range_are_not_to_be_sent(kit: Write) -> None:
-    """One step past each bound that the C type can hold; a constant, a bool or a full range has none."""
+    """One step past each bound that the C type can hold; none for a constant, a bool or a full range."""
     text = kit("qlink").read_text()
     start = text.index("node_setup_request_unsent[] IN_FLASH = {\n")
     assert text[start : text.index("};", start)].splitlines()[1:] == [
@@ -76,7 +76,7 @@ def test_vectors_by_hand_say_where_they_come_from(kit: Write) -> None:
 
 
 def test_vectors_by_hand_are_those_of_the_shipped_schema_alone(tmp_path: Path) -> None:
-    """With another checksum, or in a schema that somebody has changed, their bytes are wrong."""
+    """With another checksum, or after a change of the schema, their bytes are wrong."""
     shipped = cases.protocol("trio")
     assert cli_kits.by_hand(shipped) == cases.by_hand("trio")
     assert cli_kits.by_hand(load(find("trio"), crc="crc-16/xmodem")) == {}
@@ -151,11 +151,11 @@ commands:
 
 
 def test_a_constant_after_the_checksum(tmp_path: Path, require_tool: Callable[..., str]) -> None:
-    """The check value and the constant are wrong in turn, and each fault has its own kind."""
+    """The check value and the constant are wrong in turn, and each fault has its kind."""
     (tmp_path / "ended.yaml").write_text(ENDED)
     report = run(load(tmp_path / "ended.yaml"), tmp_path, require_tool("gcc", package="gcc"))
     assert len(report.names) == report.planned
-    # The receiver of the header does not tell of a wrong constant at the end yet.
+    # The receiver of the header does not report a wrong constant at the end yet.
     assert not [each for each in report.failed if not each.endswith(" receive")], report.diagnoses[:3]
     tested = {each.split(" ", 1)[1] for each in report.names}
     assert {"wrong-crc decode", "wrong-frame decode"} <= tested
@@ -164,12 +164,12 @@ def test_a_constant_after_the_checksum(tmp_path: Path, require_tool: Callable[..
 def test_where_noise_looks_like_a_frame_there_is_less_of_it(
     tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
-    """A frame that breaks off is ended by what follows it, as nothing tells the two apart."""
+    """A frame that is cut short is completed by the following bytes."""
     (tmp_path / "bare.yaml").write_text(BARE)
     protocol = load(tmp_path / "bare.yaml")
     report = run(protocol, tmp_path, require_tool("gcc", package="gcc"))
     assert len(report.names) == report.planned
-    # The header calls an unknown message, or a forbidden address, a fault of the frame yet.
+    # The header still reports an unknown message or an illegal address as a frame error.
     late = ("wrong-unknown decode", "wrong-range decode", "wrong-range tell", "receive")
     assert not [each for each in report.failed if not each.endswith(late)], report.diagnoses[:3]
     text = (tmp_path / "bare_conformance.c").read_text()

@@ -1,4 +1,4 @@
-"""A header that is wrong in one place fails where it is wrong, says so, and fails nowhere else."""
+"""A header with one error fails in exactly the tests of that error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.conformance.conftest import Write
 
 
 class Mistake(NamedTuple):
-    """Text of a header, what stands there by mistake, and the messages and verbs that alone have to fail."""
+    """Text of a header, its wrong replacement, and the messages and verbs that must fail."""
 
     name: str
     right: str
@@ -104,7 +104,7 @@ def test_another_polynomial_is_found_first(
     assert report.status == 1
     assert report.failed[0].startswith("check value ")
     assert report.diagnoses[0].splitlines()[1].startswith("  expected: 0x")
-    # Whatever has no check value is as it was.
+    # Messages without a check value are unaffected.
     assert {each.split(" ")[0] for each in report.failed} == {"check", "direct_variable_transfer"}
 
 

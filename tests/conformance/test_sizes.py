@@ -1,4 +1,4 @@
-"""Kits of long frames, wide ids and large addresses: every test that was planned runs."""
+"""Kits of long frames, wide ids and large addresses: all planned tests run."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def check(kit: Path, compiler: str) -> None:
 
 @pytest.mark.parametrize("most", [250, 3000])
 def test_long_values(most: int, tmp_path: Path, require_tool: Callable[..., str]) -> None:
-    """The vectors of a message have more than 65,535 bytes long before one of them has."""
+    """The vectors of a message together exceed 65,535 bytes long before one of them does."""
     check(write(tmp_path, most=most), require_tool("gcc", package="gcc"))
 
 

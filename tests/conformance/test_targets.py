@@ -67,8 +67,8 @@ def simulator(tmp_path_factory: pytest.TempPathFactory, require_tool: Callable[.
     return program
 
 
-#: First and last message of each part. 32 KiB of flash hold all of two protocols, and half of the third
-#: without its dispatching, which needs the code of all commands in every part.
+#: First and last message of each part. 32 KiB of flash hold two whole protocols, and half of the third
+#: without dispatching, which needs the code of all commands in every part.
 HALVES = ((0, 101), (102, 201))
 RUNS: list[tuple[str, tuple[int, ...]]] = [
     ("qlink", ()),

@@ -1,4 +1,4 @@
-"""Construct structures accept what the interpreter of the plan accepts, with the same values and errors."""
+"""Construct structures and the interpreter of the plan agree on frames, values and errors."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Both:
         self.live = construct.live(protocol)
 
     def natives(self, message: Message, raws: Mapping[str, Raw]) -> dict[str, Any]:
-        """Raw values as construct holds them."""
+        """Raw values in the types of construct."""
         found: dict[str, Any] = {}
         for value in (each for each in message.values if each.name in raws):
             raw, kind = raws[value.name], value.type
@@ -60,11 +60,11 @@ class Both:
         return found
 
     def frame(self, message: Message) -> Direction:
-        """The direction of whose frame the message is."""
+        """The direction of the frame of the message."""
         return message.direction if message.direction in self.live.frames else "request"
 
     def same_payload(self, message: Message, payload: bytes) -> None:
-        """The structures read a payload as the interpreter does."""
+        """Check that structures and interpreter decode a payload to the same result."""
         try:
             expected: object = self.natives(message, unpack(self.plan.message(message.name).payload, payload))
         except BadContent:
@@ -76,7 +76,7 @@ class Both:
         assert found == expected, (message.name, payload.hex())
 
     def same_frame(self, direction: Direction, wire: bytes, request: bytes) -> None:
-        """They read a frame alike, or refuse it for the same reason."""
+        """Check that both decode a frame to the same result, or reject it for the same reason."""
         found, expected = self._parsed(direction, wire, request), self._decoded(direction, wire, request)
         assert found == expected, (direction, wire.hex())
 
@@ -98,7 +98,7 @@ class Both:
 
 @cache
 def both(name: str) -> Both | None:
-    """Of a file, or of a random schema; None where lint refuses that."""
+    """The pair of a file or of a random schema; None if lint rejects it."""
     path = next((path for path in _FILES if path.stem == name), None)
     protocol = load(path) if path else loads(generate(int(name)), "random.yaml")[0]
     return Both(protocol) if protocol else None
@@ -158,7 +158,7 @@ def test_what_cannot_be_sent_is_refused_as_the_plan_says(name: str) -> None:
 
 
 def _sends(one: Both, message: Message, raws: Mapping[str, Raw]) -> bool:
-    """Both refuse, or both make the same bytes."""
+    """Check that both encode the same bytes, or reject the values."""
     natives = one.natives(message, raws)
     try:
         expected = pack(one.plan.message(message.name).payload, raws)

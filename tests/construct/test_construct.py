@@ -1,4 +1,4 @@
-"""Construct structures: how their source reads, and that what is wrong is refused."""
+"""Construct structures: style of their source, and rejection of errors."""
 
 from __future__ import annotations
 
@@ -149,5 +149,5 @@ def test_any_bytes_are_a_payload_or_an_error(data: bytes, choice: str) -> None:
             fields = message.parse(data)
         except ConstructError:
             continue
-        # What was reserved or left out is sent in its usual form, and then means the same.
+        # Reserved and omitted parts are normalised, which does not change the meaning.
         assert message.parse(message.build(fields)) == fields

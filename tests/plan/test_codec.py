@@ -32,7 +32,7 @@ def _vectors(name: str, kind: str) -> list[dict[str, object]]:
 
 
 def _raw(plan: Plan, row: dict[str, object]) -> dict[str, Raw]:
-    """The values of a vector as they are on the wire."""
+    """The raw values of a vector."""
     fields, raws = dict(row["fields"]), row.get("raw", {})  # type: ignore[call-overload]
     for each in plan.message(str(row["message"])).payload.settable:
         if isinstance(each, BytesStep):

@@ -1,4 +1,4 @@
-"""Every byte of a frame belongs to one span, and what is wrong with it is what a decoder says."""
+"""Every byte of a frame belongs to one span, and faults agree with the decoder."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 _SCHEMAS = sorted([*(_ROOT / "schemas").glob("*.yaml"), *(_ROOT / "tests" / "schemas").glob("*.yaml")])
 _MUTANTS = 150
 
-#: Shapes of frames that no schema file has: parts, and the stuffing.
+#: Shapes of frames that do not occur in schema files: parts and stuffing.
 _NUMBER, _NODE = "id: {role: message, type: u8}", "node: {role: address, type: u8}"
 _DATA, _SIZE = "data: {role: payload, size: 0..40}", "size: {role: length, type: u8, counts: [data]}"
 _SUM = "check: {role: checksum, type: u8, algorithm: sum8, over: [id, node, data]}"
@@ -107,7 +107,7 @@ def _cases() -> Iterator[tuple[Path | str, Direction]]:
 
 
 def _frames(plan: Plan, direction: Direction, chance: random.Random) -> list[tuple[bytes, bytes]]:
-    """Two frames of each message, one with its default values, one with any; each with its request."""
+    """Two frames of each message, with default and with random values, and their requests."""
     codec, frames = Codec(plan), []
     for message in plan.received(direction):
         request = bytes((message.id, *chance.randbytes(2)))
@@ -116,7 +116,7 @@ def _frames(plan: Plan, direction: Direction, chance: random.Random) -> list[tup
         payloads = [chance.randbytes(chance.randint(least, max(least, most)))]
         try:
             payloads.append(pack(message.payload, {}))
-        except Unsendable:  # the caller has to choose a value
+        except Unsendable:  # a value without a default
             payloads.append(bytes(least))
         frames += [(codec.wrap(message.name, each, address, request), request) for each in payloads]
     return frames

@@ -1,4 +1,4 @@
-"""Most bytes of a frame on the wire: exactly what the longest frame has, whatever can be a stuffed byte."""
+"""The maximum size of a frame on the wire is exactly the size of the longest frame, with any stuffing."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _plan(nodes: str, number: int, sizes: str, constant: str = "") -> Plan:
 
 
 def _longest(plan: Plan) -> int:
-    """The longest frame of the request, its payload all stuffed bytes."""
+    """The longest frame of the request, whose payload consists of stuffed bytes."""
     message = plan.message("own")
     assert message.allowed
     addresses = [at for each in message.allowed.ranges for at in range(each.low, each.high + 1)]
@@ -61,7 +61,7 @@ def test_an_address_and_an_id_may_be_stuffed(nodes: str, number: int) -> None:
 
 @pytest.mark.parametrize("sizes", ["0..124", "124..124", "125..125", "126..130", "126..126"])
 def test_a_length_may_be_stuffed(sizes: str) -> None:
-    """The length counts the check value too; one that is always or sometimes the byte is stuffed."""
+    """The length includes the check value; it is stuffed if it always or sometimes equals the byte."""
     plan = _plan("1..2", 5, sizes)
     assert plan.message("own").wire_size == _longest(plan)
 

@@ -1,4 +1,4 @@
-"""The one expectation: protocols, and what is said of their bytes by hand and by the reference."""
+"""Expectations: protocols with their vectors, by hand and by the reference."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from qlinkgen.schema import find, load
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ("qlink", "trio", "mc1231a")
-#: Kinds of frames and fields that no shipped protocol has.
+#: Kinds of frames and fields that do not occur in shipped protocols.
 OTHERS = tuple(sorted(path.stem for path in (ROOT / "tests" / "schemas").glob("*.yaml")))
 PROTOCOLS = (*SHIPPED, *OTHERS)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A frame as it should be."""
+    """A valid frame."""
 
     message: Message
     address: int
@@ -36,7 +36,7 @@ class Case:
     payload: bytes
     wire: bytes
     request: bytes = b""
-    #: What is on the wire for the values that a Python object has in another form.
+    #: Raw values that differ from the values of Python objects.
     raw: Mapping[str, int] = field(default_factory=dict)
     kinds: tuple[str, ...] = ()
     decode_only: bool = False
@@ -44,7 +44,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Refusal:
-    """A frame that is wrong, and why."""
+    """A wrong frame, and its kind of fault."""
 
     kind: str
     message: Message
@@ -55,7 +55,7 @@ class Refusal:
 
 @functools.cache
 def protocol(name: str) -> Protocol:
-    """A shipped protocol, or one of the tests'."""
+    """A shipped protocol, or one of the tests."""
     return load(find(name) if name in SHIPPED else ROOT / "tests" / "schemas" / f"{name}.yaml")
 
 
@@ -73,20 +73,20 @@ def module(name: str) -> Any:
 
 @functools.cache
 def generated(name: str) -> Mapping[str, Any]:
-    """The vectors that the compiler writes, read back from their text."""
+    """The generated vectors, parsed from their text."""
     [text] = vectors.generate(protocol(name), Options()).values()
     return json.loads(text, parse_float=Decimal)  # type: ignore[no-any-return]
 
 
 @functools.cache
 def by_hand(name: str) -> Mapping[str, Any]:
-    """The vectors that people wrote; there are none for the tests' own protocols."""
+    """The vectors worked out by hand; the protocols of the tests have none."""
     path = ROOT / "schemas" / "vectors" / f"{name}.yaml"
     return yaml.safe_load(path.read_text("utf-8")) if path.exists() else {}
 
 
 def cases(name: str) -> list[Case]:
-    """Every right frame."""
+    """All valid frames."""
     return [
         _case(protocol(name), row)
         for source in (by_hand, generated)
@@ -95,7 +95,7 @@ def cases(name: str) -> list[Case]:
 
 
 def refusals(name: str) -> list[Refusal]:
-    """Every wrong frame."""
+    """All wrong frames."""
     return list(_refusals(name))
 
 

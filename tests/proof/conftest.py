@@ -1,4 +1,4 @@
-"""Outputs that have to be compiled first."""
+"""Compiled outputs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EVERY = [*OUTPUTS, *(pytest.param(name, marks=pytest.mark.program) for name in C
 @pytest.fixture(scope="session")
 @decided_by_parameter
 def make(shared: Path, require_tool: Callable[..., str]) -> Iterator[Make]:
-    """Give a function that gives an output of a protocol, and makes it once."""
+    """Give a function that returns an output of a protocol, built once."""
     made: dict[tuple[str, str], Output] = {}
     programs = contextlib.ExitStack()
 

@@ -1,4 +1,4 @@
-"""A fixed set of corruptions of a stream of frames, and which frames they leave intact."""
+"""A fixed set of corruptions of a stream of frames, and the frames that remain intact."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-#: Bytes that look like the begin of a frame.
+#: Bytes that look like the beginning of a frame.
 LookAlike = Callable[[random.Random], bytes]
 
-#: One frame or gap in so many is corrupted.
+#: One in this number of frames or gaps is corrupted.
 _ONE_IN = 4
 _LONGEST_NOISE = 40
 _LONGEST_CHUNK = 64
@@ -17,18 +17,18 @@ _LONGEST_CHUNK = 64
 
 @dataclass(frozen=True)
 class Stream:
-    """What arrives.
+    """A received stream.
 
     Attributes:
         data: the bytes.
-        intact: the frames whose every byte is there, in order.
+        intact: the complete frames, in order.
     """
 
     data: bytes
     intact: Sequence[bytes]
 
     def chunks(self) -> Iterator[bytes]:
-        """The bytes in pieces as a port would give them."""
+        """The bytes in pieces, as a port returns them."""
         chance, at = random.Random(len(self.data)), 0
         while at < len(self.data):
             size = chance.randint(1, _LONGEST_CHUNK)
@@ -37,7 +37,7 @@ class Stream:
 
 
 def corrupted(frames: Sequence[bytes], kind: str, look_alike: LookAlike) -> Stream:
-    """The stream of some frames under one kind of corruption, under all of them mixed, or under none."""
+    """A stream of frames with one kind of corruption, a mixture of all, or none."""
     chance = random.Random(kind)
     pieces, intact = [], []
     for frame in frames:

@@ -1,4 +1,4 @@
-"""Every output of the compiler behind one face, so that one expectation can be held against all of them."""
+"""A common interface to all outputs of the compiler, so that they share expectations."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from tests.support.cdriver import WARNINGS, Driver, raw_text
 
 
 class Refused(Exception):
-    """An encoder's or decoder's own error.
+    """An error of an encoder or decoder.
 
     Attributes:
-        kind: the word that a decoder has for the reason, "" where it names none.
+        kind: the kind of error of a decoder, "" if it states none.
     """
 
     def __init__(self, kind: str, text: str) -> None:
@@ -39,7 +39,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True)
 class Decoded:
-    """What a decoder made of a frame."""
+    """The result of a decoder."""
 
     message: str
     address: int
@@ -52,20 +52,20 @@ class Output(typing.Protocol):
     def encode(
         self, message: Message, fields: Mapping[str, Any], address: int, request: bytes
     ) -> tuple[bytes, bytes]:
-        """Payload and frame; what is not given has its default. Raises Refused, and nothing else."""
+        """Payload and frame, with defaults for missing values. Raises only Refused."""
         ...
 
     def decode(self, message: Message, wire: bytes, request: bytes) -> Decoded:
-        """What a whole frame says, sent in the direction of a message. Raises Refused, and nothing else."""
+        """Decode a whole frame in the direction of a message. Raises only Refused."""
         ...
 
     def decode_payload(self, message: Message, payload: bytes) -> Mapping[str, Any]:
-        """What a payload says. Raises Refused, and nothing else."""
+        """Decode a payload. Raises only Refused."""
         ...
 
 
 def plain_numbers(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields that construct gives, labels and flags as the numbers that other outputs have."""
+    """The fields of construct, with labels and flags as numbers, like other outputs."""
     named = EnumIntegerString | EnumInteger | Container
     return {name: int(value) if isinstance(value, named) else value for name, value in fields.items()}
 
@@ -104,7 +104,7 @@ class ConstructOutput:
             raise Refused("", str(error)) from None
 
     def _direction(self, direction: str) -> str:
-        """What anybody may send is in every direction's frame."""
+        """The direction of a message; any frame for messages of both directions."""
         return direction if direction in self._live.frames else "request"
 
 
@@ -166,7 +166,7 @@ def construct_live(name: str) -> Output:
 
 
 def construct_source(name: str) -> Output:
-    """The generated source, imported from a package as a user would."""
+    """The generated source, imported from a package."""
     outputs = construct.generate(cases.protocol(name), Options())
     with tempfile.TemporaryDirectory() as folder:
         package = Path(folder) / f"construct_of_{name}"
@@ -194,7 +194,7 @@ def python_module(name: str) -> Output:
 
 
 class COutput:
-    """A compiled C header, asked through a program that speaks for it."""
+    """A compiled C header, called through a driver program."""
 
     def __init__(self, protocol: Protocol, driver: Driver) -> None:
         self._protocol = protocol
@@ -220,7 +220,7 @@ class COutput:
         return _natives(message, self._ask("payload", message.name, _hex(payload)))
 
     def stream(self, direction: str, data: bytes) -> list[str]:
-        """Events of the receiver, as the program words them."""
+        """Events of the receiver, in the words of the program."""
         return self._ask("stream", direction, _hex(data))
 
     def _ask(self, *words: object) -> list[str]:
@@ -231,13 +231,13 @@ class COutput:
         return answer
 
     def _kind(self, kind: str) -> str:
-        """C checks marks and contents in two calls, and can so tell apart what is one error elsewhere."""
+        """C checks marks and contents in two calls, and so distinguishes errors that are one elsewhere."""
         marked = isinstance(self._protocol.frame, MarkedFrame)
         return "frame" if marked and kind in ("length", "unknown") else kind
 
 
 def _text(value: Value, native: Any) -> str:
-    """A native value as the program reads it."""
+    """A native value in the format of the program."""
     if isinstance(value.type, Scalar):
         return raw_text(value, raw_from_native(value, native))
     return raw_text(value, native.encode("ascii") if isinstance(native, str) else native)
@@ -264,14 +264,14 @@ def _bytes(word: str) -> bytes:
     return b"" if word == "-" else bytes.fromhex(word)
 
 
-#: What needs no tool but Python.
+#: Outputs that need only Python.
 OUTPUTS: dict[str, Callable[[str], Output]] = {
     "construct": construct_live,
     "construct source": construct_source,
     "python": python_module,
 }
-#: Compiler and flags of what is compiled: optimised, with the warnings that need it; and under sanitizers,
-#: which end the program at the first undefined thing.
+#: Compiler and flags: optimised, with the warnings that need it; and with sanitizers, which end the program
+#: at the first undefined behaviour.
 COMPILED = {
     "gcc": ("gcc", ("-O2", "-std=c99", *WARNINGS)),
     "clang": (

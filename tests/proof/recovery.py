@@ -1,4 +1,4 @@
-"""Which frames come out of a corrupted stream: of the generated stream decoders, and of a peer."""
+"""Frames recovered from a corrupted stream, by the generated stream decoders and by a peer."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Result:
     """One decoder on one stream.
 
     Attributes:
-        intact: frames that arrived whole.
-        recovered: those of them that the decoder delivered.
-        strange: frames delivered that nobody sent; what no checksum covers cannot be seen to be wrong.
+        intact: frames that arrived complete.
+        recovered: intact frames that the decoder delivered.
+        strange: delivered frames that were not sent; errors outside of a checksum are undetectable.
     """
 
     intact: int
@@ -37,8 +37,8 @@ class Subject:
     """A protocol and its decoder.
 
     Attributes:
-        frames: distinct frames, as they are sent.
-        look_alike: makes what could be taken for the begin of a frame.
+        frames: distinct frames, as sent.
+        look_alike: makes bytes that look like the beginning of a frame.
         decoded: the frames that a decoder delivers from chunks of a stream.
     """
 
@@ -52,7 +52,7 @@ class Subject:
 
     @functools.lru_cache  # noqa: B019  # there are three subjects, and a result takes a while
     def result(self, kind: str) -> Result:
-        """How the decoder does."""
+        """The result of the decoder."""
         stream = self.stream(kind)
         delivered = Counter(self.decoded(stream.chunks()))
         recovered = sum((delivered & Counter(stream.intact)).values())
@@ -61,7 +61,7 @@ class Subject:
 
 @functools.cache
 def qlink() -> Subject:
-    """Answers of slaves, of all sizes, no two alike."""
+    """Distinct responses of slaves of all sizes."""
     live, chance = cases.reference("qlink"), random.Random("qlink")
     frames: list[bytes] = []
     fields: dict[str, Any]
@@ -80,7 +80,7 @@ def qlink() -> Subject:
 
 @functools.cache
 def trio() -> Subject:
-    """Texts and variables, no two alike."""
+    """Distinct texts and variables."""
     live, chance = cases.reference("trio"), random.Random("trio")
     frames: list[bytes] = []
     fields: dict[str, Any]
@@ -109,13 +109,13 @@ def _delivered(name: str, *direction: str) -> Callable[[Iterable[bytes]], Sequen
 
 
 def has_pymavlink() -> bool:
-    """The peer is installed."""
+    """Whether the peer is installed."""
     return importlib.util.find_spec("pymavlink") is not None
 
 
 @functools.cache
 def mavlink() -> Subject:
-    """MAVLink 2 frames of about the same sizes, with the decoder of pymavlink that looks past bad data."""
+    """MAVLink 2 frames of similar sizes, with the robust decoder of pymavlink."""
     dialect = importlib.import_module("pymavlink.dialects.v20.common")
     sender, chance = dialect.MAVLink(None, srcSystem=1), random.Random("mavlink")
     frames = []
@@ -134,7 +134,7 @@ def _mavlink_decoded(dialect: Any, chunks: Iterable[bytes]) -> Sequence[bytes]:
     receiver = dialect.MAVLink(None)
     receiver.robust_parsing = True
     events = [event for chunk in chunks for event in receiver.parse_buffer(chunk) or ()]
-    # A message id that it does not know is passed on, its checksum unseen: that is no frame received.
+    # It passes on messages with an unknown id without verifying their checksum; these do not count.
     return [
         bytes(each.get_msgbuf()) for each in events if not each.get_type().startswith(("BAD_DATA", "UNKNOWN"))
     ]

@@ -18,7 +18,7 @@ def table() -> str:
 
 
 def cell(result: recovery.Result) -> str:
-    """Recovered of intact, and what nobody sent."""
+    """Recovered and intact frames, and frames that were not sent."""
     share = 100 * result.recovered / result.intact
     strange = f", {result.strange} not sent" if result.strange else ""
     return f"{result.recovered}/{result.intact} = {share:.4g} %{strange}"

@@ -1,4 +1,4 @@
-"""What the documents say of stuffing and of checksums alone."""
+"""Rules of the documents on stuffing and checksums."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_stuffing_is_undone_for_every_short_string(output: str, make: Make) -> N
     for data in strings:
         fields = {"offset": 0xA5, "data": data}
         _, wire = made.encode(message, fields, 1, b"")
-        # Behind the preamble each A5 has its 00, and taking these away leaves what was sent.
+        # After the preamble 00 follows each A5; without these bytes the original remains.
         assert wire[2:].count(b"\xa5") == wire[2:].count(b"\xa5\x00")
         body = wire[2:].replace(b"\xa5\x00", b"\xa5")
         assert (len(body), body[4:-2]) == (body[0] + 1, data)

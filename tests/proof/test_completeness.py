@@ -1,4 +1,4 @@
-"""No message goes without vectors."""
+"""Every message has vectors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_every_message_has_every_kind_of_vector(name: str) -> None:
 @pytest.mark.parametrize("name", cases.SHIPPED)
 def test_every_message_has_a_fault(name: str) -> None:
     messages = {row["message"] for row in cases.generated(name)["faults"]}
-    # A packet's request carries nothing that could be seen to be wrong, unless a value has a range.
+    # Errors in a packet's request are undetectable, unless a value has a range.
     expected = {
         each.name
         for each in cases.protocol(name).messages

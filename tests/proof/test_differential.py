@@ -1,4 +1,4 @@
-"""Whatever is sent or received, the generated Python does what the reference does."""
+"""Generated Python agrees with the reference for random input."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def output(name: str, kind: str) -> Output:
 
 
 def outcome(call: Callable[[], Any]) -> Any:
-    """What it returns, or that it refuses."""
+    """The result, or a refusal."""
     try:
         return call()
     except Refused as error:
@@ -35,7 +35,7 @@ def outcome(call: Callable[[], Any]) -> Any:
 
 
 def both(name: str, call: Callable[[Output], Any]) -> tuple[Any, Any]:
-    """What the reference and the generated Python make of the same thing."""
+    """The results of the reference and of generated Python."""
     return outcome(lambda: call(output(name, "construct"))), outcome(lambda: call(output(name, "python")))
 
 
@@ -43,7 +43,7 @@ def both(name: str, call: Callable[[Output], Any]) -> tuple[Any, Any]:
 
 
 def numbers(scalar: Scalar) -> st.SearchStrategy[Any]:
-    """Mostly legal, now and then one step past the range, or between two steps."""
+    """Mostly legal, sometimes one step past the range, or between two steps."""
     low, high = scalar.minimum, scalar.maximum
     raw = st.integers(low, high) | st.sampled_from([low, high, low - 1, high + 1])
     native = raw.map(lambda number: native_from_raw(scalar, number))
@@ -116,10 +116,10 @@ def test_any_wrapped_payload_is_refused_for_the_same_reason(name: str, data: st.
 
 
 def as_reason(name: str, message: Message, found: Any) -> Any:
-    """A refusal with the reasons that cannot be told apart made one.
+    """A refusal in which indistinguishable reasons are equal.
 
-    Without a length a frame that is cut short and a payload of the wrong size are one thing. Behind a wrong
-    count every byte stands for another field: size and a value can be wrong at once, and either may be named.
+    Without a length, a frame that is cut short and a payload of the wrong size are indistinguishable. After a
+    wrong count the fields are shifted: size and a value can be wrong at once, and either may be reported.
     """
     kinds = [field.type for field in message.fields if isinstance(field.type, Scalar)]
     counted = any(isinstance(kind.role, Count) for kind in kinds)
@@ -136,7 +136,7 @@ def plain(found: Decoded) -> tuple[str, int, dict[str, Any]]:
 
 
 def without_kind(found: Any) -> Any:
-    """Why bytes are refused is compared where only one reason is possible."""
+    """Reasons are compared if only one is possible."""
     return Refused if isinstance(found, tuple) and found[0] is Refused else found
 
 
@@ -157,7 +157,7 @@ def request_of(name: str, message: Message) -> bytes:
 
 @st.composite
 def mutated(draw: st.DrawFn, originals: tuple[bytes, ...]) -> bytes:
-    """One of some byte strings with a byte changed, lost or added, or as it is."""
+    """One of several byte strings, unchanged or with a byte changed, lost or added."""
     data = bytearray(draw(st.sampled_from(originals)))
     for change in draw(st.lists(st.sampled_from(["change", "lose", "add"]), max_size=2)):
         at = draw(st.integers(0, len(data)))

@@ -1,8 +1,8 @@
-"""Fields of every kind beside fields of every kind: the bytes and values of an independent reference.
+"""Fields of every kind next to fields of every kind, compared with an independent reference.
 
-`tests.support.field_kinds` knows the kinds and their bytes. Here they become messages: each kind alone, each
-ordered pair of the commonest kinds, triples of those that generated code treats differently, and chains in
-which every kind precedes every other. Where lint refuses a message, it says why.
+`tests.support.field_kinds` defines the kinds and their bytes. Here they are combined to messages: each kind
+alone, each ordered pair of the commonest kinds, triples of those that generated code treats differently, and
+chains in which every kind precedes every other. If lint rejects a message, it reports the right rule.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from tests.support.field_kinds import COUNTS, KINDS, LENGTH, PACKET, STUFFED, Ed
 #: Messages in one schema.
 MANY = 250
 BY_NAME = {kind.name: kind for kind in KINDS}
-#: Those whose code differs, in every place of a pair.
+#: Kinds with different code, at both positions of pairs.
 COMMON = tuple(
     BY_NAME[name]
     for name in (
@@ -53,7 +53,7 @@ DISTINCT = tuple(
 
 
 def refusals(layout: Layout) -> set[str]:
-    """The rules of lint that forbid a message."""
+    """The rules of lint that a message violates."""
     rows = [kind for kind in layout.kinds if isinstance(kind, Row)]
     at = [index for index, row in enumerate(rows) if row.open]
     found = {"two-open-ends"} if len(at) > 1 else set()
@@ -62,7 +62,7 @@ def refusals(layout: Layout) -> set[str]:
 
 
 def chains(kinds: Sequence[Kind], size: int) -> Iterator[Layout]:
-    """Messages in which every kind precedes every other, as far as lint allows, in blocks of some kinds."""
+    """Messages in which every kind precedes every other, as far as legal, in blocks of several kinds."""
     opens = [kind for kind in kinds if isinstance(kind, Row) and kind.open]
     others = tuple(kind for kind in kinds if kind not in opens)
     blocks = [others[start : start + size] for start in range(0, len(others), size)]
@@ -74,12 +74,12 @@ def chains(kinds: Sequence[Kind], size: int) -> Iterator[Layout]:
 
 
 def layouts() -> Mapping[str, list[Layout]]:
-    """Every message that is made, legal or not."""
+    """All messages, legal or not."""
     pairs = [Layout(pair, first) for first in (False, True) for pair in itertools.product(COMMON, repeat=2)]
     triples = [Layout(triple) for triple in itertools.product(DISTINCT, repeat=3)]
     return {
         "alone": [Layout((kind,)) for kind in KINDS],
-        # Counts before both fields make a difference only where the second one has a count.
+        # Counts before both fields differ only if the second one has a count.
         "pairs": [
             pair for pair in pairs if not pair.counts_first or pair.specs() != Layout(pair.kinds).specs()
         ],
@@ -127,7 +127,7 @@ def _output(group: Group, kind: str) -> Output:
 
 
 def groups() -> Iterator[Group]:
-    """The legal messages, in frames and byte orders by turns."""
+    """The legal messages, in alternating frames and byte orders."""
     frames: Iterator[tuple[str, Order]] = itertools.cycle(
         ((LENGTH, "big"), (STUFFED, "little"), (LENGTH, "little"), (STUFFED, "big"))
     )
@@ -162,7 +162,7 @@ every_group = pytest.mark.parametrize(
 
 @contextmanager
 def named(layout: Layout) -> Iterator[None]:
-    """Say in an error which message it is."""
+    """Add the message to an error."""
     try:
         yield
     except Exception as error:
@@ -171,7 +171,7 @@ def named(layout: Layout) -> Iterator[None]:
 
 
 def outcome(output: Output, message: Message, payload: bytes) -> Mapping[str, Any] | None:
-    """The values of a payload, None where it is refused. Nothing but a refusal may be raised."""
+    """The values of a payload, None if it is rejected. Other exceptions are errors."""
     try:
         return dict(output.decode_payload(message, payload))
     except Refused:
@@ -189,7 +189,7 @@ def damaged(payload: bytes, rng: random.Random) -> Iterator[bytes]:
 
 
 def agree(group: Group, output: Output) -> None:
-    """Hold an output against the reference."""
+    """Compare an output with the reference."""
     for number, layout in enumerate(group.layouts):
         message = group.protocol().by_name[f"m{number}"]
         rng = random.Random(number)
@@ -207,7 +207,7 @@ def agree(group: Group, output: Output) -> None:
 
 
 def agree_on_damage(group: Group, outputs: Sequence[Output]) -> None:
-    """Damaged payloads give the same values in all outputs, or are refused by all."""
+    """Damaged payloads have the same values in all outputs, or are rejected by all."""
     for number, layout in enumerate(group.layouts):
         message = group.protocol().by_name[f"m{number}"]
         rng = random.Random(number)
@@ -244,7 +244,7 @@ def test_c_has_the_bytes_and_values_of_the_reference(
         agree_on_damage(group, [group.output("construct"), output])
 
 
-# What lint refuses
+# Messages rejected by lint
 
 
 def test_lint_names_a_reason_for_each_message_that_it_refuses() -> None:

@@ -1,4 +1,4 @@
-"""After any corruption every intact frame that follows is delivered."""
+"""After any corruption, every later intact frame is delivered."""
 
 from __future__ import annotations
 

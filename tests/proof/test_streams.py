@@ -1,4 +1,4 @@
-"""A stream gives the same messages and faults, in the same order, in generated Python and in C."""
+"""Generated Python and C return the same messages and faults of a stream, in the same order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.proof.outputs import COutput
 pytestmark = pytest.mark.program
 
 NO_STREAM = ("mc1231a", "response")
-#: Frames that the C program takes in one line.
+#: Number of frames in a line to the C program.
 _FRAMES = 800
 
 
@@ -31,7 +31,7 @@ def c_events(output: object, name: str, direction: str, data: bytes) -> list[str
 
 
 def _in_full(name: str, event: str) -> str:
-    """A payload left out, which is a payload of defaults to whoever decodes it."""
+    """An omitted payload, which is decoded as the defaults."""
     _, *words = event.split(":")
     if words and words[-1] == "-" and cases.protocol(name).by_name[words[0]].empty_is_default:
         return event[:-1] + cases.reference(name).payload(words[0], {}).hex()
@@ -44,13 +44,13 @@ def python_events(name: str, direction: str, chunks: Sequence[bytes]) -> list[st
     module = cases.module(name)
     decoder = module.StreamDecoder(*([] if direction == "message" else [direction]))
     events = [event for chunk in chunks for event in decoder.feed(chunk)]
-    # A receiver that never has to look back has nothing left in C when the stream ends.
+    # In C, a receiver without look-back buffers nothing at the end of a stream.
     events += decoder.finish() if looks_back(name) else []
     return [_shown(event, protocol.address_name) for event in events]
 
 
 def looks_back(name: str) -> bool:
-    """Bytes wait in the receiver until it is clear what they are."""
+    """The receiver buffers bytes until they can be classified."""
     return isinstance(plan_of(cases.protocol(name)).frame.receiver, Rescan)
 
 
@@ -78,7 +78,7 @@ def streams(draw: st.DrawFn, name: str, direction: str) -> tuple[bytes, ...]:
 
 @pytest.mark.parametrize(
     ("name", "direction"),
-    # The response of a packet protocol is no stream: only its request tells where it ends.
+    # Responses of a packet protocol cannot be split without their requests.
     [
         (name, each)
         for name in cases.PROTOCOLS

@@ -1,4 +1,4 @@
-"""One expectation, every output: the vectors, both ways, bytes and values."""
+"""All outputs encode and decode the vectors."""
 
 from __future__ import annotations
 
@@ -62,19 +62,19 @@ def test_what_is_wrong_is_refused_for_the_same_reason(name: str, output: str, ma
 
 
 def same(found: Decoded, expected: Decoded) -> bool:
-    """The same message, and the same value of the same type for every field that is expected."""
+    """Whether the message, and value and type of every expected field are equal."""
     return (found.message, found.address) == (expected.message, expected.address) and same_values(
         found.fields, expected.fields
     )
 
 
 def same_values(found: Mapping[str, Any], expected: Mapping[str, Any]) -> bool:
-    """The same value of the same type for every field that is expected; enums and flags are integers."""
+    """Whether value and type of every expected field are equal; enums and flags are integers."""
     return all(
         found[name] == value and isinstance(found[name], _kind(value)) for name, value in expected.items()
     )
 
 
 def _kind(value: object) -> type | tuple[type, ...]:
-    # A whole number stands for a float or a Decimal in hand-written vectors and in JSON.
+    # In hand-written vectors and in JSON, a whole number may represent a float or a Decimal.
     return (int, float, Decimal) if type(value) is int else type(value)

@@ -1,4 +1,4 @@
-"""The protocols of the tests: shipped ones and those under tests/schemas, each with its generated module."""
+"""The protocols of the tests: shipped ones and those in tests/schemas, each with its generated module."""
 
 from __future__ import annotations
 
@@ -32,36 +32,36 @@ def module(name: str) -> Any:
 
 
 def text_of(name: str) -> str:
-    """A test schema's text, for tests that change it."""
+    """The text of a test schema, for tests that change it."""
     return (_SCHEMAS / f"{name}.yaml").read_text("utf-8")
 
 
 def defaults(name: str, message: Message) -> dict[str, Any]:
-    """Every argument of a message's class, at the default of the model."""
+    """All arguments of the class of a message, with defaults of the model."""
     arguments: dict[str, Any] = {value.name: default_of(value) for value in message.values}
     address = protocol(name).address_name
     return arguments | ({address: message.default_address} if address and message.addresses else {})
 
 
 def build(name: str, message: Message, /, **changes: Any) -> Any:
-    """A message object, its defaults changed."""
+    """A message object with changed defaults."""
     return module(name).MESSAGES[message.name](**defaults(name, message) | changes)
 
 
 def wire_of(name: str, message: Message, built: Any) -> bytes:
-    """The whole frame of a message object; a packet's response answers its request with all defaults."""
+    """The whole frame of a message object; the request of a packet response has all defaults."""
     if name == "mc1231a" and message.direction == "response":
         return bytes(built.to_frame(request_for(name, message)))
     return bytes(built.to_frame())
 
 
 def request_for(name: str, message: Message) -> Any:
-    """The request with all defaults that a response answers."""
+    """The request of a response, with all defaults."""
     return build(name, protocol(name).by_name[f"{message.command}.request"])
 
 
 def decode(name: str, message: Message, wire: bytes) -> Any:
-    """The generated decoder for a message's direction."""
+    """The generated decoder for the direction of a message."""
     codec = module(name)
     if message.direction == "message" and hasattr(codec, "decode"):
         return codec.decode(wire)
@@ -83,7 +83,7 @@ def stream(name: str, direction: str) -> Any:
 
 
 def directions(name: str) -> tuple[str, ...]:
-    """Directions that a stream decoder can take without being told what to expect."""
+    """Directions that a stream decoder can decode without `expect`."""
     if name == "mc1231a":
         return ("request",)
     return protocol(name).directions

@@ -1,7 +1,7 @@
-"""What a field is given becomes the right bytes or an EncodeError, for every kind of field.
+"""Any value of any kind of field is encoded to the right bytes, or raises EncodeError.
 
-Integers of other libraries are ints for an encoder: those that have nothing but `__index__`, and those of a
-fixed width, like numpy's, which lose bits when they are shifted.
+Encoders accept integers of other libraries: those that only have `__index__`, and those of a fixed width,
+like numpy's, which lose bits when shifted.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from tests.python.protocols import module as shipped
 from tests.support import field_kinds
 from tests.support.field_kinds import KINDS, LENGTH, STUFFED, BitFields, Edge, Layout, Row
 
-#: What may precede something else.
+#: Kinds that can precede other fields.
 CLOSED = tuple(kind for kind in KINDS if not isinstance(kind, Row) or not kind.open)
-#: Each kind alone, and then several fields in a message.
+#: Each kind alone, then several fields in a message.
 LAYOUTS = (
     *(Layout((kind,)) for kind in KINDS),
     *(Layout(CLOSED[at : at + 5]) for at in range(0, len(CLOSED), 5)),
@@ -35,7 +35,7 @@ EDGES: tuple[Edge, ...] = ("least", "most", "any")
 
 
 class Bare:
-    """An integer with nothing but `__index__`."""
+    """An integer that only has `__index__`."""
 
     def __init__(self, number: int) -> None:
         self._number = number
@@ -49,7 +49,7 @@ class Bare:
 
 @functools.total_ordering
 class Narrow(Bare):
-    """An integer as numpy has it: as wide as it needs to be, and what is computed with it no wider."""
+    """An integer like numpy's: of the minimum width, also in the results of computations."""
 
     def __eq__(self, other: object) -> bool:
         return self._number == other
@@ -90,7 +90,7 @@ def module(frame: str) -> Any:
 
 
 def drawn() -> Iterator[tuple[str, Layout, dict[str, Any], bytes]]:
-    """Each message by its name, with values and payload."""
+    """Values and payload of each message, by name."""
     for number, layout in enumerate(LAYOUTS):
         rng = random.Random(number)
         for edge in EDGES:
@@ -186,7 +186,7 @@ def sent(codec: Any, message: Any) -> Any:
 
 
 def stands_for(given: Any, value: Any) -> bool:
-    """A decoded value is what was given, or the nearest step to it."""
+    """Whether a decoded value is the given one, or its nearest step."""
     if isinstance(value, list):
         return [index(item) for item in given] == value
     if isinstance(value, str):
@@ -199,6 +199,6 @@ def stands_for(given: Any, value: Any) -> bool:
 
 
 def test_the_kinds_have_fields_of_more_than_32_bits_in_bits() -> None:
-    """Where a shift of a narrow integer loses everything."""
+    """Layouts in which shifting a narrow integer loses all bits."""
     wide = [kind for kind in KINDS if isinstance(kind, BitFields)]
     assert any(at >= 32 for kind in wide for at, _, _ in kind.members.values())

@@ -1,4 +1,4 @@
-"""Bus modules: every command can be called and handled, and type checkers know what comes back."""
+"""Bus modules: every command can be called and handled, and type checkers know the results."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EVERY = [(name, command) for name in BUSES for command in protocol(name).command
 
 
 def loaded(model: Protocol, codec: ModuleType, options: Options | None = None) -> Any:
-    """The bus module, compiled in memory beside a codec module in memory."""
+    """The bus module, compiled in memory with a codec module in memory."""
     made = ModuleType(f"wire.{model.name}_bus")
     made.__package__ = "wire"
     with mock.patch.dict(sys.modules, {"wire": ModuleType("wire"), f"wire.{model.name}": codec}):
@@ -46,7 +46,7 @@ def bus_of(name: str) -> Any:
 
 
 def recorder(base: type[Any], node: int) -> tuple[Any, list[tuple[Any, Any]]]:
-    """An object of a class of calls that notes what it is asked, and its notes."""
+    """An object of a class of calls that records its requests, and the record."""
     notes: list[tuple[Any, Any]] = []
 
     def note(request: Any, response: Any = None) -> Any:
@@ -133,7 +133,9 @@ def test_nobody_answers_a_broadcast() -> None:
         assert result(calls.write_single_register(0, number=4, value=5)) is None
         assert notes == [(codec.WriteSingleRegisterRequest(address=0, number=4, value=5), None)]
         assert result(calls.write_single_register(7, number=4, value=5)) is not None
-    assert "which do not respond: returns None" in " ".join(modbus.MasterCalls.write_single_register.__doc__.split())
+    assert "which do not respond: returns None" in " ".join(
+        modbus.MasterCalls.write_single_register.__doc__.split()
+    )
 
 
 @pytest.mark.parametrize("caller", CALLERS)
@@ -146,7 +148,7 @@ def test_a_runtime_has_to_say_how_requests_are_sent(caller: str) -> None:
         result(calls.tell(codec.NodeStartRequest(node=1)))
 
 
-# The host's side
+# Host
 
 
 HOST = {command.name: command for command in protocol("mc1231a").commands}
@@ -155,7 +157,7 @@ ON_AXIS = {name for name, command in HOST.items() if command.attributes["axis"] 
 
 
 def host_recorder(caller: str) -> tuple[Any, list[tuple[Any, ...]]]:
-    """An object of a class of a host's calls that notes what it is asked, and its notes."""
+    """An object of a class of calls of a host that records its requests, and the record."""
     notes: list[tuple[Any, ...]] = []
 
     def note(request: Any, response: Any, *axis: int) -> Any:
@@ -260,7 +262,7 @@ def test_a_field_may_be_called_axis_too_and_not_everything_is_answered() -> None
     assert not hasattr(made.AxisCalls, "halt")
 
 
-# The slave's side
+# Slave
 
 
 @pytest.mark.parametrize("name", BUSES)
@@ -313,7 +315,7 @@ def test_one_handler_is_replaced_at_a_time() -> None:
     assert replaced.handle(qlink.NodeInfoRequest(node=3), 0.0) == qlink.NodeInfoResponse(node=9)
 
 
-# What is written, and where
+# Files
 
 
 def test_rings_have_none_and_neither_has_the_far_side_of_a_host() -> None:
@@ -390,7 +392,7 @@ def test_commands_may_have_the_names_of_what_a_class_has_itself() -> None:
     assert made.SlaveHandlers(1).handle(codec.HandleRequest(node=1, x=b""), 0.0) is None
 
 
-# Type checkers and other readers of the text
+# Type checkers and linters
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from tests.support.whole import schemas, words
 
 ROOT = Path(__file__).parents[2]
 SEEDS = range(1, 41)
-#: Added to names; how much of it decides where lines end.
+#: Appended to names in parts, to vary where lines break.
 _LONGER = "_of_the_second_cooling_circuit"
 
 

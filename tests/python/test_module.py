@@ -1,4 +1,4 @@
-"""The generated text itself: clean under every checker, the same every time, light to import."""
+"""The generated text: clean under every checker, reproducible, fast to import."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_a_role_has_the_decoders_that_it_needs() -> None:
     ]
 
 
-# Frames that no schema of the tree has
+# Frames that do not occur in schema files
 
 CHECK = (
     "    check: {role: checksum, type: u8, algorithm: crc-8/smbus, over: [length, kind, station, payload]}"

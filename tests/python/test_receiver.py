@@ -1,4 +1,4 @@
-"""The generated stream decoders: the events of the byte-at-a-time reference, whatever the pieces."""
+"""The generated stream decoders return the events of the byte-at-a-time reference for any pieces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STREAMS = [(name, direction) for name in EVERY for direction in directions(name)
 
 
 def some_wire(name: str, direction: Any) -> st.SearchStrategy[bytes]:
-    """A good frame, one with a byte changed, lost or added, one that breaks off, or noise."""
+    """A valid frame, one with a byte changed, lost or added, a truncated one, or noise."""
     kinds = module(name).MESSAGES
     good = strategies.messages(protocol(name), direction).map(
         lambda both: wire_of(name, both[0], kinds[both[0].name](**both[1]))
@@ -39,7 +39,7 @@ def streams(name: str, direction: Any) -> st.SearchStrategy[bytes]:
 
 
 def summary(events: Iterable[Any]) -> list[tuple[Any, ...]]:
-    """Events with everything that has to be the same in another run."""
+    """Events with all properties that must be reproducible."""
     return [(e.kind, e.offset, e.raw) if hasattr(e, "kind") else ("message", repr(e), b"") for e in events]
 
 
@@ -69,7 +69,7 @@ def test_the_pieces_do_not_matter(name: str, direction: Any, data: st.DataObject
 
 
 def described(events: Iterable[Any]) -> list[tuple[object, ...]]:
-    """Events of the generated decoder, as the reference tells them."""
+    """Events of the generated decoder, in the form of the reference."""
     return [
         ("fault", e.kind, e.offset)
         if hasattr(e, "offset") and hasattr(e, "kind")
@@ -102,7 +102,7 @@ def test_the_reference_sees_the_same(name: str, direction: Any, data: st.DataObj
 
 
 def test_skipped_bytes_are_told_of_by_the_longest_frame_that_there_can_be() -> None:
-    """Its payload may be longer than that of any message: C, and the model, count by the frame as well."""
+    """The maximum follows from the frame, not from the messages, as in C and in the plan."""
     machine = receiver(plan_of(protocol("modbus_rtu")), "request")
     decoder = module("modbus_rtu").StreamDecoder("request")
     noise = bytes((0xA5,)) * 600
@@ -111,7 +111,7 @@ def test_skipped_bytes_are_told_of_by_the_longest_frame_that_there_can_be() -> N
 
 
 def test_a_frame_behind_what_may_be_a_longer_one_comes_out_at_its_last_byte() -> None:
-    """00 10 in front begins a candidate whose count is wrong; the frame in it must not wait."""
+    """The leading 00 10 begins a candidate with a wrong count; the frame inside it must not be delayed."""
     codec = module("modbus_rtu")
     frame = bytes.fromhex("010300000001840a")
     decoder = codec.StreamDecoder("request")

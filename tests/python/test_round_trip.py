@@ -1,4 +1,4 @@
-"""What is encoded is decoded again; any bytes at all give a message or the documented error."""
+"""Encoded messages are decoded to equal ones; any bytes result in a message or the documented error."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_any_bytes_give_a_message_or_the_documented_error(name: str, data: st.Da
 
 
 def outcome(codec: Any, attempt: Callable[[], Any]) -> Any:
-    """What comes back, or the error of the codec."""
+    """The result, or the error of the codec."""
     try:
         return attempt()
     except codec.CodecError as error:
@@ -75,7 +75,7 @@ def outcome(codec: Any, attempt: Callable[[], Any]) -> Any:
 
 
 def changed(wire: bytes) -> st.SearchStrategy[bytes]:
-    """A frame with one byte replaced, or cut off."""
+    """A frame with one byte replaced, or cut short."""
     places = st.tuples(st.integers(0, len(wire) - 1), st.integers(0, 255)) if wire else st.just((0, 0))
     replaced = places.map(lambda both: wire[: both[0]] + bytes((both[1],)) + wire[both[0] + 1 :])
     return st.one_of(replaced, st.integers(0, len(wire)).map(lambda end: wire[:end]))
@@ -129,7 +129,7 @@ def test_whatever_a_field_holds_an_encode_error_names_it(name: str) -> None:
 
 
 def refused(codec: Any, name: str, message: Any, field: str, value: object) -> None:
-    """Either the value is one that the field can have (text, bytes, a list), or the error tells all."""
+    """The value is legal (text, bytes, a list), or the error has all details."""
     built = build(name, message, **{field: value})
     wire = outcome(codec, lambda: wire_of(name, message, built))
     if isinstance(wire, codec.EncodeError):
@@ -138,7 +138,7 @@ def refused(codec: Any, name: str, message: Any, field: str, value: object) -> N
         assert message.name in str(wire)
     else:
         again = decode(name, message, wire)
-        if isinstance(getattr(again, field), list):  # bytes and an empty dict are numbers in a row too
+        if isinstance(getattr(again, field), list):  # bytes and an empty dict are also sequences of numbers
             setattr(built, field, list(getattr(built, field)))
         assert again == built, f"{message.name}.{field} = {value!r} was sent as something else"
 

@@ -1,4 +1,4 @@
-"""Facts of the documents and corners of the wire, each by its bytes."""
+"""Facts of the documents and corner cases, by their bytes."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_a_codec_has_any_16_bit_algorithm(algorithm: Any) -> None:
     for junk in (b"", b"\xa5", b"\xa5\xa5", b"\xa5\xa5\x04", b"\0\0\0\0", b"\0\0\0\0\0\0\0"):
         with pytest.raises(qlink.DecodeError):
             codec.decode_request(junk)
-    # The module itself keeps the schema's algorithm.
+    # The module keeps the algorithm of the schema.
     assert message.to_frame() == before
     assert qlink.encode(message) == before
     assert qlink.decode_request(before) == message
@@ -222,7 +222,7 @@ def test_answers_are_split_by_what_is_expected() -> None:
 
 @pytest.mark.parametrize("name", [name for name in EVERY if name != "mc1231a"])
 def test_behind_any_corruption_every_intact_frame_is_delivered(name: str) -> None:
-    """Bare packets are left out: they have no mark to begin at."""
+    """Packets are omitted, because they have no delimiter."""
     random_source, lost = random.Random(name), 0
     for direction in directions(name):
         chosen = [m for m in protocol(name).messages if m.direction in (direction, "message")]
@@ -235,7 +235,7 @@ def test_behind_any_corruption_every_intact_frame_is_delivered(name: str) -> Non
             found = events(decoder, bytes(spoilt) + b"".join(wires[1:]))
             delivered = b"".join(bytes(event.to_frame()) for event in found if hasattr(event, "to_frame"))
             lost += not delivered.endswith(b"".join(wires[1:]))
-    # A checksum of 8 bits takes one wrong frame in 256 for right; one of 16 bits none of these.
+    # A checksum of 8 bits accepts one wrong frame in 256, one of 16 bits none of these.
     assert lost <= (6 if name == "kitchen_sink" else 0)
 
 

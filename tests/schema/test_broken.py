@@ -1,7 +1,7 @@
-"""A deliberately broken file for every rule, with exactly what is said of it.
+"""A deliberately broken file for every rule, with its exact messages.
 
-After a change of wording, `UPDATE_EXPECTED=1 pytest tests/schema/test_broken.py` writes the expected texts
-anew; look at their diff as a user would.
+After a change of wording, `UPDATE_EXPECTED=1 pytest tests/schema/test_broken.py` updates the expected texts;
+review their diff from the user's point of view.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FILES = sorted(FOLDER.glob("*.yaml"))
 LINE = re.compile(
     r"[\w.-]+\.yaml:\d+:\d+: (error|warning)\[(?P<rule>[a-z-]+)\]: (?P<what>[^;]+)(; (?P<hint>.+))?"
 )
-#: No file in a folder of YAML files can show it; see test_robust.
+#: Not possible with a file of the folder; see test_robust.
 WITHOUT_FILE = {"file-unreadable"}
 
 

@@ -1,4 +1,4 @@
-"""Bytes in a schema: what each notation means, at every key that takes bytes."""
+"""Bytes in a schema: every notation, at every key for bytes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def default(protocol: Protocol) -> bytes:
     return kind.default
 
 
-#: Key to how the model has it.
+#: Keys, and their values in the model.
 READ: dict[str, Callable[[Protocol], bytes]] = {
     "value": lambda protocol: frame(protocol).preamble,
     "after": lambda protocol: stuffing(protocol).after,

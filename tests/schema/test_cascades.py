@@ -1,4 +1,4 @@
-"""One fault is reported once: nothing is concluded from what it has taken out or left uncertain."""
+"""An error is reported once, without errors derived from it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def rules(text: str) -> list[str]:
 @pytest.mark.parametrize(
     ("old", "new", "rule"),
     [
-        # A part that is taken out is still counted, covered, and addressed.
+        # A removed part is still counted, covered, and addressed.
         ("station: {role: address, type: u8}", "station: {rôle: address, type: u8}", "unknown-key"),
         ("kind: {role: message, type: u8}", "kind: {role: message, type: 8}", "wrong-type"),
         ("payload: {role: payload, size: 0..120}", "payload: {role: payload, size: many}", "bad-value"),
@@ -36,7 +36,7 @@ def rules(text: str) -> list[str]:
         ("addressing: node", "adressing: node", "unknown-key"),
         ("  repeat: safe", "  repeat: save", "bad-value"),
         ("response_within: 20 bytes", "response_within: 20", "bad-value"),
-        # Named types: used often, reported once.
+        # Named types: used repeatedly, reported once.
         ("type: i16, scale: 1/10, offset: -40", "type: i16, scale: 1/0, offset: -40", "bad-value"),
         ("type: i16, scale: 1/10, offset: -40", "type: i16, scael: 1/10, offset: -40", "unknown-key"),
         ("type: i64, scale: 1/1000", "type: i64, scale: 1/3", "inexact-scale"),
@@ -44,7 +44,7 @@ def rules(text: str) -> list[str]:
         ("green: 2,", "green: two,", "wrong-type"),
         ("  colour:\n    type: u8", "  colour:\n    type: u5x", "unknown-type"),
         ("  strict:\n    type: u8", "  strict:\n    typ: u8", "unknown-key"),
-        # Fields that other fields and keys refer to.
+        # Fields referred to by other fields and keys.
         ('words: "u16[0..8]"', 'words: "u17x[0..8]"', "unknown-type"),
         ("counts: words}", "count: words}", "unknown-key"),
         ("counts: words}", "counts: wrods}", "bad-count"),
@@ -111,7 +111,7 @@ def test_position_of_key_and_value() -> None:
     assert source.position(("a", "b", 1, "c"), of_key=True).column == 11
     assert source.position(("a", "b", 1, "c")).column == 14
     assert source.position(("a", "x", "y"), of_key=True).line == 1, (
-        "what is not there stands where its parent does"
+        "a missing node has the position of its parent"
     )
 
 

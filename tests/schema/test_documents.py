@@ -1,4 +1,4 @@
-"""Generated pages are up to date, examples in the reference work, editors get the truth."""
+"""Generated pages are up to date, examples of the reference are valid, the JSON Schema agrees with lint."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FILES = [*(find(name) for name in shipped()), *sorted((ROOT / "tests/schemas").g
 
 
 def plain(data: Any) -> Any:
-    """What an editor's YAML parser makes of the same text."""
+    """The text parsed like by a YAML parser of an editor."""
     if isinstance(data, dict):
         return {key: plain(value) for key, value in data.items()}
     if isinstance(data, list):
@@ -54,7 +54,7 @@ def test_example_of_the_reference(number: int) -> None:
 
 
 def _dump(data: Any) -> str:
-    """YAML with every scalar as it was written: plain where the notation needs it."""
+    """YAML with scalars as written: plain if the notation needs it."""
     if isinstance(data, dict):
         return "{" + ", ".join(f"{key}: {_dump(value)}" for key, value in data.items()) + "}"
     if isinstance(data, list):

@@ -1,4 +1,4 @@
-"""Echoes: what a response repeats of its request, and what it cannot repeat."""
+"""Echoes: fields that a response can repeat, and fields that it cannot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ bus: {kind: master_slave}
 
 
 def faults(request: str, response: str) -> list[str]:
-    """What is said of a request's field x and a response's field x that is an echo, bar unused types."""
+    """Faults for a field x of a request and an echo x in its response, except unused types."""
     text = (
         f"{FRAME}commands: {{go: {{id: 1, request: {{{request}}}, response: {{{response}}}, repeat: safe}}}}"
     )

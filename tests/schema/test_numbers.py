@@ -1,4 +1,4 @@
-"""Defaults at the bounds of their field, and one step beyond."""
+"""Defaults at the bounds of their field, and one step past them."""
 
 from __future__ import annotations
 

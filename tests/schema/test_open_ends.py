@@ -1,4 +1,4 @@
-"""Where a field takes the rest of the payload: what the schema accepts, every target can make."""
+"""Fields that take the rest of the payload: every target supports every valid schema."""
 
 from __future__ import annotations
 

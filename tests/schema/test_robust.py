@@ -1,4 +1,4 @@
-"""Whatever is in a file, the answer is a protocol or faults that have a place."""
+"""Any file results in a protocol, or in faults with a position."""
 
 from __future__ import annotations
 

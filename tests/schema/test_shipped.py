@@ -1,4 +1,4 @@
-"""The shipped schemas against the facts about their protocols."""
+"""The shipped schemas agree with the facts about their protocols."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from qlinkgen.plan.framing import Hunt
 from qlinkgen.schema import find, lint, load, loads, shipped
 
 ROWS = list(csv.DictReader(Path(__file__).with_name("mc1231a.csv").read_text("utf-8").splitlines()))
-#: Command: section, code, bytes of request, bytes of response (None: no answer), addressing.
+#: Command: section, code, size of request, size of response (None: no response), addressing.
 QLINK = {
     "node_setup": ("7.1", 0x01, (4, 4), (0, 0), "answered_broadcast"),
     "node_info": ("7.2", 0x02, (0, 0), (11, 11), "answered_broadcast"),
@@ -104,7 +104,7 @@ def _kind(kind: object) -> str:
     return f"{'i' if kind.signed else 'u'}{kind.bits}"
 
 
-# All of them
+# All protocols
 
 
 def test_only_warnings_of_unconfirmed_facts() -> None:
