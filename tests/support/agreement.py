@@ -1,4 +1,4 @@
-"""A C program says of frames and streams, whatever their damage, what the interpreter of the plan says."""
+"""A C program and the interpreter of the plan agree on frames and streams with any damage."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.support.random_raw import damaged, random_address, random_values
 
 
 def marks(plan: Plan) -> bytes:
-    """The bytes that mean something to a receiver."""
+    """The bytes that are significant to a receiver."""
     found = b"".join(part.data for part in plan.frame.envelope.parts if isinstance(part, ConstantPart))
     transparency = plan.frame.transparency
     if isinstance(transparency, FrameStuffing | PayloadStuffing):
@@ -31,7 +31,7 @@ def marks(plan: Plan) -> bytes:
 
 
 def wire(plan: Plan, message: MessagePlan, rng: random.Random, request: bytes = b"") -> bytes:
-    """A good frame of random values, or one that is right in all but the contents."""
+    """A valid frame of random values, or one with wrong contents."""
     values: dict[str, Raw] = {
         value.name: raw
         for value, raw in zip(message.message.values, random_values(message.message, rng), strict=True)
@@ -50,7 +50,7 @@ def wire(plan: Plan, message: MessagePlan, rng: random.Random, request: bytes = 
 
 
 def streams(plan: Plan, direction: Direction, rng: random.Random, number: int) -> Iterator[bytes]:
-    """Frames in a row, most of them damaged, and noise."""
+    """Frames, most of them damaged, and noise."""
     messages, alphabet = plan.received(direction), marks(plan)
     for each in range(number if messages else 0):
         stream = b"".join(wire(plan, rng.choice(messages), rng) for _ in range(rng.randint(1, 6)))
@@ -60,7 +60,7 @@ def streams(plan: Plan, direction: Direction, rng: random.Random, number: int) -
 
 
 def told(event: Event) -> str:
-    """An event as the program tells it."""
+    """An event in the format of the program."""
     if event.decoded is None:
         return f"{event.at}:{event.kind}"
     decoded = event.decoded
@@ -69,7 +69,7 @@ def told(event: Event) -> str:
 
 
 def events(plan: Plan, direction: Direction, stream: bytes) -> list[str]:
-    """What a receiver makes of a stream; one that keeps no bytes has nothing to say of its end."""
+    """The events of a receiver; one without a buffer reports nothing at the end."""
     machine = receiver(plan, direction)
     found = [told(event) for byte in stream for event in machine.feed(byte)]
     ends = machine.finish() if isinstance(plan.frame.receiver, Rescan) else ()
@@ -77,7 +77,7 @@ def events(plan: Plan, direction: Direction, stream: bytes) -> list[str]:
 
 
 def kind(plan: Plan, direction: Direction, frame: bytes, request: bytes = b"") -> str:
-    """What is wrong with bytes that should be one whole frame."""
+    """The kind of fault of bytes decoded as one whole frame."""
     try:
         Codec(plan).decode(frame, direction, request)
     except BadFrame as bad:
@@ -86,7 +86,7 @@ def kind(plan: Plan, direction: Direction, frame: bytes, request: bytes = b"") -
 
 
 def compare(plan: Plan, direction: Direction, driver: Driver, rng: random.Random, number: int) -> None:
-    """Streams through the receiver; every front part of some frames, right and damaged, as whole ones."""
+    """Compare streams in the receiver, and all prefixes of valid and damaged frames as whole ones."""
     for stream in streams(plan, direction, rng, number):
         said = driver.ask("stream", direction, stream.hex() or "-").split()[1:]
         due = events(plan, direction, stream)
@@ -99,6 +99,6 @@ def compare(plan: Plan, direction: Direction, driver: Driver, rng: random.Random
 
 
 def _difference(said: Sequence[str], due: Sequence[str]) -> str:
-    """The first event that differs, of C and of the interpreter."""
+    """The first different events of C and the interpreter."""
     pairs = itertools.zip_longest(said, due, fillvalue="nothing")
     return next(f"{one} instead of {other}" for one, other in pairs if one != other)

@@ -1,6 +1,6 @@
-"""Bounded model checking of a header: the text of the proofs, and cbmc's verdict on each.
+"""Bounded model checking of a header: the text of the proofs, and the results of cbmc.
 
-The proofs of a receiver stand in tests/c/proofs, with its invariant; those of the messages are written here.
+The proofs of a receiver and its invariant are in tests/c/proofs; those of the messages are generated here.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ static size_t up_to(size_t most)
     __CPROVER_assume(size <= most);
     return size;
 }
-/* Memory of exactly this size: a byte behind it is noticed. */
+/* Memory of exactly this size, so that accesses past its end are detected. */
 static uint8_t *bytes_of(size_t size)
 {
     uint8_t *const bytes = (uint8_t *)malloc(size);
@@ -51,12 +51,12 @@ _PROPERTY = re.compile(r"^\[(?P<name>\S+)\] (?P<text>.*): (?P<verdict>[A-Z]+)$",
 
 @dataclass(frozen=True)
 class Verdict:
-    """What cbmc says of every property, by name: SUCCESS or FAILURE; of a goal: SATISFIED or FAILED."""
+    """Results of cbmc by property, SUCCESS or FAILURE, or by goal, SATISFIED or FAILED."""
 
     properties: dict[str, tuple[str, str]]
 
     def failed(self) -> list[str]:
-        """Properties that do not hold, goals that cannot be reached."""
+        """Failed properties, unreachable goals."""
         wrong = ("FAILURE", "FAILED", "UNKNOWN", "ERROR")
         return [f"{name}: {text}" for name, (text, verdict) in self.properties.items() if verdict in wrong]
 
@@ -75,7 +75,7 @@ def _run(cbmc: str, file: Path, function: str, unwind: int, *options: str) -> Ve
     command = [cbmc, file.name, "--function", function, "--unwind", str(unwind), *options]
     done = subprocess.run(command, cwd=file.parent, capture_output=True, text=True, timeout=120, check=False)
     found = {each["name"]: (each["text"], each["verdict"]) for each in _PROPERTY.finditer(done.stdout)}
-    # 0: all hold; 10: some do not. Anything else is no verdict.
+    # 0: all hold; 10: some do not. Any other code is an error of cbmc.
     if done.returncode not in (0, 10) or not found:
         raise RuntimeError(
             f"{command} ended with {done.returncode}:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
@@ -84,10 +84,9 @@ def _run(cbmc: str, file: Path, function: str, unwind: int, *options: str) -> Ve
 
 
 def write_header(protocol: Protocol, folder: Path) -> Path:
-    """The protocol's header in a folder, its receiver without padding.
+    """Write the header to a folder, its receiver without padding.
 
-    A byte behind the receiver's last array is then behind the receiver: no write to it can pass for one into
-    padding.
+    Without padding, a write past the last array of the receiver is a write past the receiver.
     """
     (text,) = c.generate(protocol, Options()).values()
     end = f"}} {protocol.name}_receiver_t;"
@@ -98,7 +97,7 @@ def write_header(protocol: Protocol, folder: Path) -> Path:
 
 
 def write_receiver_proof(protocol: Protocol, folder: Path) -> Path:
-    """The proofs of the protocol's receiver, beside its header."""
+    """Write the proofs of the receiver next to the header."""
     kind, store, places = _receiver_of(plan_of(protocol).frame)
     invariant = (PROOFS / f"invariant_{kind}.c").read_text("utf-8")
     text = (PROOFS / "receiver.c").read_text("utf-8")
@@ -121,7 +120,7 @@ def _receiver_of(frame: FramePlan) -> tuple[str, str, dict[str, str]]:
 
 
 def write_message_proof(protocol: Protocol, folder: Path) -> Path:
-    """The proofs of the protocol's messages, beside its header: `decoding` and `encoding` of any message."""
+    """Write the proofs of the messages next to the header: `decoding` and `encoding` of any message."""
     names = Names(protocol)
     messages = [message for message in protocol.messages if message.fields]
     lines = [_MESSAGES.replace("@p@", protocol.name)]
@@ -169,12 +168,12 @@ def _encoding(names: Names, message: Message) -> list[str]:
 
 
 def _call(names: Names, message: Message) -> tuple[str, list[str]]:
-    # To cbmc, a variable that is not set may have any value.
+    # cbmc assumes any value for an uninitialised variable.
     return ("&message, ", [f"    {names.function(message)}_t message;"]) if message.values else ("", [])
 
 
 def shrunk(protocol: Protocol, most: int) -> Protocol:
-    """The protocol with payloads of at most so many bytes: what varies is cut, what does not fit left out."""
+    """The protocol with short payloads: runs are cut, and fields that do not fit are removed."""
     kept = {m.name: _cut(m, most) for m in protocol.messages if m.min_size <= most}
     commands = tuple(
         replace(

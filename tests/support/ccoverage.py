@@ -1,9 +1,9 @@
-"""What the committed corpus reaches of each header: lines and branches, counted by gcov.
+"""Coverage of each header by the committed corpus: lines and branches, counted by gcov.
 
     python -m tests.support.ccoverage [--write]
 
-prints the figures and every place that is not reached; --write puts the figures into docs/firmware.md. Needs
-gcc (gcov comes with it).
+prints the figures and all unreached places; --write updates the figures in docs/firmware.md. Needs gcc, which
+includes gcov.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Any
 from tests.support import cfuzz_corpus
 from tests.support.cfuzz import TARGETS, compiled
 
-#: Every function of a header is kept, so that one that nobody calls counts as not reached.
+#: Every function of a header is kept, so that an unused one counts as unreached.
 FLAGS = ("-std=gnu99", "-O0", "--coverage", "-fkeep-inline-functions", "-fkeep-static-functions", "-DREPLAY")
 PAGE = Path(__file__).parents[2] / "docs" / "firmware.md"
 BEGIN, END = "<!-- coverage -->", "<!-- end of coverage -->"
@@ -32,7 +32,7 @@ _TABLE = re.compile(f"{BEGIN}(.*?){END}", re.DOTALL)
 
 @dataclass
 class Line:
-    """How often a line ran, and how often each of its branches was taken."""
+    """Execution counts of a line and of its branches."""
 
     function: str
     count: int = 0
@@ -41,7 +41,7 @@ class Line:
 
 @dataclass(frozen=True, order=True)
 class Gap:
-    """A place that is not reached: a whole line, or some branches of one. The protocol's name is left out."""
+    """An unreached place: a line, or some of its branches. The name of the protocol is omitted."""
 
     function: str
     text: str
@@ -50,18 +50,18 @@ class Gap:
 
 @dataclass(frozen=True)
 class Coverage:
-    """What is reached of one header."""
+    """Coverage of one header."""
 
     lines: dict[int, Line]
     source: list[str]
     name: str
 
     def gaps(self) -> list[Gap]:
-        """Every place that is not reached, in the header's order."""
+        """All unreached places, in order."""
         return [place for place in self.places() if place.missing]
 
     def places(self) -> list[Gap]:
-        """Every line with code; `missing` is "" where it and all of its branches are reached."""
+        """All lines with code; `missing` is "" if a line and all its branches are reached."""
         found = []
         for number, line in sorted(self.lines.items()):
             missed = sum(1 for taken in line.branches.values() if not taken)
@@ -88,11 +88,11 @@ class Coverage:
 
 
 class Refuted(Exception):
-    """For some input something is not so: a sanitizer reports it, or the target requires it."""
+    """An input fails: reported by a sanitizer, or by a requirement of the target."""
 
 
 def measure(compiler: str, gcov: str, folder: Path) -> dict[str, Coverage]:
-    """Run the corpus of every target; what is reached of each shipped header."""
+    """Run the corpus of every target; returns the coverage of each shipped header."""
     files: dict[str, dict[int, Line]] = {f"{name}.h": {} for name in cfuzz_corpus.SHIPPED}
     name = cfuzz_corpus.write_program(folder, "all", TARGETS)
     done = compiled(compiler, folder, name, *FLAGS)
@@ -108,7 +108,7 @@ def measure(compiler: str, gcov: str, folder: Path) -> dict[str, Coverage]:
 
 
 def _every_input() -> Iterator[bytes]:
-    """The inputs of all targets, for the program that has them all: its first byte chooses both."""
+    """The inputs for the program with all targets; the first byte selects target and protocol."""
     for number, target in enumerate(TARGETS):
         for each in cfuzz_corpus.read(target):
             protocol = each[0] % len(cfuzz_corpus.SHIPPED)
@@ -116,7 +116,7 @@ def _every_input() -> Iterator[bytes]:
 
 
 def replay(program: Path, inputs: list[bytes]) -> None:
-    """Run each input once in a program that was built with REPLAY."""
+    """Run each input once in a program built with REPLAY."""
     text = "".join(f"{each.hex()}\n" for each in inputs)
     done = subprocess.run(
         [program], input=text, cwd=program.parent, capture_output=True, text=True, timeout=300, check=False
@@ -127,7 +127,7 @@ def replay(program: Path, inputs: list[bytes]) -> None:
 
 
 def _gcov(gcov: str, folder: Path, target: str) -> dict[str, Any]:
-    # How gcc names its counts depends on its version.
+    # The names of the count files depend on the version of gcc.
     (counts,) = folder.glob(f"*{target}.gcda")
     command = [gcov, "--json-format", "--stdout", "--branch-probabilities", counts.name]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=True)
@@ -155,14 +155,14 @@ def table(found: dict[str, Coverage]) -> str:
 
 
 def standing(page: str) -> str:
-    """The figures that stand in the page; AssertionError where it has no place for them."""
+    """The figures in the page; AssertionError if it has no place for them."""
     found = _TABLE.search(page)
     assert found, f"{PAGE.name} has no {BEGIN} and {END} for the figures of the corpus"
     return found[1].strip()
 
 
 def main() -> None:
-    """Print the table, then every gap."""
+    """Print the table and the unreached places."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
     parser.add_argument("--write", action="store_true", help=f"put the table into docs/{PAGE.name}")
     options = parser.parse_args()

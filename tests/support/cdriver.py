@@ -1,26 +1,25 @@
-"""A C program that speaks for a generated header: one process proves every vector of a protocol.
+"""A C program that drives a generated header: one process tests all vectors of a protocol.
 
-`build` writes the program (with cdriver_source) and compiles it, `Driver` talks to it. It answers each line
-with one line:
+`build` writes the program (with cdriver_source) and compiles it, `Driver` runs it. It answers each line with
+one line:
 
     encode MESSAGE NODE VALUE...        ok PAYLOAD WIRE              | error KIND
     decode MESSAGE WIRE [REQUEST]       ok NODE VALUE...             | error KIND
     payload MESSAGE PAYLOAD             ok VALUE...                  | error KIND
     stream DIRECTION BYTES              ok EVENT...
-    cuts DIRECTION BYTES                ok KIND...                   (of each front part, "intact" if right)
+    cuts DIRECTION BYTES                ok KIND...                   (of each prefix, "intact" if valid)
     check BYTES                         ok NUMBER                    (check value of the bytes)
 
-Bytes are hex, "-" where there are none. VALUEs are those of `Message.values` in that order: a raw integer
-(decimal or 0x, a bool is 0 or 1), an array as integers with commas between them, bytes and text as hex; "-"
-for an empty one. NODE is the address, "-" where the frame has none. For the response of a packet protocol
-NODE (encode) and REQUEST (decode) is the request's packet, because the check value covers it. MESSAGE is
-the full name, DIRECTION is request, response or message. KIND is capacity, length, range, unknown, crc,
-stuffing, truncated, frame or illegal. An EVENT is `AT:KIND` or `AT:message:MESSAGE:NODE:PAYLOAD`, where AT
-is the number of the byte, from 0, with which it came; a fault of what an intact frame carries (unknown,
-length, range) is an event like the others. A last `end:KIND` comes from the header's finish function where
-it has one. `cuts` takes the first 0, 1, 2 ... bytes apart, each in memory of exactly its size, and every
-front part of an intact payload too, so that an address sanitizer sees what is read past the end. A line that
-is not understood is answered by `usage`.
+Bytes are hex, "-" if empty. VALUEs are those of `Message.values` in order: a raw integer (decimal or 0x, a
+bool is 0 or 1), an array as integers separated by commas, bytes and text as hex; "-" if empty. NODE is the
+address, "-" if the frame has none. For the response of a packet protocol NODE (encode) and REQUEST (decode)
+are the packet of the request, because the check value covers it. MESSAGE is the full name, DIRECTION is
+request, response or message. KIND is capacity, length, range, unknown, crc, stuffing, truncated, frame or
+illegal. An EVENT is `AT:KIND` or `AT:message:MESSAGE:NODE:PAYLOAD`, where AT is the offset of the byte that
+completed it; faults in the contents of an intact frame (unknown, length, range) are also events. A last
+`end:KIND` comes from the finish function of the header, if it has one. `cuts` decodes the first 0, 1, 2 ...
+bytes, each in memory of exactly its size, and every prefix of an intact payload, so that an address sanitizer
+detects reads past the end. The answer to an invalid line is `usage`.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ from qlinkgen.model.types import Blob, Scalar
 from tests.support.cdriver_source import source
 from tests.support.sharing import made_once
 
-#: The flags under which every generated header has to be clean.
+#: Flags under which every generated header must compile without warnings.
 WARNINGS = (
     *("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wsign-conversion"),
     *("-Wcast-qual", "-Wundef", "-Werror"),
@@ -50,9 +49,9 @@ WARNINGS = (
 def build(
     protocol: Protocol, folder: Path, compiler: str, flags: Sequence[str] = ("-O1", "-std=c99")
 ) -> Path:
-    """Write header and program into a folder of their own in `folder` and compile them; returns the program.
+    """Write header and program to a separate folder in `folder` and compile them; returns the program.
 
-    Where the same was built before, by whatever process, it is not built again.
+    It is built once, also if several processes need it.
     """
     files = {Path(name).name: text for name, text in c.generate(protocol, Options()).items()}
     files["driver.c"] = source(protocol)
@@ -71,7 +70,7 @@ class Driver:
     """A running program; one question, one answer."""
 
     def __init__(self, *command: str | Path) -> None:
-        """Start it, under an emulator where the command names one."""
+        """Start it, optionally in an emulator."""
         words = [str(word) for word in command]
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
@@ -106,7 +105,7 @@ class Driver:
 
 
 def raw_text(value: Value, raw: int | Sequence[int] | bytes) -> str:
-    """A raw value as the program reads and prints it."""
+    """A raw value in the format of the program."""
     if isinstance(value.type, Scalar):
         assert isinstance(raw, int)
         return str(int(raw))

@@ -1,4 +1,4 @@
-"""The text of the program that cdriver.py tells of."""
+"""The text of the program described in cdriver.py."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _HEAD, _MAIN = (Path(__file__).with_name(f"cdriver_{part}.c").read_text("utf-8")
 
 
 def source(protocol: Protocol) -> str:
-    """The program's text; it includes the header by its name alone."""
+    """The text of the program; it includes the header without a path."""
     return _Source(protocol).text()
 
 
@@ -255,7 +255,7 @@ class _Source:
     # Cuts
 
     def _cuts(self) -> None:
-        """Each front part of the bytes, at the end of memory of exactly its size; see cdriver_head.c."""
+        """Each prefix of the bytes, in memory of exactly its size; see cdriver_head.c."""
         unpacks, directed = self.header.unpacks, self.header.directed
         self._add(
             "static void cuts(const char *direction)",

@@ -1,4 +1,4 @@
-"""libFuzzer harnesses for headers: three targets, built for one protocol or for several in one program."""
+"""libFuzzer harnesses for headers: three targets, for one protocol or several in one program."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from tests.support.cfuzz_dispatch import dispatch
 from tests.support.cfuzz_source import Harness
 
 TARGETS = ("receiver", "decoders", "dispatch")
-#: Without optimisation nearly every branch of the source is one that the fuzzer sees, and so many short
-#: functions are compiled under sanitizers in a fifth of the time.
+#: Without optimisation the fuzzer sees nearly every branch of the source, and compiling with sanitizers takes
+#: a fifth of the time.
 FUZZER = (
     "-std=c99",
     "-gline-tables-only",
@@ -23,7 +23,7 @@ FUZZER = (
 
 
 def program(protocols: list[Protocol], targets: tuple[str, ...]) -> str:
-    """The program's text; an input's first byte chooses the protocol, and the target if there are several."""
+    """The text of the program; the first byte of an input selects the protocol, and the target if several."""
     harnesses = [Harness(protocol) for protocol in protocols]
     lines = [f"#define {h.c.upper}_ENABLE_{what} 1" for h in harnesses for what in ("FLOAT", "NAMES")]
     lines += [f'#include "{h.c.prefix}.h"' for h in harnesses]
@@ -55,7 +55,7 @@ def _receiver(h: Harness) -> str:
         next=_events(h, "next") if h.c.rescans else "",
         finish=_finish(h),
         lawful=str(_lawful(h.protocol)),
-        # Where the search goes on inside what looked like a frame, the last one may have to wait for the end.
+        # After a false start the last frame may be delivered only at the end of the stream.
         promised="!answer" if h.c.packets else "true" if isinstance(kind, Hunt | Marks) else "false",
     )
 
@@ -83,7 +83,7 @@ def _events(h: Harness, name: str) -> str:
 
 def _finish(h: Harness) -> str:
     if h.c.packets:
-        # Nothing in a stream of packets tells where one begins: the host gets back in step.
+        # Packets have no delimiter: the host must resynchronise.
         return h.filled("    @p@_receiver_init(receiver);")
     if h.c.rescans:
         return (
@@ -122,7 +122,7 @@ def _enum(h: Harness, name: str) -> list[str]:
 
 
 def _any_frame(h: Harness) -> str:
-    """Any id, address and payload in a frame of any room: what could be made can be taken apart."""
+    """Any id, address and payload in a buffer of any size: an encoded frame can be decoded."""
     made = h.frame_encode("bytes", "input->left", "wire", "capacity")
     lines = [
         "/* Any id, address and payload as a frame. */",
@@ -139,7 +139,7 @@ def _any_frame(h: Harness) -> str:
         "    bytes = copy(input->at, input->left);",
         f"    size = {made};",
         "    REQUIRE(size <= (int)capacity);",
-        # Without a length in the frame, only what a message can be is a frame.
+        # Without a length in the frame, only valid messages are frames.
         "    if (size >= 0) { REQUIRE(@p@_whole_(answer, wire, (size_t)size)@or_unknown@); }",
         "    release(bytes);",
         "    release(wire);",
@@ -149,7 +149,7 @@ def _any_frame(h: Harness) -> str:
 
 
 def _any_answer(h: Harness) -> str:
-    """Any bytes as the answer to any request; what could be taken apart is made again."""
+    """Any bytes as the response to any request; a decoded one is encoded again."""
     cases = []
     for number, message in enumerate(h.protocol.messages):
         if message.direction == "response":

@@ -2,8 +2,8 @@
 
     python -m tests.support.cfuzz_corpus [--seconds N] [TARGET...]
 
-makes them anew: fuzzes each target from what is there and from the shipped vectors, then keeps the fewest
-inputs that reach as much. Needs clang and libFuzzer.
+updates them: fuzzes each target from the present inputs and the shipped vectors, then keeps a minimal set of
+inputs with the same coverage. Needs clang and libFuzzer.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from tests.support.cfuzz import FUZZER, TARGETS, compiled, program
 
 SHIPPED = ("qlink", "trio", "mc1231a")
 CORPUS = Path(__file__).parents[1] / "c" / "corpus"
-#: What follows from other edges is counted as well: gcov will ask for it.
+#: Edges implied by others are counted too, because gcov requires them.
 EVERY_EDGE = ("-fsanitize-coverage=no-prune",)
-#: What gcov tells apart and the fuzzer does not: a Trio header of a known message for no node, and an MC1231A
-#: packet with a byte too much. And what a mistake may let in: a Q.link length that is beyond the longest, and
-#: as many bytes; a Q.link frame that ends before an inserted byte.
+#: Inputs that gcov distinguishes but the fuzzer does not: a Trio header of a known message with address 0,
+#: and an MC1231A packet with one byte too many. And an input that an error might accept: a Q.link length
+#: above the maximum, with as many bytes; and a Q.link frame that ends before an inserted byte.
 KEPT = {
     "receiver": ("01000181", "000000a5a540" + 70 * "11"),
     "decoders": ("0201000100", "000100a5a504a5"),
@@ -55,7 +55,7 @@ def write(target: str, inputs: list[bytes]) -> None:
 
 
 def unpack(inputs: list[bytes], folder: Path) -> Path:
-    """One file for each input, as libFuzzer wants them."""
+    """Write one file per input, as libFuzzer requires."""
     folder.mkdir(parents=True)
     for number, each in enumerate(inputs):
         (folder / f"{number:05}").write_bytes(each)
@@ -63,7 +63,7 @@ def unpack(inputs: list[bytes], folder: Path) -> Path:
 
 
 def write_program(folder: Path, name: str, targets: tuple[str, ...]) -> str:
-    """The source of targets for all shipped protocols, with their headers; returns the program's name."""
+    """Write the source of the targets for all shipped protocols, with headers; returns the program's name."""
     protocols = [load(find(each)) for each in SHIPPED]
     for protocol in protocols:
         (text,) = c.generate(protocol, Options()).values()
@@ -73,7 +73,7 @@ def write_program(folder: Path, name: str, targets: tuple[str, ...]) -> str:
 
 
 def seeds(target: str) -> list[bytes]:
-    """Inputs made of the shipped vectors: every message, taken apart and made."""
+    """Inputs from the shipped vectors: every message, decoded and encoded."""
     found = []
     for number, name in enumerate(SHIPPED):
         protocol = load(find(name))
@@ -85,7 +85,7 @@ def seeds(target: str) -> list[bytes]:
 
 
 def _seeds(target: str, protocol: Protocol, message: Message, vector: dict[str, Any]) -> list[bytes]:
-    # Zeros choose all the room there is, supported commands and the slave's own address.
+    # Zeros select the largest buffer, supported commands and the address of the slave.
     payload, wire = bytes.fromhex(vector["payload"]), bytes.fromhex(vector.get("wire", ""))
     answer, rng = bytes([message.direction == "response"]), random.Random(vector["payload"])
     place = bytes([protocol.bus.nodes[0]]) if protocol.bus.nodes else b""
@@ -137,7 +137,7 @@ def _sum(request: bytes) -> bytes:
 
 
 def grow(target: str, seconds: int) -> None:
-    """Fuzz a target, and keep the fewest inputs that reach as much as all of them."""
+    """Fuzz a target, and keep a minimal set of inputs with the same coverage."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_program(folder, target, (target,))
@@ -155,7 +155,7 @@ def grow(target: str, seconds: int) -> None:
             "-print_funcs=0",
         ]
         subprocess.run([*run, f"-max_total_time={seconds}", str(found)], check=True)
-        # Without counters an input is worth keeping for what it reaches, not for how often.
+        # Without counters an input is kept for the edges it reaches, not for their counts.
         subprocess.run([*run, "-set_cover_merge=1", "-use_counters=0", str(least), str(found)], check=True)
         inputs = [file.read_bytes() for file in least.iterdir()] + [
             bytes.fromhex(line) for line in KEPT[target]
@@ -165,7 +165,7 @@ def grow(target: str, seconds: int) -> None:
 
 
 def main() -> None:
-    """Grow the targets named on the command line, or all."""
+    """Fuzz the targets named on the command line, or all."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
     parser.add_argument("--seconds", type=int, default=60, help="to fuzz each target (default: 60)")

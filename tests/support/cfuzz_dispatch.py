@@ -1,4 +1,4 @@
-"""The fuzz target dispatch: a slave whose functions give any answer, a listener that is told anything."""
+"""The fuzz target dispatch: a slave with any response, and a listener with any message."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from tests.support.cfuzz_source import Harness
 
 
 def dispatch(h: Harness) -> str:
-    """The target's text for one protocol."""
+    """The text of the target for one protocol."""
     slave, master = h.first == "request", bool(h.c.listener)
     return h.part(
         "dispatch",
@@ -35,7 +35,7 @@ def _slave(h: Harness) -> str:
 
 
 def _for_me(h: Harness) -> str:
-    """Only requests to this slave or to all reach its functions."""
+    """Only requests to this slave and broadcasts reach its functions."""
     if not h.c.address:
         return "true"
     own = f"frame.{h.c.address} == slave.{h.c.address}"
@@ -44,7 +44,7 @@ def _for_me(h: Harness) -> str:
 
 
 def _whom(h: Harness) -> str:
-    """Whose number the slave has and whom the request goes to: mostly the same, sometimes any."""
+    """Address of the slave and of the request: mostly the same, sometimes any."""
     if not h.c.address:
         return ""
     first, last = h.protocol.bus.nodes or (0, 255)
@@ -62,7 +62,7 @@ def _whom(h: Harness) -> str:
 
 
 def _handler(h: Harness, request: Message, response: Message | None) -> list[str]:
-    """A function of a slave's table: its request can be encoded; its answer is whatever the input says."""
+    """A function of a slave's table: its request can be encoded; its response is taken from the input."""
     function, takes, gives = h.c.function(request), bool(request.values), bool(response and response.values)
     parameters = "@p@_slave_t *slave"
     parameters += f", const {function}_t *request" if takes else ""
@@ -87,7 +87,7 @@ def _handler(h: Harness, request: Message, response: Message | None) -> list[str
 
 
 def _answer_of_frame(h: Harness) -> list[str]:
-    """The answer is a frame that decodes, from this slave and to this command."""
+    """The response is a valid frame, from this slave and for this command."""
     address = [f"        REQUIRE(back.{h.c.address} == slave.{h.c.address});"] if h.c.address else []
     pairs = [(command.request, command.response) for command in h.protocol.commands if command.response]
     same = "back.@id@ == frame.@id@" if all(q.id == r.id for q, r in pairs) else "true"
@@ -102,7 +102,7 @@ def _answer_of_frame(h: Harness) -> list[str]:
 
 
 def _answer_of_packet(h: Harness) -> list[str]:
-    """The answer is that of the command, or the refusal of one that the slave does not support."""
+    """The response is that of the command, or the rejection of an unsupported one."""
     cases = []
     for command in h.protocol.commands:
         if command.response:
@@ -120,7 +120,7 @@ def _answer_of_packet(h: Harness) -> list[str]:
         *cases,
         "        default: break;",
         "        }",
-        # The check value of a refusal may be the right one by chance.
+        # The check value of a rejection may happen to be the right one.
         "        REQUIRE(status == @P@_OK || (!supported && status == @P@_ERROR_ILLEGAL));",
     ]
 
@@ -137,7 +137,7 @@ def _master(h: Harness) -> str:
 
 
 def _teller(h: Harness, message: Message) -> list[str]:
-    """A function of a listener's table: what it is told can be encoded."""
+    """A function of a listener's table: its message can be encoded."""
     function, takes = h.c.function(message), bool(message.values)
     parameters = f"@p@_{h.c.listener}_t *listener"
     parameters += f", uint{h.c.address_bits}_t whom" if h.c.address else ""

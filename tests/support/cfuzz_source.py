@@ -1,7 +1,7 @@
-"""The text of the fuzz targets: what is common to all three, for one protocol or several in one program.
+"""The text of the fuzz targets: common parts of all three, for one protocol or several in one program.
 
-Each of the files cfuzz_*.c beside this one is a template; @p@ stands for the protocol's name, other places
-for what is written here.
+The files cfuzz_*.c in this folder are templates; @p@ is replaced by the name of the protocol, other
+placeholders by text from this module.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from qlinkgen.plan.transparency import FrameStuffing
 
 
 def _ignores_bits(message: Message) -> bool:
-    """Some received bits are not kept: what is encoded again may differ in them."""
+    """Whether some received bits are ignored, so that encoding again may change them."""
     for each in message.fields:
         kind = each.type
         if isinstance(kind, Scalar) and isinstance(kind.role, Reserved):
@@ -33,21 +33,21 @@ def _ignores_bits(message: Message) -> bool:
 
 
 class Harness:
-    """One protocol's functions that every target uses, and a way to fill in a template."""
+    """Common functions of the targets of one protocol, and a way to fill in templates."""
 
     def __init__(self, protocol: Protocol) -> None:
-        """Describe the protocol's header."""
+        """Use the interface of the header."""
         self.protocol = protocol
         self.c: Interface = interface(protocol)
         self.frame = plan_of(protocol).frame
         self.first, self.second = (*protocol.directions, *protocol.directions)[:2]
 
     def part(self, file: str, /, **places: str) -> str:
-        """A template with its places filled in."""
+        """A template with its placeholders filled in."""
         return self.filled(Path(__file__).with_name(f"cfuzz_{file}.c").read_text("utf-8"), **places)
 
     def filled(self, text: str, /, **places: str) -> str:
-        """The text with its places filled in; those that every text may have come last."""
+        """The text with its placeholders filled in, common ones last."""
         common = {
             "id": self.c.id,
             "address_size": str(self.c.address_bits // 8),
@@ -64,23 +64,23 @@ class Harness:
         return text
 
     def text(self) -> str:
-        """Functions for each message, and those that choose one."""
+        """Functions for each message, and functions that select one."""
         ahead = "\nstatic bool @p@_whole_(bool answer, const uint8_t *wire, size_t size);\n"
         messages = "".join(self._message(message) for message in self.protocol.messages)
         return self.filled(ahead) + messages + self._choices() + self._whole()
 
     def address(self, value: str) -> str:
-        """The statement that gives a frame its address."""
+        """The statement that sets the address of a frame."""
         return f"    frame.{self.c.address} = (uint{self.c.address_bits}_t){value};" if self.c.address else ""
 
     def flag(self, message: Message) -> str:
-        """How `answer` is set for a message."""
+        """The statement that sets `answer` for a message."""
         return "true" if message.direction == "response" else "false"
 
     # One message
 
     def put(self, message: Message, struct: str, to: str, capacity: str) -> str:
-        """The call that encodes a message; one without fields has no function."""
+        """The call that encodes a message, if it has fields."""
         own = f"{struct}, " if message.values else ""
         return f"{self.c.function(message)}_encode({own}{to}, {capacity})" if message.fields else "0"
 
@@ -145,7 +145,7 @@ class Harness:
         )
 
     def _filled(self, value: Value) -> list[str]:
-        """Statements that give a value of a message whatever the input says, legal or not."""
+        """Statements that set a value of a message from the input, legal or not."""
         kind, member = value.type, f"message->{naming.member(value.name)}"
         if isinstance(kind, Scalar):
             if scalar_type(kind) == "bool":
@@ -165,7 +165,7 @@ class Harness:
         ]
 
     def _scale(self, message: Message, value: Value) -> list[str]:
-        """A raw value comes back from its physical one, and no double becomes a raw value out of range."""
+        """Raw to physical and back is the identity, and no double becomes a raw value out of range."""
         kind, ok = value.type, f"{self.c.upper}_OK"
         if not isinstance(kind, Scalar) or kind.scaling is None:
             return []
@@ -173,7 +173,7 @@ class Harness:
         member = f"message.{naming.member(value.name)}"
         constant = function.upper()
         least, most = scalar_literal(kind, kind.minimum), scalar_literal(kind, kind.maximum)
-        # A double holds every whole number of so many bits, and not every longer one.
+        # A double holds all whole numbers of 53 bits.
         exact = kind.bits < 53
         inside = f"IN_RANGE({member}, {least}, {most})" if exact else "true"
         return [
@@ -193,13 +193,13 @@ class Harness:
     # All messages
 
     def sides(self) -> list[tuple[str, str]]:
-        """Directions, and the condition on `answer` for each; a ring has one direction alone."""
+        """Directions, and the condition on `answer` for each; a ring has only one direction."""
         if self.first == self.second:
             return [(self.first, "answer || !answer")]
         return [(self.first, "!answer"), (self.second, "answer")]
 
     def _choices(self) -> str:
-        """Functions that find a message by direction and id, and do something with the one found."""
+        """Functions that call a function of the message with a direction and an id."""
         found = ["\nstatic inline unsigned @p@_find_(bool answer, uint8_t id)", "{"]
         messages = self.protocol.messages
         for direction, condition in self.sides():
@@ -246,7 +246,7 @@ class Harness:
         return [head, "{", "    switch (found) {", *rows, "    default: return 0u;", "    }", "}"]
 
     def _whole(self) -> str:
-        """The function that takes any bytes for a whole frame; what could be taken apart is made again."""
+        """The function that decodes any bytes as a whole frame, and encodes a decoded one again."""
         decoded = self.frame_decode("frame", "answer ? @P@_RESPONSE : @P@_REQUEST", "wire", "size")
         checks = []
         for name, condition in self.sides():
@@ -279,7 +279,7 @@ class Harness:
         same = "made == (int)size"
         stuffing = self.frame.transparency
         if isinstance(stuffing, FrameStuffing):
-            # After the last byte of a frame an inserted one may be missing.
+            # An inserted byte after the last byte of a frame may be missing.
             same = f"({same} || (made == (int)size + 1 && again[size] == {stuffing.rule.insert}u))"
         return [
             "    {",
@@ -290,11 +290,11 @@ class Harness:
         ]
 
     def frame_decode(self, frame: str, direction: str, wire: str, size: str) -> str:
-        """The call that takes a whole frame apart; what it unpacks goes into `buffer`."""
+        """The call that decodes a whole frame, using `buffer`."""
         directed, buffer = f"{direction}, " if self.c.directed else "", "buffer, " if self.c.unpacks else ""
         return f"{self.c.prefix}_frame_decode({directed}&{frame}, {buffer}{wire}, {size})"
 
     def frame_encode(self, payload: str, size: str, wire: str, capacity: str) -> str:
-        """The call that makes a frame of the id and address in `frame`."""
+        """The call that encodes a frame with the id and address of `frame`."""
         whom = f"frame.{self.c.address}, " if self.c.address else ""
         return f"{self.c.prefix}_frame_encode(frame.{self.c.id}, {whom}{payload}, {size}, {wire}, {capacity})"

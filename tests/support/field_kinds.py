@@ -1,7 +1,7 @@
-"""Every kind of field with a reference encoder of its own, and schemas of messages that combine them.
+"""Every kind of field with a reference encoder, and schemas of messages that combine them.
 
-The reference shares no code with qlinkgen: a kind says how a schema file spells it, and draws values together
-with their bytes. `schema` writes one YAML file of many messages, `draw` gives a message's values and payload.
+The reference shares no code with qlinkgen: a kind has its schema notation, and draws values with their bytes.
+`schema` writes a YAML file of many messages, `draw` returns values and payload of a message.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import Literal, Protocol
 
 Native = int | bool | float | Decimal | bytes | str | list[int]
-#: Which values are drawn: the least of everything, the greatest, or any.
+#: The values to draw: minimum, maximum, or any.
 Edge = Literal["least", "most", "any"]
 Order = Literal["big", "little"]
 #: Name and definition of a field.
@@ -24,7 +24,7 @@ Spec = tuple[str, str]
 
 @dataclass(frozen=True)
 class Drawn:
-    """Values of a kind's fields by name, the bytes of its counts, and those of the rest."""
+    """Values of the fields of a kind by name, the bytes of its counts, and those of the rest."""
 
     values: Mapping[str, Native]
     counts: bytes
@@ -32,14 +32,14 @@ class Drawn:
 
 
 class Kind(Protocol):
-    """One way to say something in a payload."""
+    """A kind of field."""
 
     @property
     def name(self) -> str:
-        """For test reports."""
+        """The name, for test reports."""
 
     def counts(self, field: str) -> list[Spec]:
-        """The fields that say how long it is."""
+        """The counts of the field."""
 
     def fields(self, field: str) -> list[Spec]:
         """The other fields."""
@@ -57,11 +57,11 @@ class Item:
 
     Attributes:
         type: its type in the schema.
-        keys: what else the schema says of its bytes.
-        low: least value.
-        high: greatest value.
+        keys: other keys of its layout.
+        low: minimum value.
+        high: maximum value.
         size: bytes on the wire.
-        put: the bytes of a value.
+        put: encodes a value.
     """
 
     type: str
@@ -73,12 +73,12 @@ class Item:
 
     @property
     def name(self) -> str:
-        """The type, with what is not plain about its bytes."""
+        """The type, with keys of its layout."""
         return self.type + {"byteorder: little": "le", "byteorder: big": "", "": ""}.get(self.keys, "g")
 
     def draw(self, rng: random.Random, edge: Edge) -> int:
         """A legal value."""
-        # Rows have up to 250 of these: nothing is drawn that is not used.
+        # Arrays have up to 250 items, so unused values are not drawn.
         choice = {"least": 0, "most": 1, "any": int(3 * rng.random())}[edge]
         return (self.low, self.high)[choice] if choice < 2 else rng.randint(self.low, self.high)
 
@@ -112,7 +112,7 @@ def _spec(*parts: str) -> str:
 
 @dataclass(frozen=True)
 class Number:
-    """A field of one integer; `value` says what the integer means."""
+    """A field of one integer; `value` converts it to its meaning."""
 
     name: str
     item: Item
@@ -138,19 +138,19 @@ class Number:
 
 
 def scaled(scale: Fraction, offset: int = 0) -> Callable[[int], Native]:
-    """Value of a scaled integer that a float can hold."""
+    """Value of a scaled integer that a float can represent."""
     return lambda raw: float(raw * scale + offset)
 
 
 def wide(scale: Fraction) -> Callable[[int], Native]:
-    """Value of a scaled integer that a float cannot hold; the scale is a power of two."""
+    """Value of a scaled integer that a float cannot represent; the scale is a power of two."""
     digits = scale.denominator.bit_length() - 1
     return lambda raw: Decimal(raw * scale.numerator * 5**digits).scaleb(-digits, Context(prec=100))
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """Bytes that are always the same."""
+    """Constant bytes."""
 
     name: str
     type: str
@@ -166,13 +166,13 @@ class Fixed:
         return [(field, _spec(f"type: {self.type}", self.keys))]
 
     def draw(self, field: str, rng: random.Random, edge: Edge) -> Drawn:  # nothing to choose
-        """No value, always the same bytes."""
+        """No value, constant bytes."""
         return Drawn({}, b"", self.data)
 
 
 @dataclass(frozen=True)
 class BitFields:
-    """An integer of bit fields: lowest bit, width, and whether it is signed, by the letter of each."""
+    """An integer of bit fields: lowest bit, width and sign of each, by name."""
 
     name: str
     item: Item
@@ -205,18 +205,18 @@ class BitFields:
         return Drawn(values, b"", self.item.put(whole))
 
 
-# Several items
+# Arrays, bytes and text
 
 
 @dataclass(frozen=True)
 class Row:
-    """Items in a row, bytes or text; `counts_in` says what counts it, each count in an integer of its own.
+    """An array, bytes or text; its counts have different integers.
 
     Attributes:
-        least: fewest items.
-        most: most items.
+        least: minimum number of items.
+        most: maximum number of items.
         item: the items, "bytes" or "text".
-        counters: integer of each count, and what it counts. Without one, it takes the rest of the payload.
+        counters: integer and unit of each count. Without counts, the field takes the rest of the payload.
     """
 
     name: str
@@ -227,12 +227,12 @@ class Row:
 
     @property
     def open(self) -> bool:
-        """It takes the rest of the payload."""
+        """Whether it takes the rest of the payload."""
         return self.least != self.most and not self.counters
 
     @property
     def counted(self) -> bool:
-        """A field in front counts it."""
+        """Whether an earlier field counts it."""
         return bool(self.counters)
 
     @property
@@ -240,7 +240,7 @@ class Row:
         return self.item.size if isinstance(self.item, Item) else 1
 
     def counts(self, field: str) -> list[Spec]:
-        """The fields that count it."""
+        """Its counts."""
         return [
             (
                 f"{field}_n{index}",
@@ -257,7 +257,7 @@ class Row:
         return [(field, _spec(f'type: "{base}[{span}]"', keys))]
 
     def draw(self, field: str, rng: random.Random, edge: Edge) -> Drawn:
-        """So many items as are legal."""
+        """A legal number of items."""
         middle = rng.choice((rng.randint(self.least, self.most), min(self.most, self.least + 1)))
         number = {"least": self.least, "most": self.most, "any": middle}[edge]
         value: Native
@@ -398,7 +398,7 @@ class Layout:
         return values, b"".join(each.counts + each.data for each in drawn)
 
     def line(self, name: str, number: int) -> str:
-        """The message in a schema file, in one line."""
+        """The message in a schema file, as one line."""
         fields = ", ".join(f"{field}: {spec}" for field, spec in self.specs())
         return f"  {name}: {{id: {number}, direction: request, fields: {{{fields}}}}}"
 
@@ -420,7 +420,7 @@ commands:
 messages:
 """
 
-#: A length tells where a message ends; nothing is stuffed.
+#: A frame with a length, without stuffing.
 LENGTH = """\
   parts:
     start: {role: constant, value: 0x7E}
@@ -429,7 +429,7 @@ LENGTH = """\
     payload: {role: payload, size: 0..5000}
     check: {role: checksum, type: u16, algorithm: crc-16/modbus, over: [number, payload]}
 bus: {kind: master_slave}"""
-#: The preamble appears nowhere inside a frame, so Python decodes frames without it.
+#: The preamble does not occur inside a frame, so Python decodes frames without it.
 STUFFED = """\
   parts:
     start: {role: constant, value: A5 A5}
@@ -440,14 +440,14 @@ STUFFED = """\
     check: {role: checksum, type: u16, algorithm: crc-16/modbus, over: [size, number, node, payload]}
   stuffing: {after: 0xA5, insert: 0, exempt: [start]}
 bus: {kind: master_slave, nodes: 1..9}"""
-#: Only the counts in a message tell where it ends.
+#: The end of a message follows only from its counts.
 COUNTS = """\
   parts:
     number: {role: message, type: u16}
     payload: {role: payload, size: 0..5000}
     check: {role: checksum, type: u16, algorithm: crc-16/modbus, over: [number, payload]}
 bus: {kind: master_slave}"""
-#: No frame at all: fields of fixed size, or one that takes the rest.
+#: Packets: fields of fixed size, or one that takes the rest.
 PACKET = """\
   packet:
     number: {role: message, type: u8}
@@ -457,7 +457,7 @@ bus: {kind: host}"""
 
 
 def schema(layouts: Sequence[Layout], frame: str, order: Order = "big") -> str:
-    """A schema file with a message m0, m1, ... for each layout, each in a line of its own at the end."""
+    """A schema file with a message m0, m1, ... for each layout, one per line at the end."""
     numbers = (number for number in itertools.count() if number != 255)
     lines = [layout.line(f"m{index}", next(numbers)) for index, layout in enumerate(layouts)]
     addressing = "node" if frame == STUFFED else "none"

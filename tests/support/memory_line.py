@@ -1,4 +1,4 @@
-"""A simulated line at a memory port: run by a thread in real time, but silence is skipped."""
+"""A simulated line at a memory port, run by a thread in real time that skips silence."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from qlinkgen.errors import PortLost
 from qlinkgen.sim import Wire
 from qlinkgen.transport import Port, memory_pair
 
-#: Seconds until the thread looks again, and until a reader asks whether anything can still come.
+#: Seconds between polls of the thread, and of a reader that checks whether data can still arrive.
 _LOOK = 0.002
-#: Rounds of the thread without anything to do, after which nothing is under way. One is not enough: it may
-#: have begun before the last bytes were written.
+#: Number of idle rounds of the thread after which the line is idle. One is not enough, since it may have
+#: begun before the last bytes were written.
 _QUIET = 2
 
 
 class MemoryLine(Port):
-    """The outside of a `Wire`, in memory.
+    """The external side of a `Wire`, in memory.
 
-    A read whose timeout will pass without bytes returns early, and the clock goes on by the rest: once the
-    thread has dealt with everything that was written and no station has anything due, nothing can come. So a
-    timeout takes milliseconds of real time, and may be generous: a slow thread is waited for.
+    A read that would time out returns early, and the clock advances by the rest: once the thread has
+    processed all written bytes and no node has anything due, no data can arrive. A timeout therefore takes
+    milliseconds of real time and may be long, and a slow thread does no harm.
     """
 
     def __init__(self, wire: Wire, baud: int = 115200) -> None:
@@ -54,12 +54,12 @@ class MemoryLine(Port):
         return data
 
     def write(self, data: bytes) -> None:
-        with self._lock:  # or a round that is about to end would count as a quiet one after this
+        with self._lock:  # otherwise a round that is about to end would count as idle
             self._quiet = 0
             self._near.write(data)
 
     def do(self, action: Callable[[], Any]) -> Any:
-        """Do something to the stations, between two rounds of the thread."""
+        """Call a function between two rounds of the thread, to change nodes."""
         with self._lock:
             self._quiet = 0
             return action()

@@ -1,12 +1,12 @@
-"""Marks each test by what its code can reach, and fails one that uses what it has no marker for.
+"""Marks each test by the resources that its code can use, and fails a test that uses others.
 
-`pty` and `program` are found, not written by hand. A test is marked when its function, one of its fixtures,
-or a function or class of the tests that these refer to names a pseudo-terminal or `subprocess`. Where a
-parameter decides, such as the transport of a rig, the function that acts on it is decorated with
+`pty` and `program` are assigned automatically. A test is marked if its function, one of its fixtures, or a
+function or class of the tests that these refer to names a pseudo-terminal or `subprocess`. If a parameter
+decides, such as the transport of a rig, the function that evaluates it is decorated with
 `decided_by_parameter`, and the parameter has an attribute `needs` with the names of markers.
 
-The search does not look into qlinkgen, nor through `getattr` and the like. A guard covers the rest: a test
-that opens a pseudo-terminal or starts a program without the marker fails, in whatever suite it runs.
+The search does not enter qlinkgen, nor follow `getattr` and the like. A guard covers these cases: a test that
+opens a pseudo-terminal or starts a program without the marker fails.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _DECIDED: list[object] = []
 
 
 def decided_by_parameter(function: F) -> F:
-    """Keep the search out of a function; the attribute `needs` of a parameter says what it takes."""
+    """Exclude a function from the search; the attribute `needs` of its parameter has the markers."""
     _DECIDED.append(function)
     return function
 
@@ -77,7 +77,7 @@ def found_in(root: object) -> frozenset[str]:
 
 
 def _function(value: object) -> object:
-    """Return the function of a method, property or decorated function, None where a parameter decides."""
+    """Return the function of a method, property or decorated function, None if a parameter decides."""
     value = getattr(value, "fget", None) or getattr(value, "__func__", value)
     if callable(value):
         value = inspect.unwrap(value, stop=_is_decided)
@@ -90,7 +90,7 @@ def _is_decided(value: object) -> bool:
 
 @functools.cache
 def _references(function: FunctionType) -> tuple[frozenset[str], tuple[object, ...]]:
-    """Return which of NAMES a function contains, and the functions and classes to search next."""
+    """Return the NAMES in a function, and the functions and classes to search next."""
     names = set(_names(function.__code__))
     values = [function.__globals__[name] for name in names if name in function.__globals__]
     for module in [value for value in values if isinstance(value, ModuleType)]:
@@ -129,7 +129,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 class _Guard:
-    """Notes what a test uses without a marker. It stops nothing: what is raised here might be caught."""
+    """Records resources used without a marker. It does not raise, because the test might catch that."""
 
     def __init__(self) -> None:
         self.item: pytest.Item | None = None
@@ -140,17 +140,17 @@ class _Guard:
             self.missing[marker] = what
 
     def hear(self, event: str, details: tuple[Any, ...]) -> None:
-        """Serve as audit hook."""
+        """Handle an audit event."""
         if event == "subprocess.Popen":
             self.note("program", f"starts {os.fsdecode(details[0])}")
 
     def openpty(self, original: Callable[[], tuple[int, int]]) -> tuple[int, int]:
-        """Stand in for os.openpty, which has no audit event."""
+        """Replace os.openpty, which has no audit event."""
         self.note("pty", "opens a pseudo-terminal")
         return original()
 
     def watch(self, item: pytest.Item) -> Generator[None, object, object]:
-        """Fail a test, or its setup, that has used something without a marker."""
+        """Fail a test or setup that has used a resource without a marker."""
         self.item = item
         self.missing.clear()
         try:
@@ -180,7 +180,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the markers, and put the guard in its place for the rest of this process."""
+    """Declare the markers, and install the guard for the rest of this process."""
     for name, meaning in MARKERS.items():
         config.addinivalue_line("markers", f"{name}: {meaning}")
     sys.addaudithook(_guard.hear)

@@ -1,4 +1,4 @@
-"""Faults planted into a header, to know that what should find them does."""
+"""Faults planted in a header, to verify that tests detect them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Fault:
     replacement: str | Callable[[re.Match[str]], str]
 
     def planted(self, header: str) -> str:
-        """The header with the fault in it; AssertionError where the function has no such place."""
+        """The header with the fault; AssertionError if the pattern does not occur in the function."""
         start = re.search(rf"^static inline [^;{{]*\b{self.function}\(", header, re.MULTILINE)
         assert start, f"there is no {self.function}"
         end = header.index("\n}\n", start.start())
@@ -26,5 +26,5 @@ class Fault:
 
 
 def one_more(match: re.Match[str]) -> str:
-    """Replace a bound by the next number; the pattern's groups are what stands before it, and the number."""
+    """Replace a bound by the next number; the groups of the pattern are the text before it and the number."""
     return f"{match[1]}{int(match[2]) + 1}U"

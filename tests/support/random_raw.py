@@ -1,4 +1,4 @@
-"""Random messages as raw values, and random damage to a stream; the same for the same seed."""
+"""Reproducible random messages as raw values, and random damage to a stream."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ Raw = int | list[int] | bytes
 
 
 def random_values(message: Message, rng: random.Random) -> list[Raw]:
-    """A raw value for each value of a message, all of them legal; bounds come often."""
+    """Legal raw values of a message, often bounds."""
     return [_random(value, rng) for value in message.values]
 
 
 def random_address(message: Message, rng: random.Random) -> int:
-    """An address that the message may carry, 0 where the frame has none."""
+    """A legal address of the message, 0 if the frame has none."""
     if not message.addresses:
         return 0
     first, last = rng.choice(message.addresses)
@@ -24,7 +24,7 @@ def random_address(message: Message, rng: random.Random) -> int:
 
 
 def damaged(stream: bytes, rng: random.Random, alphabet: bytes) -> bytes:
-    """The stream with a few bytes changed, lost, doubled or added."""
+    """The stream with a few bytes changed, lost, duplicated or added."""
     data = bytearray(stream)
     for _ in range(rng.randint(1, 6)):
         at = rng.randrange(len(data) + 1)

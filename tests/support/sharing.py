@@ -1,4 +1,4 @@
-"""What one worker makes and all of them use, so that it is made once in a session."""
+"""Resources that one worker builds once per session for all workers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def locked(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def made_once(folder: Path) -> Iterator[bool]:
-    """Enter the block alone; yields whether this is the first time, so that the folder has to be filled."""
+    """Enter the block exclusively; yields whether it is the first time and the folder must be filled."""
     folder.mkdir(parents=True, exist_ok=True)
     done = folder.with_suffix(".done")
     with locked(folder.with_suffix(".lock")):

@@ -1,6 +1,6 @@
 """Hypothesis strategies from the model: legal values of any field, and the fields of any message.
 
-Values are native, as qlinkgen.model.values describes them: what generated Python and construct hold.
+Values are native, as described in qlinkgen.model.values: those of generated Python and construct.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from qlinkgen.model.values import native_from_raw
 
 
 def raw_values(scalar: Scalar) -> st.SearchStrategy[int]:
-    """Legal integers on the wire, bounds and bytes that frames stumble over among them."""
+    """Legal raw integers, including bounds and bytes that are critical in frames."""
     if isinstance(scalar.meaning, Flags) and scalar.meaning.reserved_zero:
         bits = [1 << member.value for member in scalar.meaning.members]
         return st.lists(st.sampled_from(bits), unique=True).map(sum)
@@ -49,7 +49,7 @@ def texts(kind: Blob) -> st.SearchStrategy[str]:
 
 
 def octets(kind: Blob) -> st.SearchStrategy[bytes]:
-    """Byte strings, with more than their share of bytes that frames stumble over."""
+    """Byte strings, often with bytes that are critical in frames."""
     byte = st.one_of(st.sampled_from([0xA5, 0x00, 0xFF, 0xFD, 0x7E]), st.integers(0, 255))
     return st.lists(byte, min_size=kind.length.minimum, max_size=kind.length.maximum).map(bytes)
 
@@ -60,12 +60,12 @@ def fields(message: Message) -> st.SearchStrategy[dict[str, Any]]:
 
 
 def addresses(message: Message) -> st.SearchStrategy[int]:
-    """Addresses that a message may carry."""
+    """Legal addresses of a message."""
     return st.one_of(*(st.integers(low, high) for low, high in message.addresses))
 
 
 def arguments(protocol: Protocol, message: Message) -> st.SearchStrategy[dict[str, Any]]:
-    """Fields and address of a message, as the constructor of its generated class takes them."""
+    """Fields and address of a message, as arguments of its generated class."""
     if not message.addresses or protocol.address_name is None:
         return fields(message)
     address = st.fixed_dictionaries({protocol.address_name: addresses(message)})
@@ -73,13 +73,13 @@ def arguments(protocol: Protocol, message: Message) -> st.SearchStrategy[dict[st
 
 
 def messages(protocol: Protocol, direction: str = "") -> st.SearchStrategy[tuple[Message, dict[str, Any]]]:
-    """Any message of a direction (of all, if none is given) with its arguments."""
+    """Any message of a direction (default: all) with its arguments."""
     chosen = [m for m in protocol.messages if not direction or m.direction in (direction, "message")]
     return st.sampled_from(chosen).flatmap(lambda m: st.tuples(st.just(m), arguments(protocol, m)))
 
 
 def junk(protocol: Protocol) -> st.SearchStrategy[bytes]:
-    """Bytes, among them many that mean something in the protocol's frames."""
+    """Bytes, many of them significant in frames of the protocol."""
     special = [0x00, 0x01, 0x04, 0xFF]
     special += [message.id for message in protocol.messages if message.id < 256][:20]
     frame = protocol.frame
