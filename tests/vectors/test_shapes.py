@@ -1,4 +1,4 @@
-"""Vectors of frames of every shape: each says what targets find, and each fault is in the part it names."""
+"""Vectors of frames of every shape agree with targets, and each fault is in the named part."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from tests.proof.outputs import plain_numbers
 from tests.support.whole import schemas
 
 Row = Mapping[str, Any]
-#: Random whole schemas, beside the shapes that the C headers are tested with.
+#: Random whole schemas, in addition to the shapes of the tests of C headers.
 SEEDS = range(16)
 
 
 @functools.cache
 def protocols() -> tuple[Protocol, ...]:
-    """Shapes that schemas accept, random schemas, and one whose preamble is found nowhere else."""
+    """Valid shapes, random schemas, and one whose preamble occurs nowhere else."""
     shapes = [protocol for _, protocol in itertools.chain(test_shapes.pairs(), test_shapes.others())]
     random = [loads(schemas.generate(seed), "whole.yaml")[0] for seed in SEEDS]
     hunting = cases.protocol("qlink")
@@ -93,7 +93,7 @@ def test_every_right_vector_decodes_in_python_and_construct() -> None:
 
 
 def decoded(module: Any, plan: Plan, message: MessagePlan, row: Row) -> Any:
-    """What generated Python makes of a vector."""
+    """The result of generated Python for a vector."""
     direction = plan.hears(message)
     decode = getattr(module, "decode" if direction == "message" else f"decode_{direction}")
     return decode(wire(row), *([module.decode_request(wire(row, "request"))] if row.get("request") else []))
@@ -111,12 +111,12 @@ def test_every_fault_has_its_kind_in_python_and_is_none_of_constructs_frames() -
                 live.parse(plan.hears(message), wire(row), wire(row, "request"))
 
 
-#: What a part alone is wrong in, as far as its kind does not depend on the rest of the frame.
+#: The fault of each kind of part, if it does not depend on the rest of the frame.
 KINDS = {ConstantPart: "frame", CheckPart: "crc", MarkPart: "frame", AddressPart: "range", IdPart: "unknown"}
 
 
 def test_every_part_has_a_vector() -> None:
-    """Whatever surrounds it: a constant or another part may follow the check value."""
+    """In any frame: a constant or another part may follow the check value."""
     for plan, document in written():
         kinds: dict[tuple[str, str], set[str]] = defaultdict(set)
         for row in document["faults"]:
@@ -143,7 +143,7 @@ def test_every_part_has_a_vector() -> None:
 
 
 def test_a_wrong_part_is_the_only_one() -> None:
-    """Of the frame without stuffing; a check value is that of the wrong part."""
+    """In the frame without stuffing; the check value is computed over the wrong part."""
     for plan, message, row in rows("faults"):
         part = next(each for each in message.envelope.parts if each.name == row["part"])
         if isinstance(plan.frame.transparency, FrameStuffing | PayloadStuffing | SevenBit):
@@ -171,7 +171,7 @@ def checked(plan: Plan, message: MessagePlan, cells: Mapping[str, bytes], row: R
 
 
 def test_a_frame_is_cut_everywhere() -> None:
-    """The first message of each direction breaks off after every number of bytes that is no frame."""
+    """The first message of each direction is cut after every number of bytes that is not a frame."""
     for plan, document in written():
         module = python.load(plan.protocol)
         begun: set[str] = set()

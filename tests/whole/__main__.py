@@ -1,7 +1,7 @@
-"""Random whole schemas through everything: ``python -m tests.whole --seeds 0..99 [--jobs 2]``.
+"""Try random whole schemas: ``python -m tests.whole --seeds 0..99 [--jobs 2]``.
 
-Prints a line for each cause of a difference, with the seeds that show it, and ends with 1 if there is one.
-``--report FILE`` writes every difference with its schema, ``--output PAGE`` the figures if there is none.
+Prints a line with the seeds for each cause of a difference, and exits with 1 if there is any.
+``--report FILE`` writes all differences with their schemas, ``--output PAGE`` the figures of a clean run.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pathlib import Path
 from tests.support.whole.schemas import generate
 from tests.support.whole.trial import Effort, Outcome, run
 
-#: Of the schemas of `--names mixed`, every so many has hostile names and texts.
+#: With `--names mixed`, one in this number of schemas has hostile names and texts.
 _HOSTILE = 2
-#: After so many schemas a line tells how far the trials are.
+#: Number of schemas between lines of progress.
 _STEP = 50
 
 _PAGE = """\
@@ -64,7 +64,7 @@ class _Arguments:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run the trials that a command line asks for."""
+    """Run the trials of a command line."""
     arguments = _parsed(words)
     if arguments.show:
         for seed in arguments.seeds:
@@ -97,7 +97,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def is_hostile(seed: int, names: str) -> bool:
-    """The schema of a seed has hostile names and texts."""
+    """Whether the schema of a seed has hostile names and texts."""
     return names == "hostile" or (names == "mixed" and seed % _HOSTILE == _HOSTILE - 1)
 
 
@@ -106,7 +106,7 @@ def _trial(seed: int, names: str, effort: Effort) -> Outcome:
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """How many schemas were refused and why, and every cause of a difference with its seeds."""
+    """Numbers of rejected schemas by reason, and causes of differences with their seeds."""
     refused: dict[str, list[int]] = defaultdict(list)
     causes: dict[tuple[str, str, str], list[int]] = defaultdict(list)
     for outcome in outcomes:

@@ -1,6 +1,6 @@
-"""The comparison notices faults like those that generated code once had, planted into what it has now.
+"""The comparison detects faults like those that generated code once had.
 
-Each is planted into the text of one output, or into the vectors, and is found where it shows.
+Each is planted in the text of one output, or in the vectors, and detected in the right stage.
 """
 
 from __future__ import annotations
@@ -61,10 +61,10 @@ class Planted:
     """A fault.
 
     Attributes:
-        schema: one whose code has the place.
-        pattern: the place in the generated text, and what is there instead.
-        found: stages and outputs of which one must tell of it.
-        target: whose text it is.
+        schema: one with the code.
+        pattern: the generated text, and its wrong replacement.
+        found: stages and outputs, one of which must report it.
+        target: the target of the text.
     """
 
     schema: str
@@ -169,7 +169,7 @@ def test_a_planted_fault_is_found(planted: Planted, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.slow
 def test_a_vector_that_spoils_another_part_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The kit then fails on a right header."""
+    """The kit then fails on a correct header."""
     right = faults.Faults.of
 
     def wrong(self: faults.Faults, good: faults.Good, *, first: bool) -> Iterator[faults.Bad]:

@@ -1,4 +1,4 @@
-"""Schemas on which outputs once differed; random ones found them."""
+"""Schemas on which outputs once differed, found by random schemas."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_outputs_agree(text: str, require_tool: Callable[..., str]) -> None:
 
 
 def test_the_first_wrong_part_of_a_header_names_the_fault() -> None:
-    """Without a preamble; the constant precedes the address, which is wrong too."""
+    """Without a preamble; the constant precedes the address, which is also wrong."""
     text = f"{_HEAD}{_BARE}{_BUS}messages:\n  log: {{id: 5, fields: {{v: u8}}}}\n"
     protocol, faults = loads(text, "whole.yaml")
     assert protocol, faults

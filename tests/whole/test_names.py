@@ -1,4 +1,4 @@
-"""Names that generated functions use themselves, over many shapes of frames."""
+"""Names used by generated functions, in many shapes of frames."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.support.whole import schemas
 
 _FUNCTION = re.compile(r"^static inline ([^;{]*?)\{\n(.*?)^\}\n", re.MULTILINE | re.DOTALL)
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
-#: Lower case, and not the member of a struct.
+#: Lower case, and not a struct member.
 _WORD = re.compile(r"(?<![\w>.])[a-z_]\w*")
 
 

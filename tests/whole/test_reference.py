@@ -1,4 +1,4 @@
-"""The reference and the generator, before anything is held to them."""
+"""Tests of the reference and of the random schemas."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.support.whole.reference import Reference, Wrong, checks
 from tests.support.whole.trial import traits
 
 ROOT = Path(__file__).parents[2]
-#: Schemas that are looked at without making anything of them.
+#: Schemas that are checked without generating outputs.
 MANY = 120
 
 

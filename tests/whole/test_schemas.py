@@ -1,6 +1,6 @@
-"""Random whole schemas through every target: the same ones always, and some that nothing has tried yet.
+"""Random whole schemas through every target: a fixed set, and a new one in each session.
 
-Which new ones is told at the begin of a session; QLINKGEN_SCHEMAS=NUMBER asks for the same again.
+The number of the new set is printed at the beginning of a session; QLINKGEN_SCHEMAS=NUMBER selects it again.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import pytest
 from tests.support.whole.trial import Effort, Outcome, run
 
 FIXED, NEW = 28, 16
-#: Added to a seed whose schema lint refuses.
+#: Added to a seed whose schema lint rejects.
 _NEXT = 1_000_000_000
 
 
 def trial(seed: int) -> Outcome:
-    """The trial of the first schema from a seed on that lint accepts; every second one is hostile."""
+    """The trial of the first valid schema from a seed on; every second one is hostile."""
     seeds = itertools.count(seed, _NEXT)
     trials = (run(each, hostile=bool(seed % 2), effort=Effort(messages=4, streams=8)) for each in seeds)
     return next(outcome for outcome in trials if not outcome.refused)

@@ -1,1 +1,1 @@
-"""Whole random schemas, and an independent reference that every output is compared with."""
+"""Whole random schemas, and an independent reference for comparison with every output."""

@@ -1,4 +1,4 @@
-"""Random values, frames that are wrong in one way, and streams that are damaged."""
+"""Random values, frames with one error, and damaged streams."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.support.whole.reference.document import Message, Number, Run
 
 
 def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
-    """Legal values; bounds and the stuffed byte come often."""
+    """Legal values, often bounds and the stuffed byte."""
     return {name: _run(kind, rng, mark) if isinstance(kind, Run) else _number(kind, rng, mark)
             for name, kind in message.values()}  # fmt: skip
 
@@ -32,7 +32,7 @@ def _number(kind: Number, rng: random.Random, mark: int) -> int:
 
 
 def address(message: Message, rng: random.Random) -> int:
-    """An address that the message may carry."""
+    """A legal address of the message."""
     if not message.addresses:
         return 0
     low, high = rng.choice(message.addresses)
@@ -42,7 +42,7 @@ def address(message: Message, rng: random.Random) -> int:
 def wrong_frames(
     reference: Reference, message: Message, payload: bytes, wire: bytes, rng: random.Random, *, request: bytes
 ) -> list[bytes]:
-    """Frames with a byte changed, lost or added, and good frames around payloads that are wrong."""
+    """Frames with a byte changed, lost or added, and valid frames around wrong payloads."""
     place = rng.choice(message.addresses)[0] if message.addresses else 0
     found = [_spoilt(wire, rng) for _ in range(3)]
     found += [wire[: rng.randrange(len(wire) + 1)], wire + bytes([rng.randrange(256)])]
@@ -60,13 +60,13 @@ def wrapped(
     *,
     request: bytes = b"",
 ) -> list[bytes]:
-    """A good frame around a payload that may be wrong, if one can hold it."""
+    """A valid frame around a payload that may be wrong, if a frame can hold it."""
     spoilt = _spoilt(payload, rng)
     return [reference.wrap(message.name, spoilt, place, request)] if fits(reference, spoilt) else []
 
 
 def fits(reference: Reference, payload: bytes) -> bool:
-    """A frame can hold the payload, whatever it is."""
+    """Whether a frame can hold the payload, valid or not."""
     most = getattr(reference.frame, "most", None)
     return most is None or len(payload) <= most
 
@@ -125,7 +125,7 @@ def pieces(data: bytes, rng: random.Random) -> list[bytes]:
 
 
 def smallest(data: bytes, fails: Callable[[bytes], bool], tries: int = 80) -> bytes:
-    """The data with everything taken out that a failure does not need."""
+    """The data reduced to the minimum that reproduces a failure."""
     size = max(1, len(data) // 2)
     while size:
         at = 0

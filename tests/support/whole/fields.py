@@ -1,4 +1,4 @@
-"""Random fields of every kind, in any order that the language allows."""
+"""Random fields of every kind, in any legal order."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _Words(Protocol):
 
 @dataclass
 class Room:
-    """What is left of a payload."""
+    """The rest of a payload."""
 
     least: int
     left: int
@@ -38,12 +38,12 @@ class Room:
 
 @dataclass
 class FieldMaker:
-    """Makes the fields of one schema's messages."""
+    """Creates the fields of the messages of a schema."""
 
     rng: random.Random
     words: _Words
     shape: Shape
-    #: Share of the fields that have a variable size.
+    #: Fraction of fields of variable size.
     variable: float = 0.3
     taken: set[str] = field(default_factory=set)
     enums: Doc = field(default_factory=dict)
@@ -73,7 +73,7 @@ class FieldMaker:
         }
 
     def forget_unused(self, document: Doc) -> None:
-        """Take out what no field has, so that lint has nothing to warn of."""
+        """Remove unused types, so that lint does not warn."""
         text = repr({key: document.get(key) for key in ("commands", "messages")})
         for group in ("types", "enums", "flags"):
             for name in reversed(list(document.get(group, {}))):
@@ -104,7 +104,7 @@ class FieldMaker:
     # The fields of a message
 
     def fields(self, room: Room, begun: Doc | None = None) -> Doc:
-        """The fields of one message, those `begun` in front."""
+        """The fields of one message, beginning with `begun`."""
         rng = self.rng
         taken = {self.shape.address_name, *(begun or {})}
         made: list[tuple[str, Any]] = []
@@ -152,7 +152,7 @@ class FieldMaker:
         return "[" not in kind and kind not in ("bytes", "text")
 
     def _fill_words(self, made: list[tuple[str, Any]], taken: set[str]) -> None:
-        """Reserved bytes up to a whole word."""
+        """Reserved bytes as padding to whole words."""
         size = sum(self._packet_size(spec) for _, spec in made)
         while size % self.shape.word:
             made.append((self.words.name(taken), {"type": "u8", "reserved": True}))
@@ -193,7 +193,7 @@ class FieldMaker:
         return made()
 
     def _integer(self) -> tuple[str, Doc, int]:
-        """An integer type, its byte order where that differs, its bytes."""
+        """An integer type, its byte order if it differs, its size."""
         if self.shape.groups:
             bits = self.rng.choice((1, 6, 7, 8, 13, 14, 16, 20, 28, 32, 64))
             kind = f"{'i' if bits > 1 and self.rng.random() < 0.3 else 'u'}{bits}"
@@ -285,7 +285,7 @@ class FieldMaker:
         return spec | ({"const": _limits(kind)[1]} if self.rng.random() < 0.3 else {}), size
 
     def _grouped(self) -> tuple[Any, int]:
-        """Integers in groups of bits of their own."""
+        """Integers with their own groups of bits."""
         if self.shape.groups:
             return self._plain()
         bits, size = self.rng.choice((4, 6, 7)), self.rng.choice((7, 10, 13, 16, 24, 32, 64))
@@ -349,7 +349,7 @@ class FieldMaker:
         return place
 
     def _variable(self, name: str, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
-        """A field of variable size: with one or two counts in front, or as what is left."""
+        """A field of variable size: with one or two preceding counts, or as the rest of the payload."""
         rng = self.rng
         kind, spec, step = self._variable_kind()
         most = min(rng.choice((1, 3, 8, 40, 250)), (room.left - room.least - 4) // step)
@@ -398,7 +398,7 @@ class FieldMaker:
         taken: set[str],
         room: Room,
     ) -> None:
-        """A count somewhere before its field, and before an open-ended one at `end`."""
+        """A count anywhere before its field, and before an uncounted one at `end`."""
         rng = self.rng
         kind = "u8" if most < 256 and rng.random() < 0.75 else "u16"
         spec: Doc = {"type": kind, "counts": name, "counts_in": unit}

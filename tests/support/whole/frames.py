@@ -1,4 +1,4 @@
-"""Random frames, put together from every part that the language has."""
+"""Random frames of all kinds of parts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _Words(Protocol):
 
 @dataclass
 class Shape:
-    """A frame, and what it demands of the messages in it."""
+    """A frame, and its requirements on messages."""
 
     kind: str
     frame: Doc
@@ -37,11 +37,11 @@ class Shape:
     mark: int = 0xA5
     end_id: int = -1
     groups: Doc = field(default_factory=dict)
-    #: Text fits beside the marker bit.
+    #: Text does not use the marker bit.
     text: bool = True
-    #: Payloads are whole words of so many bytes, all fields of fixed size.
+    #: Size of the words of payloads, whose fields then have a fixed size.
     word: int = 0
-    #: The checksum of a marked frame names the messages that have it.
+    #: The checksum of a marked frame lists its messages.
     only: bool = False
 
 
@@ -54,7 +54,7 @@ def choose(rng: random.Random, words: _Words) -> Shape:
 
 
 def _algorithm(rng: random.Random) -> tuple[str, int]:
-    """A checksum and its width; sums and the CRCs of eight and sixteen bits come most."""
+    """A checksum and its width, mostly sums and CRCs of eight and sixteen bits."""
     name: str = rng.choice(
         (
             rng.choice(("sum8", "sum8-inverted", "sum16")),
@@ -86,7 +86,7 @@ class _Parts:
         return self.rng.random() < probability
 
     def _add(self, name: str, spec: Doc) -> str:
-        """A part, in most schemas under the name that its role suggests."""
+        """A part, usually with a name according to its role."""
         if self._chance(0.15):
             name = self.words.name(self.taken)
         while name in self.parts:
@@ -96,7 +96,7 @@ class _Parts:
         return name
 
     def make(self, *, hunted: bool) -> Shape:
-        # Some frames break one of the rules by which a receiver may hunt.
+        # Some frames violate one of the conditions for a hunting receiver.
         strict = hunted and self._chance(0.8)
         lead = self.rng.choice(("A5 A5", "AA AA", "02 02")) if hunted else self._lead()
         names = {"lead": self._add("start", {"role": "constant", "value": lead})} if lead else {}
@@ -147,7 +147,7 @@ class _Parts:
         return name, {"role": role, "type": kind, **_order(rng)}
 
     def _checked(self, names: Doc, *, whole: bool) -> None:
-        """A check value; `whole`: over everything after the first part, and sent as it is."""
+        """A check value; `whole`: over everything after the first part, and sent whole."""
         if not whole and not self._chance(0.78):
             return
         rng, covered = self.rng, list(self.parts)
@@ -218,13 +218,13 @@ class _Parts:
         )
 
     def _longest(self, names: Doc, stuffing: Doc, most: int, *, below: bool) -> int:
-        """As much payload as the length can count; `below`: without being the byte that is stuffed."""
+        """The maximum payload for the length; `below`: with lengths below the stuffed byte."""
         length = parts_length = self.parts[names["length"]]
         bias = sum(_size(self.parts[name]) for name in length["counts"])
         top = (1 << int(parts_length["type"][1:])) - 1 - bias
         if stuffing.get("checksum") == "after":
             top = top * len(stuffing["after"].split()) // (len(stuffing["after"].split()) + 1)
-        # Lengths below, around and above the byte that is stuffed.
+        # Lengths below, around and above the stuffed byte.
         mark = int(stuffing["after"].split()[0], 16) - bias if stuffing else 0
         if below and mark > 4:
             return min(most, mark - 1)
@@ -245,7 +245,7 @@ def _marked(rng: random.Random) -> Shape:
     bits = rng.choices((7, 6), (4, 1))[0]
     ids = rng.randint(2, 4)
     rest = 7 - ids
-    # With six bits in a group the marker is bit 6, and bit 7 belongs to the header.
+    # With six bits in a group the marker is bit 6, and bit 7 is part of the header.
     places = {7: (f"{ids}..6", f"0..{ids - 1}"), 6: ("7" if rest == 1 else f"{ids}..5", f"0..{ids - 1}")}
     marker, address = 0x80, rest
     header = {"address": places[bits][0], "message": places[bits][1]}

@@ -1,4 +1,4 @@
-"""Whole random schemas: the same text for the same seed."""
+"""Whole random schemas, reproducible by seed."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from tests.support.whole.frames import Shape
 Doc = dict[str, Any]
 _PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
 _YAML_WORDS = frozenset("true false null yes no on off y n nan inf".split())  # noqa: SIM905
-#: One schema of so many has mostly fields of variable size.
+#: One in this number of schemas has mostly fields of variable size.
 _VARIABLE = 5
-#: Mappings that lie deeper than this are written on one line.
+#: Mappings below this depth are written on one line.
 _BLOCKS = 4
 
 
 def generate(seed: int, *, hostile: bool = False) -> str:
-    """The text of a schema; `hostile` names and texts are those of `words` that break careless generators."""
+    """The text of a schema; `hostile` selects names and texts of `words` that break careless generators."""
     return dump(_Maker(seed, hostile=hostile).make())
 
 
@@ -34,7 +34,7 @@ class Words:
     hostile: bool
 
     def name(self, taken: set[str]) -> str:
-        """A name that nothing in a scope has yet, nor the count that belongs to something there."""
+        """A name that is unique in a scope, including names of counts."""
         while True:
             odd = self.hostile and self.rng.random() < 0.35
             name = self.rng.choice(words.HOSTILE if odd else words.NAMES)
@@ -196,7 +196,7 @@ class _Maker:
         return spec
 
     def _id(self, shape: Shape) -> int:
-        """A number that nothing else has; the stuffed byte and the bounds come often."""
+        """A unique number, often the stuffed byte or a bound."""
         top = (1 << shape.id_bits) - 1
         while True:
             likely = (
@@ -217,7 +217,7 @@ class _Maker:
 
 
 def dump(document: Doc) -> str:
-    """A schema as YAML that people can read; everything that YAML could take for something else is quoted."""
+    """A schema as readable YAML; ambiguous scalars are quoted."""
     return "\n".join(_lines(document, 0)) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""The outputs of one schema behind one face: values go in and come out as integers of the wire."""
+"""A common interface to the outputs of one schema, with raw values."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _EXACT = Context(prec=200)
 
 @dataclass(frozen=True)
 class Heard:
-    """An event as every receiver can tell it; `place` is left out by those that do not know it."""
+    """An event in a form common to all receivers; `place` is None if the receiver does not report it."""
 
     at: int
     kind: str
@@ -59,25 +59,25 @@ class Target:
     name = ""
 
     def __init__(self, reference: Reference) -> None:
-        """`reference` knows the shape of every message."""
+        """`reference` has the layout of every message."""
         self.reference = reference
 
     def encode(
         self, message: Message, given: Mapping[str, Raw], address: int, request: bytes
     ) -> tuple[bytes, bytes]:
-        """Payload and wire bytes. Raises Wrong where the output refuses, and nothing else."""
+        """Payload and wire bytes. Raises only Wrong, if the output rejects the values."""
         raise NotImplementedError
 
     def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
-        """What a frame says. Raises Wrong where the output refuses, and nothing else."""
+        """Decode a frame. Raises only Wrong, if the output rejects it."""
         raise NotImplementedError
 
     def natives(self, message: Message, given: Mapping[str, Raw]) -> dict[str, Any]:
-        """Values as a caller in Python has them."""
+        """Values of the Python API."""
         return {name: native(kind, given[name]) for name, kind in message.values()}
 
     def raws(self, message: Message, found: Callable[[str], Any]) -> dict[str, Raw]:
-        """Values as integers, out of what a caller in Python gets."""
+        """Raw values from values of the Python API."""
         return {name: raw_of(kind, found(name)) for name, kind in message.values()}
 
 
@@ -173,7 +173,7 @@ class PythonTarget(Target):
 
 
 class InterpreterTarget(Target):
-    """The plan itself, run without generating anything."""
+    """The interpreter of the plan."""
 
     name = "interpreter"
 
@@ -228,7 +228,7 @@ class ConstructTarget(Target):
     """Construct structures, live or as printed."""
 
     def __init__(self, reference: Reference, name: str, live: construct.Live) -> None:
-        """`name` tells the two apart."""
+        """`name` distinguishes the two."""
         super().__init__(reference)
         self.name = name
         self._live = live
@@ -265,12 +265,12 @@ def printed_structures(outputs: Outputs, folder: Path) -> construct.Live:
 
 
 def printed_codec(outputs: Outputs, folder: Path) -> types.ModuleType:
-    """The printed module, imported with that of the calls of its bus."""
+    """The printed module, imported with its bus module."""
     return _printed(folder / "printed_codecs", outputs)
 
 
 def _printed(package: Path, outputs: Outputs) -> types.ModuleType:
-    """The first module of a package, after all of its modules were imported as a user would."""
+    """The first module of a package, after importing all of its modules."""
     package.mkdir()
     for path, text in outputs.items():
         (package / Path(path).name).write_text(text, "utf-8")
@@ -287,7 +287,7 @@ def _printed(package: Path, outputs: Outputs) -> types.ModuleType:
 
 
 class CTarget(Target):
-    """A compiled header, asked through the program that speaks for it."""
+    """A compiled header, called through the driver program."""
 
     name = "c"
 
@@ -296,7 +296,7 @@ class CTarget(Target):
         super().__init__(reference)
         self._driver = driver
         frame = reference.frame
-        #: Receivers that look back are told of the end of the stream, others have nothing to say then.
+        #: Only receivers with look-back have events at the end of a stream.
         self.finishes = isinstance(frame, Frame) and not frame.unique
 
     def encode(

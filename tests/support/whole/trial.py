@@ -42,52 +42,52 @@ from tests.support.whole.targets import (
     printed_structures,
 )
 
-#: Seconds of processor time that one schema may take, and of any time that a compiled program may.
+#: Limits in seconds: processor time of one schema, real time of a compiled program.
 SECONDS = 120
-#: Compilers and the standards by which they take a header; `every` adds the later ones.
+#: Compilers and language standards; `every` adds the later ones.
 _STRICT = (("gcc", "-std=c99"), ("clang", "-std=c99"))
 _EVERY = (
     *_STRICT,
     *(("gcc", "-std=c11"), ("clang", "-std=c11")),
     *(("g++", "-xc++", "-std=c++17"), ("clang++", "-xc++", "-std=c++17")),
 )
-#: Most differences of the streams of one output that are made small and reported.
+#: Maximum number of differences in streams of one output that are minimised and reported.
 _MOST = 3
-#: Targets that need no vectors, which take long.
+#: Targets without vectors, which take long.
 _QUICK = ("python", "bus", "c", "construct")
 _PLAIN = ("-O0", "-std=c99")
-#: The optimiser could remove what a sanitizer is to see, and takes three times as long.
+#: The optimiser could remove errors that a sanitizer should find, and takes three times as long.
 _CHECKED = ("-O0", "-g1", "-std=c99", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much of everything is tried of one schema."""
+    """The number of trials of one schema."""
 
     messages: int = 6
     streams: int = 12
-    #: One of so many schemas is compiled with sanitizers, and all whose receivers add up counts.
+    #: One in this number of schemas is compiled with sanitizers, and all whose receivers add up counts.
     sanitized: int = 4
-    #: C is generated, but nothing is compiled.
+    #: C is generated but not compiled.
     uncompiled: bool = False
-    #: Every compiler and standard takes every header, and both C compilers build the kit.
+    #: Every compiler and standard checks every header, and both C compilers build the kit.
     every: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Something that an output does otherwise than the reference."""
+    """A difference between an output and the reference."""
 
     stage: str
     who: str
-    #: What many differences of one cause have in common.
+    #: Equal for differences with the same cause.
     cause: str
     detail: str
 
 
 @dataclass
 class Outcome:
-    """What became of one schema."""
+    """The result of one schema."""
 
     seed: int
     hostile: bool
@@ -101,7 +101,7 @@ class Outcome:
     compared: int = 0
 
     def report(self) -> str:
-        """Everything that is needed to see it again."""
+        """A report that allows it to be reproduced."""
         lines = [f"seed {self.seed}{' hostile' if self.hostile else ''} ({self.traits})"]
         lines += [f"- {each.stage}, {each.who}: {each.detail}" for each in self.differences]
         return "\n".join([*lines, self.text])
@@ -123,7 +123,7 @@ def run_text(text: str, seed: int = 0, *, hostile: bool = False, effort: Effort 
 
 @contextlib.contextmanager
 def _limited() -> Iterator[None]:
-    """A trial that hangs is a difference like any other."""
+    """Raise after a time limit, so that a hanging trial counts as a difference."""
 
     def expired(number: int, frame: FrameType | None) -> None:
         raise TimeoutError(f"no result after {SECONDS} seconds of processor time")
@@ -138,7 +138,7 @@ def _limited() -> Iterator[None]:
 
 
 class _Failed(Exception):
-    """A tool refused; the text is what it said."""
+    """A tool failed; the text is its output."""
 
 
 class _Trial:
@@ -166,7 +166,7 @@ class _Trial:
     # Differences
 
     def found(self, stage: str, who: str, cause: str, detail: str) -> None:
-        """Note a difference, one of each kind."""
+        """Record a difference, one of each kind."""
         difference = Difference(stage, who, cause, detail)
         if all(
             (stage, who, cause) != (each.stage, each.who, each.cause) for each in self.outcome.differences
@@ -174,12 +174,12 @@ class _Trial:
             self.outcome.differences.append(difference)
 
     def guard(self, stage: str, who: str, action: Callable[[], None]) -> bool:
-        """Run a step; whatever it raises is a difference."""
+        """Run a step; any exception is a difference."""
         try:
             action()
         except _Failed as failed:
             self.found(stage, who, _common(str(failed)), str(failed))
-        except Exception as error:  # noqa: BLE001 - a crash of any kind is what is looked for
+        except Exception as error:  # noqa: BLE001 - crashes of any kind are findings
             last = traceback.extract_tb(error.__traceback__)[-1]
             where = f"{Path(last.filename).name}:{last.name}"
             detail = f"{type(error).__name__}: {error} at {where}"
@@ -188,7 +188,7 @@ class _Trial:
             return True
         return False
 
-    # Making
+    # Building
 
     def _make(self, protocol: Protocol, programs: contextlib.ExitStack) -> None:
         made: dict[str, Outputs] = {}
@@ -230,7 +230,7 @@ class _Trial:
         self.targets.append(CTarget(self.reference, driver))
 
     def _compile(self, header: Path) -> bool:
-        """Compile strictly; whether it compiles at all."""
+        """Compile strictly; returns whether it succeeds."""
         clean = self._strict(header, _EVERY if self.effort.every else _STRICT)
         kit = self.folder / f"{header.stem}_conformance.c"
         if kit.exists():
@@ -243,7 +243,7 @@ class _Trial:
         return done.returncode == 0
 
     def _strict(self, header: Path, compilers: Sequence[tuple[str, ...]]) -> bool:
-        """Check the syntax strictly; whether every compiler finds it clean."""
+        """Check the syntax strictly; returns whether all compilers accept it without warnings."""
         unit = header.with_name("strict.c")
         unit.write_text(f'#include "{header.name}"\nint main(void) {{ return 0; }}\n', "utf-8")
         clean = [
@@ -253,7 +253,7 @@ class _Trial:
         return all(clean)
 
     def _roles(self, protocol: Protocol) -> None:
-        """The headers of one side alone."""
+        """The headers for one role."""
         roles: tuple[Role, ...] = ("slave", "master")
         for role in roles:
             folder = self.folder / role
@@ -263,7 +263,7 @@ class _Trial:
                 self._strict(header, (*_STRICT, _EVERY[-2]) if self.effort.every else _STRICT[:1])
 
     def _kit(self, kit: Path, compiler: str) -> None:
-        """Compile strictly and run; warnings do not keep it from running, which would hide what it finds."""
+        """Compile strictly and run, even with warnings, to find more differences."""
         program = self.folder / f"kit-{compiler}"
         command = (compiler, *_PLAIN, "-DCONFORMANCE_STDIO=1", kit, "-o", program)
         strict = self.guard("compile", f"kit {compiler}", partial(_tool, *command, *WARNINGS))
@@ -281,7 +281,7 @@ class _Trial:
                 self._message(message)
 
     def _request(self, message: Message) -> bytes:
-        """The request's packet, where an answer means nothing without it."""
+        """The packet of the request, if the response depends on it."""
         if not isinstance(self.reference.frame, Packets) or message.direction != "response":
             return b""
         asked = self.reference.by_name[message.name.replace(".response", ".request")]
@@ -347,7 +347,7 @@ class _Trial:
                 self._stream(direction, chance.stream(frames, alphabet, self.rng))
 
     def _answers(self) -> None:
-        """Streams of packets that are expected."""
+        """Streams of expected packets."""
         known = list(self.reference.known("response").values())
         for _ in range(self.effort.streams if known else 0):
             asked, data = [], b""
@@ -358,7 +358,7 @@ class _Trial:
             self._stream("response", chance.damaged(data, data[:4], self.rng), tuple(asked))
 
     def _frames(self, message: Message) -> list[bytes]:
-        """The shortest of some frames, as long ones cost much time; some carry what is wrong, or a frame."""
+        """The shortest of several frames, to save time; some with wrong contents, or a frame as payload."""
         frames: list[bytes] = []
         odd: list[bytes] = []
         nested: list[bytes] = []
@@ -429,7 +429,7 @@ def _load(protocol: Protocol) -> None:
 
 @functools.cache
 def _parse(text: str, path: str) -> None:
-    """Compile; modules that are the same for all protocols once."""
+    """Compile; modules common to all protocols only once."""
     compile(text, path, "exec")
 
 
@@ -476,7 +476,7 @@ def _manner(expected: object, found: object) -> str:
     return f"{found} instead of {expected}" if isinstance(expected, str) else "refuses what is right"
 
 
-# Several comparisons of a stream in a row want these two.
+# Consecutive comparisons of a stream need these two.
 @functools.lru_cache(maxsize=4)
 def _right(
     reference: Reference, direction: Direction, data: bytes, asked: tuple[bytes, ...]
@@ -517,7 +517,7 @@ def _c_stream(target: CTarget, direction: Direction, data: bytes) -> str:
 def _cut_stream(
     target: PythonTarget, direction: Direction, asked: tuple[bytes, ...], seed: float, data: bytes
 ) -> str:
-    """What a piece brings is what its bytes bring one by one; the end of the stream is the last piece."""
+    """The events of a piece are those of its single bytes; the end of the stream is the last piece."""
     cut = chance.pieces(data, random.Random(seed))
     single = _single(target, direction, data, asked)
     end = 0
@@ -536,7 +536,7 @@ def _timeless(event: Heard) -> tuple[object, ...]:
 
 
 def _unlike(expected: Sequence[Heard], found: Sequence[Heard]) -> str:
-    """How two lists of events differ; the text before the semicolon names the manner."""
+    """The difference of two lists of events; the text before the semicolon is its kind."""
     for right, seen in zip(expected, found, strict=False):
         if right == seen:
             continue
@@ -552,7 +552,7 @@ def _unlike(expected: Sequence[Heard], found: Sequence[Heard]) -> str:
 
 
 def traits(reference: Reference) -> str:
-    """What a frame is like, in a few words."""
+    """A short description of a frame."""
     frame = reference.frame
     if not isinstance(frame, Frame):
         return type(frame).__name__.lower()
@@ -566,6 +566,6 @@ def traits(reference: Reference) -> str:
 
 
 def _common(text: str) -> str:
-    """A text without what is different in every schema."""
+    """A text without the parts that differ in every schema."""
     text = re.sub(r"'[^']*'|‘[^’]*’|\"[^\"]*\"", "_", text.splitlines()[0] if text else "")
     return re.sub(r"\b0x[0-9a-f]+\b|\d+", "N", text)[:120]

@@ -1,4 +1,4 @@
-"""Names and texts of random schemas: ordinary ones, and those that break careless generators."""
+"""Names and texts of random schemas: ordinary ones, and ones that break careless generators."""
 
 from __future__ import annotations
 

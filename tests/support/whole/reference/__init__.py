@@ -1,7 +1,7 @@
-"""An independent codec and receiver, written from docs/schema-reference.md and docs/receiver.md alone.
+"""An independent codec and receiver, based only on docs/schema-reference.md and docs/receiver.md.
 
-It reads the YAML itself, and shares nothing with qlinkgen but the catalogue of CRCs. It is written to be
-plain, not fast: every byte of a stream is judged again from the beginning of its frame.
+It parses the YAML itself, and shares only the catalogue of CRCs with qlinkgen. It is simple rather than fast:
+with every byte of a stream a frame is checked again from its beginning.
 """
 
 from tests.support.whole.reference.codec import Reference, Seen

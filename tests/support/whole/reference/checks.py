@@ -7,13 +7,13 @@ import functools
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-#: The one file that the reference shares with the product: published parameters, not code.
+#: The only file shared with the product: published parameters, not code.
 CATALOGUE = Path(__file__).parents[4] / "qlinkgen" / "model" / "crc_catalogue.csv"
 
 
 @functools.cache
 def catalogue() -> Mapping[str, Mapping[str, str]]:
-    """The parameters of every CRC by its name."""
+    """The parameters of CRCs by name."""
     with CATALOGUE.open(newline="") as rows:
         return {row["name"]: row for row in csv.DictReader(rows)}
 

@@ -1,4 +1,4 @@
-"""One schema's reference: encodes, decodes, and says what a stream delivers."""
+"""The reference of one schema: encodes, decodes, and receives streams."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.support.whole.reference.values import Raw, Wrong
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a whole frame says."""
+    """A decoded frame."""
 
     name: str
     address: int | None
@@ -30,7 +30,7 @@ class Seen:
 
 
 class Reference:
-    """Everything that is known of a schema's wire bytes."""
+    """Encodes and decodes the messages of a schema."""
 
     def __init__(self, text: str) -> None:
         """Read the text of a schema."""
@@ -52,11 +52,11 @@ class Reference:
         )
 
     def known(self, direction: Direction) -> dict[int, Message]:
-        """The messages that can come in a direction."""
+        """The messages of a direction."""
         return {each.number: each for each in self.messages if each.direction in (direction, "message")}
 
     def hears(self, message: Message) -> Direction:
-        """A direction in which a message can come."""
+        """A direction of a message."""
         return message.direction if message.direction in self.directions else "request"
 
     def encode(
@@ -70,7 +70,7 @@ class Reference:
         return payload, self.wrap(name, payload, address, request)
 
     def wrap(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """The wire bytes around a payload, whatever it is."""
+        """A frame around a payload, which is not checked."""
         message, frame = self.by_name[name], self.frame
         if isinstance(frame, Frame):
             return frame.wrap(message.number, payload, address)
@@ -79,7 +79,7 @@ class Reference:
         return frame.wrap(message, payload, request)
 
     def decode(self, direction: Direction, wire: bytes, request: bytes = b"") -> Seen:
-        """What exactly one frame says. Raises Wrong."""
+        """Decode exactly one frame. Raises Wrong."""
         if not wire:
             raise Wrong("truncated")
         known = self.known(direction)
@@ -99,7 +99,7 @@ class Reference:
         return Seen(event.name, event.address, event.values)
 
     def receiver(self, direction: Direction, asked: Sequence[bytes] = ()) -> Receiver:
-        """A new receiver; `asked` are the packets that are answered."""
+        """A new receiver; `asked` are the requests that are answered."""
         known = self.known(direction)
         if isinstance(self.frame, Marked):
             return MarkedReceiver(self.frame, known)
@@ -108,5 +108,5 @@ class Reference:
         return Hunter(self.frame, known) if self.frame.unique else Searcher(self.frame, known)
 
     def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Event]:
-        """What a receiver delivers, the end of the stream included."""
+        """The events of a receiver, including those at the end of the stream."""
         return self.receiver(direction, asked).run(stream)

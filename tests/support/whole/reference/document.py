@@ -1,4 +1,4 @@
-"""What a schema file says of its fields and messages."""
+"""Fields and messages of a schema file."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Role = Literal["value", "constant", "reserved", "count"]
 
 
 class _Loader(yaml.CSafeLoader):
-    """Numbers with a point stay exact; on, off, yes and no are text."""
+    """Loads numbers with a decimal point exactly; on, off, yes and no as text."""
 
     def exact(self, node: yaml.ScalarNode) -> Fraction:
-        """The number as it is written."""
+        """The exact number."""
         return Fraction(node.value)
 
 
@@ -33,7 +33,7 @@ _Loader.add_constructor("tag:yaml.org,2002:float", _Loader.exact)
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """An integer; `pieces` are the (lowest bit, bits) of its wire bytes in their order."""
+    """An integer; `pieces` are the (lowest bit, bits) of its wire bytes in order."""
 
     bits: int
     signed: bool
@@ -56,7 +56,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Bytes, text, or integers in a row; `high` is None until the room that is left is known."""
+    """Bytes, text, or an array; `high` is None until the rest of the payload is known."""
 
     item: Number | None
     text: bool
@@ -66,12 +66,12 @@ class Run:
 
     @property
     def step(self) -> int:
-        """Bytes of an item."""
+        """Size of an item."""
         return len(self.item.pieces) if self.item else 1
 
     @property
     def most(self) -> int:
-        """Most items."""
+        """Maximum number of items."""
         assert self.high is not None
         return self.high
 
@@ -100,17 +100,17 @@ class Slot:
 
     @property
     def fixed(self) -> bool:
-        """Always of one size."""
+        """Whether its size is constant."""
         return not isinstance(self.kind, Run) or self.kind.low == self.kind.high
 
     @property
     def least_bytes(self) -> int:
-        """Fewest bytes on the wire."""
+        """Minimum size on the wire."""
         return self.kind.step * self.kind.low if isinstance(self.kind, Run) else len(self.kind.pieces)
 
     @property
     def most_bytes(self) -> int:
-        """Most bytes on the wire; 0 of a run without a bound."""
+        """Maximum size on the wire; 0 for a run without a bound."""
         return self.kind.step * (self.kind.high or 0) if isinstance(self.kind, Run) else len(self.kind.pieces)
 
 
@@ -128,7 +128,7 @@ class Message:
     checked: bool = True
 
     def values(self) -> Iterator[tuple[str, Number | Run]]:
-        """What a caller sets and reads, in wire order."""
+        """Values in wire order."""
         for slot in self.slots:
             if isinstance(slot.kind, Packed):
                 yield from ((name, number) for name, _, number in slot.kind.members)
@@ -137,11 +137,11 @@ class Message:
 
     @property
     def sizes(self) -> tuple[int, int]:
-        """Fewest and most bytes of payload."""
+        """Minimum and maximum size of the payload."""
         return sum(slot.least_bytes for slot in self.slots), sum(slot.most_bytes for slot in self.slots)
 
     def allows(self, address: int) -> bool:
-        """The message may carry the address."""
+        """Whether the address is legal for the message."""
         return not self.addresses or any(low <= address <= high for low, high in self.addresses)
 
 
@@ -189,10 +189,10 @@ def byte_pieces(size: int, order: str) -> tuple[tuple[int, int], ...]:
 
 
 class Fields:
-    """Builds fields out of what a file says of them."""
+    """Builds fields from their mappings."""
 
     def __init__(self, document: Doc, payload_most: int) -> None:
-        """`payload_most` is what a field without a bound may fill."""
+        """`payload_most` limits fields without a bound."""
         self._document = document
         self._most = payload_most
         self._order = document.get("byteorder", "big")
@@ -205,7 +205,7 @@ class Fields:
         return tuple(_bounded(slot, room, counts.get(slot.name)) for slot in slots)
 
     def _resolved(self, spec: Any) -> Doc:
-        """A field with everything that its named types say."""
+        """A field merged with its named types."""
         written: Doc = {"type": spec} if isinstance(spec, str) else dict(spec)
         base, brackets, count = written["type"].partition("[")
         named = self._document.get("types", {}).get(base.strip())
@@ -290,7 +290,7 @@ class Fields:
         return name, first, self._with_default(number, base, written, "default")
 
     def _with_default(self, number: Number, base: str, spec: Doc, key: str) -> Number:
-        """Without a default the number nearest to 0 is meant."""
+        """Without a default, the number nearest to 0."""
         given = spec.get(key)
         if given is None:
             return replace(number, default=min(max(0, number.low), number.high))
@@ -340,7 +340,7 @@ def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
 
 
 def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
-    """Every message of a file, in its order."""
+    """All messages of a file, in order."""
     found: list[Message] = []
     for name, spec in document.get("commands", {}).items():
         found += _of_command(name, {**document.get("defaults", {}), **spec}, document, fields, addressed)

@@ -1,4 +1,4 @@
-"""Frames of parts: built, and cut out of wire bytes."""
+"""Encodes and decodes delimited frames."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from tests.support.whole.reference.values import Wrong, get, items_of, put
 
 
 class NeedMore(Exception):
-    """The bytes may still become a frame; nothing new can be told before there are `size` of them."""
+    """The bytes may be an incomplete frame; at least `size` are needed to decide."""
 
     def __init__(self, size: int = 0) -> None:
-        """Note how many."""
+        """Set the size."""
         super().__init__(size)
         self.size = size
 
 
 class Refused(Exception):
-    """No frame begins here: kind of fault, its wire bytes, and whether a receiver tells of it."""
+    """The bytes are not a frame: kind of fault, its wire bytes, and whether a receiver reports it."""
 
     def __init__(self, kind: str, size: int = 1, *, told: bool = True) -> None:
-        """Note what a fault tells."""
+        """Set the details."""
         super().__init__(kind)
         self.kind, self.size, self.told = kind, size, told
 
@@ -44,20 +44,20 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Stuffing:
-    """A byte inserted after others."""
+    """The stuffing rule."""
 
     after: bytes
     insert: int
     exempt: tuple[str, ...]
-    #: Only the payload is stuffed, and length and checksum are those of the stuffed bytes.
+    #: Only the payload is stuffed, and length and checksum apply to the stuffed bytes.
     payload_alone: bool
 
     def stuff(self, data: bytes) -> bytes:
-        """Insert; an occurrence begins behind the byte inserted last."""
+        """Insert bytes; an occurrence begins after the last inserted byte."""
         return data.replace(self.after, self.after + bytes([self.insert]))
 
     def unstuff(self, data: bytes) -> bytes:
-        """Drop what was inserted. Raises Wrong."""
+        """Remove inserted bytes. Raises Wrong."""
         plain, rest = b"", data
         while self.after in rest:
             front, _, rest = rest.partition(self.after)
@@ -68,7 +68,7 @@ class Stuffing:
 
 
 def part_of(name: str, spec: Doc, order: str) -> Part:
-    """A part as the file says."""
+    """A part from its mapping."""
     if spec["role"] == "constant":
         constant = octets(spec["value"])
         return Part(name, "constant", len(constant), spec, constant)
@@ -81,7 +81,7 @@ def part_of(name: str, spec: Doc, order: str) -> Part:
 
 
 class Frame:
-    """A frame of parts."""
+    """A delimited frame."""
 
     def __init__(self, document: Doc) -> None:
         """Read the parts."""
@@ -94,15 +94,15 @@ class Frame:
         self.stuffing = _stuffing(frame.get("stuffing"))
         length = self.by_role.get("length")
         self.bias = sum(part.size for part in self.parts if length and part.name in length.spec["counts"])
-        #: No constant in front: a candidate begins where a known message and an allowed address stand.
+        #: No leading constant: a candidate begins with a known message and a legal address.
         self.bare = self.parts[0].role != "constant"
         most, stuffing = self.most, self.stuffing
-        #: Most payload bytes on the wire, inserted ones included where the length counts them.
+        #: Maximum payload size on the wire, including inserted bytes if the length counts them.
         self.most_sent = most + most // len(stuffing.after) if stuffing and stuffing.payload_alone else most
 
     @functools.cached_property
     def unique(self) -> bool:
-        """The preamble cannot appear inside a frame, so a receiver hunts for it and never looks back."""
+        """Whether the preamble cannot occur inside a frame, so that a receiver can hunt for it."""
         stuffing, first = self.stuffing, self.parts[0]
         if stuffing is None or stuffing.payload_alone or first.constant != stuffing.after * 2:
             return False
@@ -124,7 +124,7 @@ class Frame:
         return covers and 8 * check.size == checks.width(check.spec["algorithm"]) and check.pieces in whole
 
     def stuffed(self, part: Part) -> bool:
-        """The finished frame is stuffed, and this part with it."""
+        """Whether the whole frame is stuffed, including this part."""
         return (
             self.stuffing is not None
             and not self.stuffing.payload_alone
@@ -134,7 +134,7 @@ class Frame:
     # Building
 
     def wrap(self, number: int, payload: bytes, address: int) -> bytes:
-        """The wire bytes around a payload, whatever it is."""
+        """A frame around a payload, which is not checked."""
         if self.stuffing and self.stuffing.payload_alone:
             payload = self.stuffing.stuff(payload)
         cut: dict[str, bytes] = {}
@@ -163,21 +163,21 @@ class Frame:
 
     @staticmethod
     def check_value(check: Part, cut: Mapping[str, bytes]) -> int:
-        """The check value over the parts that it covers."""
+        """The check value over the covered parts."""
         covered = b"".join(cut[name] for name in check.spec["over"])
         return checks.compute(check.spec["algorithm"], covered)
 
     def check_fails(self, cut: Mapping[str, bytes]) -> bool:
-        """The check value is wrong."""
+        """Whether the check value is wrong."""
         check = self.by_role.get("checksum")
         return check is not None and cut[check.name] != put(check.pieces, self.check_value(check, cut))
 
     def bad_constant(self, cut: Mapping[str, bytes]) -> bool:
-        """A constant is not what it must be."""
+        """Whether a constant is wrong."""
         return any(part.role == "constant" and cut[part.name] != part.constant for part in self.parts)
 
     def number(self, role: str, cut: Mapping[str, bytes]) -> int | None:
-        """The integer of a part; None where the frame has none, or its bytes are not there yet."""
+        """The integer of a part; None if the frame has none, or its bytes are missing."""
         part = self.by_role.get(role)
         return get(part.pieces, cut[part.name]) if part and part.name in cut else None
 
@@ -190,14 +190,14 @@ def _stuffing(spec: Any) -> Stuffing | None:
 
 
 class Cursor:
-    """Takes a frame's bytes from wire bytes, without what stuffing inserted, each as soon as it is there."""
+    """Reads the bytes of a frame from wire bytes, without inserted ones, one at a time."""
 
     def __init__(self, wire: bytes, frame: Frame) -> None:
-        """Begin in front."""
+        """Start at the beginning."""
         self._wire, self._frame = wire, frame
         self._recent = b""
         self.at = 0
-        #: What is inserted behind the byte taken last has still to come.
+        #: An inserted byte must follow the last byte.
         self.pending = False
 
     def take(self, part: Part) -> int:
@@ -219,7 +219,7 @@ class Cursor:
         return byte
 
     def run(self, part: Part, size: int) -> bytes:
-        """The next bytes of a part; where nothing is stuffed, all of them at once."""
+        """The next bytes of a part; all at once if they are not stuffed."""
         if self.pending or self._frame.stuffed(part):
             return bytes(self.take(part) for _ in range(size))
         if len(self._wire) < self.at + size:
@@ -236,7 +236,7 @@ class Cursor:
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """A frame's parts, and what it takes on the wire."""
+    """The parts of a frame, and its size on the wire."""
 
     parts: Mapping[str, bytes]
     size: int
@@ -244,14 +244,14 @@ class Cut:
 
 
 class Splitter:
-    """Cuts the frame out of the front of wire bytes."""
+    """Decodes the frame at the beginning of wire bytes."""
 
     def __init__(self, frame: Frame, known: Mapping[int, Message]) -> None:
-        """`known` are the messages that can come, by their number."""
+        """`known` are the messages of the direction, by number."""
         self._frame, self._known = frame, known
 
     def split(self, wire: bytes) -> Cut:
-        """The frame that begins here. Raises NeedMore or Refused; every byte is judged as it comes."""
+        """The frame at the beginning, checked byte by byte. Raises NeedMore or Refused."""
         frame, cursor, cut = self._frame, Cursor(wire, self._frame), dict[str, bytes]()
         for part in frame.parts[: frame.payload_at]:
             self._take(part, cursor, cut)
@@ -300,7 +300,7 @@ class Splitter:
 
 
 def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) -> bytes:
-    """The bytes of a payload that tells by its counts where it ends."""
+    """The bytes of a payload whose end follows from its counts."""
     counted: dict[str, int] = {}
     payload = b""
     for slot in message.slots:

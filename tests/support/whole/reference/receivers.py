@@ -1,4 +1,4 @@
-"""What a receiver delivers for a stream, as docs/receiver.md has it: four machines."""
+"""The four state machines of docs/receiver.md."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.support.whole.reference.values import Raw, Wrong
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """A frame (`kind` is "message") or a fault; `at` is the byte with which it comes."""
+    """A frame (`kind` is "message") or a fault; `at` is the offset of the byte that completed it."""
 
     kind: str
     at: int
@@ -26,7 +26,7 @@ class Event:
 
 
 class Receiver:
-    """What all machines share."""
+    """Base class of the machines."""
 
     def __init__(self, known: Mapping[int, Message]) -> None:
         """`known` are the messages that can come, by their number."""
@@ -34,7 +34,7 @@ class Receiver:
         self.at = -1
 
     def run(self, stream: bytes) -> list[Event]:
-        """The events of a whole stream; those at its end come at the number of its bytes."""
+        """The events of a whole stream; `at` of those at its end is the size of the stream."""
         events: list[Event] = []
         for byte in stream:
             self.at += 1
@@ -47,7 +47,7 @@ class Receiver:
         raise NotImplementedError
 
     def finish(self) -> Iterator[Event]:
-        """Nothing more follows."""
+        """End the stream."""
         raise NotImplementedError
 
     def carried(
@@ -58,7 +58,7 @@ class Receiver:
         offset: int,
         raw: bytes,
     ) -> Event:
-        """The message of an intact frame, or what is wrong with what it carries."""
+        """The message of an intact frame, or the fault in its contents."""
         if message is None:
             return Event("unknown", self.at, offset, raw)
         try:
@@ -71,7 +71,7 @@ class Receiver:
 
 
 class Hunter(Receiver):
-    """The preamble is found nowhere else: each byte is looked at once."""
+    """The preamble occurs nowhere else: each byte is processed once."""
 
     def __init__(self, frame: Frame, known: Mapping[int, Message]) -> None:
         """Hunt."""
@@ -150,7 +150,7 @@ class Hunter(Receiver):
 
 
 class Searcher(Receiver):
-    """Bytes are kept until a frame has proven right; else the search goes on from the next one."""
+    """Buffers bytes until a frame is valid; otherwise the search continues at the next byte."""
 
     def __init__(self, frame: Frame, known: Mapping[int, Message]) -> None:
         """An empty buffer."""
@@ -177,13 +177,13 @@ class Searcher(Receiver):
             raise Wrong(refused.kind) from None
 
     def take(self, byte: int) -> Iterator[Event]:
-        """Everything that the bytes so far tell."""
+        """The events of the bytes so far."""
         self.buffer += bytes([byte])
         if len(self.buffer) >= self.needed:
             yield from self._scan()
 
     def finish(self) -> Iterator[Event]:
-        """Give up the frame that is not complete; look for others in its bytes."""
+        """Give up the incomplete frame and search its bytes for others."""
         self.ended = True
         if self.buffer and not self.frame.bare:
             yield Event("truncated", self.at, self.start, self.buffer)
@@ -225,7 +225,7 @@ class Searcher(Receiver):
             yield from self._report()
 
     def _report(self) -> Iterator[Event]:
-        """The bytes skipped in a row, as one fault."""
+        """Consecutive skipped bytes as one fault."""
         if self.skipped:
             yield Event("frame", self.at, self.start - len(self.skipped), self.skipped)
         self.skipped = b""
@@ -234,12 +234,12 @@ class Searcher(Receiver):
         cut = self.splitter.split(self.buffer)
         event = self._event(cut, self._plain(cut))
         if event.kind == "crc" or (event.kind != "message" and "checksum" not in self.frame.by_role):
-            # Nothing has proven that this is a frame at all, so what follows its first byte may hold one.
+            # It may not be a frame at all, so another one may begin after its first byte.
             raise Refused(event.kind, cut.size)
         return event, cut.size, cut.pending
 
     def _plain(self, cut: Cut) -> bytes:
-        """The payload as its message means it. Raises Refused."""
+        """Decode the payload. Raises Refused."""
         payload, stuffing = cut.parts[self.frame.by_role["payload"].name], self.frame.stuffing
         if stuffing is None or not stuffing.payload_alone:
             return payload
@@ -261,7 +261,7 @@ class Searcher(Receiver):
 
 
 class MarkedReceiver(Receiver):
-    """Header and end carry a bit that nothing between them has."""
+    """Header and end have a marker bit that the bytes between them lack."""
 
     def __init__(self, frame: Marked, known: Mapping[int, Message]) -> None:
         """Idle."""
@@ -309,12 +309,12 @@ class MarkedReceiver(Receiver):
 
 
 class PacketReceiver(Receiver):
-    """The first byte of a request says how many follow, the request how many its response has."""
+    """The first byte of a request determines its size, the request that of its response."""
 
     def __init__(
         self, frame: Packets, known: Mapping[int, Message], asked: Sequence[bytes], *, answers: bool
     ) -> None:
-        """Between packets; `asked` are the requests that are answered one after the other."""
+        """Start between packets; `asked` are the requests whose responses follow in order."""
         super().__init__(known)
         self.frame, self.answers = frame, answers
         self.asked = [request for request in asked if request[0] in known]

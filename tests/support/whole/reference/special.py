@@ -11,10 +11,10 @@ from tests.support.whole.reference.values import Wrong, put
 
 
 class Marked:
-    """Header and end carry a marker bit."""
+    """Frames whose header and end have a marker bit."""
 
     def __init__(self, document: Doc) -> None:
-        """Read the header's bits."""
+        """Read the bits of the header."""
         spec, order = document["frame"]["marked"], document.get("byteorder", "big")
         self.marker: int = spec["marker"]
         self._address, self._message = (whole_span(spec["header"][key]) for key in ("address", "message"))
@@ -27,7 +27,7 @@ class Marked:
         return byte >> where[0] & (1 << where[1] + 1 - where[0]) - 1
 
     def is_end(self, byte: int) -> bool:
-        """The id bits are those of an end."""
+        """Whether the id bits are those of an end."""
         return self._bits(byte, self._message) == self._end
 
     def wrap(self, message: Message, payload: bytes, address: int) -> bytes:
@@ -43,7 +43,7 @@ class Marked:
         return put(self._check.pieces, checks.compute(self._check.spec["algorithm"], covered))
 
     def check_ends(self, wire: bytes) -> None:
-        """Refuse bytes that are not one header, and an end after bytes without the marker. Raises Wrong."""
+        """Check that the data is a header, bytes without the marker, and an end. Raises Wrong."""
         marks = [at for at, byte in enumerate(wire) if byte & self.marker]
         if not wire or (marks == [0] and not self.is_end(wire[0])):
             raise Wrong("truncated")
@@ -66,7 +66,7 @@ class Marked:
 
 
 class Packets:
-    """No frame at all."""
+    """Packets."""
 
     def __init__(self, document: Doc) -> None:
         """Read the sum."""
@@ -76,7 +76,7 @@ class Packets:
         self._check = found[0] if found else None
 
     def size(self, message: Message) -> int:
-        """Bytes of a packet, always the same."""
+        """Size of a packet, which is constant."""
         check = self._check.size if self._check and message.direction == "response" else 0
         return message.sizes[1] + (check if message.direction == "response" else 1)
 

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 
 from tests.support.whole.reference.document import Kind, Message, Number, Packed, Run, Slot
 
-#: A value as the integers on the wire: a number, a list of numbers, or bytes.
+#: A raw value: a number, a list of numbers, or bytes.
 Raw = int | list[int] | bytes
 
 
 class Wrong(Exception):
-    """Bytes or values that are refused: the kind of fault."""
+    """Bytes or values are rejected: the kind of fault."""
 
     def __init__(self, kind: str, about: str = "") -> None:
-        """`about` is for people."""
+        """`about` is a text for failed tests."""
         super().__init__(f"{kind} {about}".strip())
         self.kind = kind
 
@@ -30,18 +30,18 @@ def get(pieces: Sequence[tuple[int, int]], data: bytes) -> int:
 
 
 def stray(pieces: Sequence[tuple[int, int]], data: bytes) -> bool:
-    """A byte has bits that carry nothing."""
+    """Whether a byte has unused bits set."""
     return any(byte >> bits for (_, bits), byte in zip(pieces, data, strict=True))
 
 
 def check(number: Number, raw: int) -> None:
-    """Refuse what a number cannot be."""
+    """Check the range of a number. Raises Wrong."""
     if not number.low <= raw <= number.high or raw & number.forbidden:
         raise Wrong("range", str(raw))
 
 
 def default(kind: Number | Run) -> Raw:
-    """The value of a field that is not given."""
+    """The default of a field."""
     if isinstance(kind, Number):
         return kind.default
     return list(kind.default) if kind.item else bytes(kind.default)
@@ -88,7 +88,7 @@ def _encoded_run(kind: Run, given: Raw) -> bytes:
 
 
 def decode(message: Message, payload: bytes) -> dict[str, Raw]:
-    """The values of a payload. Raises Wrong: a length that does not fit before a value out of range."""
+    """The values of a payload. Raises Wrong, for wrong lengths before values out of range."""
     if not payload and message.empty_is_default:
         return {name: default(kind) for name, kind in message.values()}
     values: dict[str, Raw] = {}
@@ -176,7 +176,7 @@ def _size(slot: Slot, counted: Mapping[str, int]) -> int | None:
 
 
 def _behind(slots: Sequence[Slot], counted: Mapping[str, int]) -> int:
-    """Bytes that follow a field of no size of its own."""
+    """Number of bytes after an uncounted field."""
     sizes = [_size(slot, counted) for slot in slots]
     return sum(size for size in sizes if size is not None)
 
@@ -188,7 +188,7 @@ def _demand(kind: Kind, size: int) -> None:
 
 
 def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) -> None:
-    """Learn a count; a second one has to say the same."""
+    """Read a count; a second one must agree."""
     assert isinstance(slot.kind, Number)
     items = items_of(message, slot, get(slot.kind.pieces, data))
     if counted.setdefault(slot.counts, items) != items:
@@ -196,7 +196,7 @@ def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) ->
 
 
 def items_of(message: Message, slot: Slot, raw: int) -> int:
-    """The items that a count announces. Raises Wrong where the field cannot have so many."""
+    """The number of items from a count. Raises Wrong if it is illegal for the field."""
     kind = next(each.kind for each in message.slots if each.name == slot.counts)
     assert isinstance(kind, Run)
     unit = kind.step if slot.counts_in == "bytes" else 1
