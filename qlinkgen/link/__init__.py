@@ -1,6 +1,6 @@
-"""The engines of the wire: no input or output, no clock, no thread.
+"""Protocol engines without input or output, clock or threads.
 
-Bytes and times come in as arguments, bytes and events go out; so they run under any driver, and on a
+They take bytes and times as arguments and return bytes and events, so they run under any driver, and on a
 simulated clock.
 """
 

@@ -1,7 +1,7 @@
-"""What an engine needs of a generated module: any protocol of the master/slave kind will do.
+"""The interface of generated modules that the engines use.
 
-The classes of a generated module are its own, and so are those of the support module beside it; here they are
-known by their shape.
+Each generated module has its own classes, and its own support module; these protocols describe their common
+shape.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Message(Protocol):
     ID: ClassVar[int]
     MAX_SIZE: ClassVar[int]
     MAX_WIRE_SIZE: ClassVar[int]
-    #: Name of the attribute that holds the address, "" where frames have none.
+    #: Name of the attribute with the address, "" for frames without one.
     ADDRESS: ClassVar[str]
 
     @property
@@ -30,7 +30,7 @@ class Message(Protocol):
         ...
 
     def to_bytes(self) -> bytes:
-        """Return the payload alone."""
+        """Return the payload."""
         ...
 
     @classmethod
@@ -40,10 +40,10 @@ class Message(Protocol):
 
 
 class Framed(Message, Protocol):
-    """A message whose frame depends on nothing else: all but the answers of a host's device."""
+    """A message with a frame of its own: all except the responses of packet protocols."""
 
     def to_frame(self) -> bytes:
-        """Return the whole frame as it is on the wire."""
+        """Return the whole frame as on the wire."""
         ...
 
 
@@ -57,7 +57,7 @@ class Fault(Protocol):
 
     @property
     def offset(self) -> int:
-        """Place of its first byte in the stream."""
+        """Offset of its first byte in the stream."""
         ...
 
     @property
@@ -67,12 +67,12 @@ class Fault(Protocol):
 
     @property
     def message(self) -> str:
-        """What is wrong with them, for people."""
+        """Description of the fault."""
         ...
 
 
 class Bus(Protocol):
-    """The line and its nodes; None where the protocol has no address, or its document names no speed."""
+    """The line and its nodes; None for a missing address, or a speed that the document does not state."""
 
     first_node: int | None
     last_node: int | None
@@ -98,12 +98,12 @@ class Command(Protocol):
 
     @property
     def response(self) -> type[Message] | None:
-        """Class of the response, None where nothing answers."""
+        """Class of the response, None for a command without a response."""
         ...
 
 
 class DecoderCounters(Protocol):
-    """What a receiver has counted."""
+    """Counts of a receiver."""
 
     skipped: int
 
@@ -117,11 +117,11 @@ class Decoder(Protocol):
         ...
 
     def feed(self, data: bytes, /) -> Sequence[Framed | Fault]:
-        """Take the next bytes of the stream; return what they complete."""
+        """Take the next bytes of the stream; return the events that they complete."""
         ...
 
     def finish(self) -> Sequence[Framed | Fault]:
-        """Return what is left when the stream ends."""
+        """End the stream; return the remaining events."""
         ...
 
 
@@ -135,26 +135,26 @@ class Module(Protocol):
 
     @property
     def BUS(self) -> Bus:  # noqa: N802
-        """Who is on the line, and how fast it is."""
+        """Nodes and speed of the line."""
         ...
 
     @property
     def DecodeError(self) -> type[Exception]:  # noqa: N802
-        """What a decoder raises."""
+        """The error of a decoder."""
         ...
 
 
 class Encoder(Protocol):
-    """What makes frames of the messages of one protocol."""
+    """Encodes the messages of one protocol."""
 
-    # Any: each protocol encodes messages of its own class, and no type but Any is every one of them.
+    # Any: each protocol has its own class of messages, without a common supertype.
     def encode(self, message: Any, /) -> bytes:
-        """Return the whole frame of a message as it is on the wire."""
+        """Return the whole frame of a message as on the wire."""
         ...
 
 
 class Codec(Module, Encoder, Protocol):
-    """A generated module whose messages have frames of their own, or its `Codec` with another CRC."""
+    """A generated module whose messages have their own frames, or its `Codec` with another CRC."""
 
     @property
     def StreamDecoder(self) -> Callable[[Literal["request", "response"]], Decoder]:  # noqa: N802
@@ -168,26 +168,26 @@ def is_message(event: Framed | Fault) -> TypeIs[Framed]:
 
 
 def address_of(message: Message) -> int | None:
-    """Return the address in a message's frame, None where frames have none."""
+    """Return the address of a message, None for frames without one."""
     name = type(message).ADDRESS
     return getattr(message, name) if name else None
 
 
 def address_getter(codec: Codec) -> Callable[[Message], int | None]:
-    """Return the quick form of `address_of` for the messages of one protocol."""
+    """Return a fast `address_of` for the messages of one protocol."""
     name = next(iter(codec.COMMANDS.values())).request.ADDRESS
     return attrgetter(name) if name else lambda _message: None
 
 
 def answers(command: Command, request: Message, response: Message) -> bool:
-    """Whether a response is of the right shape for a request and repeats what it has to repeat."""
+    """Whether a response has the right class for a request and equal echoed fields."""
     return type(response) is command.response and all(
         getattr(response, name) == getattr(request, name) for name in command.echoes
     )
 
 
 def addresses_that_answer(command: Command, request: Message, bus: Bus) -> Sequence[int | None]:
-    """Return the addresses from which an answer to a request may come; none where nothing answers."""
+    """Return the addresses that may answer a request; empty for a request without a response."""
     if command.response is None:
         return ()
     asked = address_of(request)

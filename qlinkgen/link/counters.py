@@ -1,4 +1,4 @@
-"""Counts of what happened, for one node or for the bus. They only go up: read twice and subtract."""
+"""Counts of a master, for one node or for the bus. They only increase: read twice and subtract."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from collections.abc import Iterable
 
 
 class LinkCounters:
-    """What a master has seen, of one node or of all.
+    """Counts of a master, for one node or for all.
 
     Attributes:
-        requests: requests sent, repeats included.
-        repeats: how many of them were repeats.
-        answers: requests that were answered.
-        timeouts: attempts that were not answered in time.
-        failures: transactions that failed.
-        refused: transactions that were not sent since the node is offline.
+        requests: requests sent, including repeats.
+        repeats: repeats among them.
+        answers: answered requests.
+        timeouts: attempts not answered in time.
+        failures: failed transactions.
+        refused: transactions not sent because the node is offline.
         damaged: damaged frames, by kind.
-        strays: good frames that answered nothing.
-        late: how many of them came too late.
-        collisions: attempts that failed after what was sent had come back changed.
-        partial_echoes: echoes that were not complete although the answer came.
-        missing_echoes: requests whose echo did not come, or not to its end, and no answer either.
-        skipped: bytes in no frame.
+        strays: valid frames that did not answer the pending request.
+        late: strays that answered an earlier attempt or request.
+        collisions: attempts that failed after a changed echo.
+        partial_echoes: incomplete echoes followed by an answer.
+        missing_echoes: requests with neither a complete echo nor an answer.
+        skipped: bytes outside frames.
     """
 
     __slots__ = (
@@ -54,7 +54,7 @@ class LinkCounters:
 
     @classmethod
     def total(cls, parts: Iterable[LinkCounters]) -> LinkCounters:
-        """Return the sum of several."""
+        """Return the sum of several counters."""
         whole = cls()
         for part in parts:
             for name in cls.__slots__:

@@ -1,4 +1,4 @@
-"""What two-wire RS485 adapters do: hand back to the computer what it has just sent."""
+"""Cancels the echo of two-wire RS485 adapters, which receive their own transmissions."""
 
 from __future__ import annotations
 
@@ -6,45 +6,45 @@ from typing import Literal
 
 EchoMode = Literal["auto", "expect", "none"]
 
-#: Sent once to find out whether there is an echo. Receivers that hunt for a frame's beginning pass over it.
+#: Sent once to detect an echo. Receivers that hunt for a preamble skip it.
 PROBE = b"\x00\x00"
-#: Bytes of noise, as of an adapter that turns round, behind which the probe is still known.
+#: Most bytes of noise before the probe, such as from an adapter that switches direction.
 NOISE = 2
-#: An adapter may hold back the echoes of some broadcasts; of more than these the oldest is given up.
+#: Most outstanding echoes, since an adapter may delay those of some broadcasts; then the oldest is dropped.
 OUTSTANDING = 8
-#: As many bytes of a frame's head or tail are no noise: what follows them is not the frame's echo.
+#: As many bytes of a frame's head or tail are a partial echo, not noise; the frame itself does not follow.
 PARTIAL = 4
 
 
 class EchoCanceller:
-    """Takes back out of the received bytes what was sent.
+    """Removes sent bytes from the received ones.
 
-    An echo that begins as it should is taken out byte by byte. Where something else comes, all of it is left
-    in the stream: a decoder finds an intact answer behind it, and `is_own` tells that answer from the frame
-    that was sent, which some commands' answers equal to the last bit.
+    A correct echo is removed byte by byte. If other bytes arrive, all of them stay in the stream: a decoder
+    finds an intact answer after them, and `is_own` distinguishes it from the sent frame, which may be equal
+    to the answer of some commands.
 
     Attributes:
-        mode: `expect` or `none`; `auto` until a probe has shown which of them is right.
-        active: an echo is outstanding, or broken.
-        broken: something else came back than was sent.
+        mode: `expect` or `none`; `auto` until a probe has determined which.
+        active: an echo is outstanding or broken.
+        broken: the received bytes differ from the sent ones.
     """
 
     __slots__ = ("_frames", "_heard", "_seen", "active", "broken", "mode")
 
     def __init__(self, mode: EchoMode) -> None:
         if mode not in ("auto", "expect", "none"):
-            raise ValueError(f'echo: {mode!r} was given; there are "auto", "expect" and "none"')
+            raise ValueError(f"echo must be 'auto', 'expect' or 'none', not {mode!r}")
         self.mode: EchoMode = mode
         self.active = False
         self.broken = False
-        #: What was sent and has not come back, oldest first: echoes may come after the next frame is sent.
+        #: Outstanding frames, oldest first: echoes may arrive after the next frame is sent.
         self._frames: list[bytes] = []
         self._seen = 0
-        #: After a break: what came in place of the echo.
+        #: The bytes received in place of a broken echo.
         self._heard = b""
 
     def sent(self, frame: bytes) -> bool:
-        """These bytes are on their way and will come back; returns whether an older echo is given up."""
+        """Expect the echo of these bytes; return whether an older echo is dropped."""
         if self.broken:
             self.forget()
         self.active = True
@@ -57,18 +57,18 @@ class EchoCanceller:
 
     @property
     def outstanding(self) -> bytes:
-        """What was sent and has not come back yet."""
+        """The sent bytes whose echo is outstanding."""
         return b"".join(self._frames)[self._seen :]
 
     def forget(self) -> None:
-        """Whatever comes from now on is no echo."""
+        """Expect no echo any more."""
         self.active = self.broken = False
         self._frames = []
         self._seen = 0
         self._heard = b""
 
     def cancel(self, data: bytes) -> bytes:
-        """Return received bytes without the echo in front of them."""
+        """Return received bytes without a leading echo."""
         if self.broken:
             self._heard += data
             return data
@@ -90,13 +90,13 @@ class EchoCanceller:
         return data
 
     def is_own(self, raw: bytes) -> bool:
-        """Whether a frame, or the beginning of one, that was found behind a broken echo is what was sent."""
+        """Whether a frame or the beginning of one, found after a broken echo, is the sent one."""
         for index, frame in enumerate(self._frames):
             begun = frame.startswith(raw)
             if begun and len(raw) < len(frame) - 1:  # an inserted byte at the end is not part of a fault
                 return True
             if not begun:
-                if len(raw) > PARTIAL and frame.startswith(raw[:-1]):  # the last byte is another frame's
+                if len(raw) > PARTIAL and frame.startswith(raw[:-1]):  # the last byte is of another frame
                     return True
                 continue
             before, _, behind = self._heard.partition(raw)
@@ -104,7 +104,7 @@ class EchoCanceller:
                 return False
             del self._frames[: index + 1]
             self._heard = behind
-            if not self._frames:  # it did come back, behind some noise
+            if not self._frames:  # the echo was complete, after some noise
                 self.forget()
             return True
         return False

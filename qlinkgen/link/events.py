@@ -1,4 +1,4 @@
-"""What happened on the line, as data. Times are those that the engine was given."""
+"""Events of the line. Times are those passed to the engine."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from qlinkgen.link.codec import Fault, Framed, Message
 from qlinkgen.link.host_events import Filled, InStep, OutOfStep
 
-#: Events that an engine keeps for one who does not fetch them after each transaction.
+#: Most events that an engine keeps, if the driver does not remove them.
 EVENTS_KEPT = 4096
 
 
@@ -15,7 +15,7 @@ class Sent(NamedTuple):
     """A request was handed to the port."""
 
     at: float
-    #: Address in the frame, None where the protocol has none.
+    #: Address in the frame, None if the protocol has none.
     node: int | None
     request: Message
     #: 1 for the first try.
@@ -24,21 +24,21 @@ class Sent(NamedTuple):
 
 
 class Answered(NamedTuple):
-    """The answer to a request has come."""
+    """The answer to a request was received."""
 
     at: float
     node: int | None
     request: Message
-    #: None where only a host waits that none is sent.
+    #: None for a packet of a host without a response.
     response: Message | None
-    #: How often the request had been sent.
+    #: Number of transmissions of the request.
     attempts: int
     #: Seconds from the call to the answer.
     elapsed: float
 
 
 class TimedOut(NamedTuple):
-    """No answer to one attempt."""
+    """An attempt was not answered."""
 
     at: float
     node: int | None
@@ -47,7 +47,7 @@ class TimedOut(NamedTuple):
 
 
 class Failed(NamedTuple):
-    """A transaction is over without an answer."""
+    """A transaction ended without an answer."""
 
     at: float
     node: int | None
@@ -64,7 +64,7 @@ class Refused(NamedTuple):
 
 
 class Stray(NamedTuple):
-    """A good frame that answers nothing that is asked at this moment."""
+    """A valid frame that does not answer the pending request."""
 
     at: float
     message: Framed
@@ -73,36 +73,36 @@ class Stray(NamedTuple):
 
 
 class Damaged(NamedTuple):
-    """Bytes that look like a frame and are none."""
+    """An invalid frame."""
 
     at: float
-    #: Node that was being asked, None where none was.
+    #: Node of the pending request, None without one.
     node: int | None
     fault: Fault
 
 
 class EchoFound(NamedTuple):
-    """The adapter was found to send back, or not, what it is given to send."""
+    """The probe has determined whether the adapter echoes."""
 
     at: float
     echo: bool
 
 
 class EchoBroken(NamedTuple):
-    """What came back is not what was sent: a part is missing, or others were sending.
+    """An echo differs from the sent bytes: a part is missing, or another station was sending.
 
-    It is told before the Answered or TimedOut of the attempt; `at` is when it was noticed.
+    Reported before the Answered or TimedOut of the attempt; `at` is the time of detection.
     """
 
     at: float
     node: int | None
     expected: bytes
-    #: Empty where nothing came back.
+    #: Empty if nothing was received.
     received: bytes
 
 
 class HealthChanged(NamedTuple):
-    """A node's health is another one."""
+    """The health of a node has changed."""
 
     at: float
     node: int
@@ -110,7 +110,7 @@ class HealthChanged(NamedTuple):
     state: str
 
 
-#: The last three are told of host ports alone.
+#: The last three are events of host ports only.
 Event = (
     Sent | Answered | TimedOut | Failed | Refused | Stray | Damaged | EchoFound | EchoBroken | HealthChanged
     | OutOfStep | Filled | InStep

@@ -1,16 +1,16 @@
-"""Which nodes are there, so that one that is not does not cost the others their time.
+"""Tracks which nodes answer, so that a missing node does not delay the others.
 
 ===========  ===========================================================  =================================
-state        how a node gets there                                        what a request to it does
+state        entered when                                                 a request to the node
 ===========  ===========================================================  =================================
-online       it answered                                                  all attempts
-suspect      a transaction with it failed                                 all attempts
-offline      ``offline_after`` transactions failed one after the other    fails at once until its next trial,
-                                                                          which is one attempt
+online       it answered                                                  has all attempts
+suspect      a transaction failed                                         has all attempts
+offline      ``offline_after`` consecutive transactions failed            fails at once until its next trial,
+                                                                          which has one attempt
 ===========  ===========================================================  =================================
 
-The pause between two trials grows from trial to trial, and is never so short that trials take more than
-``share`` of the bus.
+The pause between trials doubles each time, and is at least so long that trials take at most ``share`` of the
+bus time.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ OFFLINE = "offline"
 
 @dataclass(frozen=True, slots=True)
 class HealthPolicy:
-    """When a node is given up, and how often it is tried again.
+    """When a node is offline, and how often it is tried again.
 
     Attributes:
-        offline_after: failed transactions in a row that make a node offline.
-        first_pause: seconds before the first trial; each further pause is twice as long ...
-        longest_pause: ... up to this many seconds.
-        share: most of the bus's time that the trials of one node may take, 0..1.
+        offline_after: consecutive failed transactions after which a node is offline.
+        first_pause: seconds before the first trial; each further pause is twice as long.
+        longest_pause: longest pause in seconds.
+        share: largest part of the bus time for the trials of one node, 0..1.
     """
 
     offline_after: int = 2
@@ -40,19 +40,19 @@ class HealthPolicy:
     share: float = 0.02
 
     def __post_init__(self) -> None:
-        """Refuse what would never, or always, leave a node alone."""
+        """Refuse values out of range."""
         if self.offline_after < 1:
-            raise ValueError(f"offline_after: {self.offline_after} was given; give 1 failure or more")
+            raise ValueError(f"offline_after must be 1 or more, not {self.offline_after}")
         if not 0 <= self.first_pause <= self.longest_pause:
             raise ValueError(
-                f"first_pause: {self.first_pause} was given with a longest_pause of {self.longest_pause}; "
-                "give seconds, 0 or more, and the longest last"
+                f"first_pause {self.first_pause} and longest_pause {self.longest_pause} must be 0 s or more, "
+                "in ascending order"
             )
         if not 0 < self.share <= 1:
-            raise ValueError(f"share: {self.share} was given; give a part of the bus's time, above 0 up to 1")
+            raise ValueError(f"share must be above 0 and at most 1, not {self.share}")
 
     def pause(self, trials: int, cost: float) -> float:
-        """Seconds to wait after `trials` failed trials, of which the last took `cost` seconds."""
+        """Return the seconds to wait after `trials` failed trials, of which the last took `cost` seconds."""
         grown = min(self.first_pause * 2.0 ** min(trials, 60), self.longest_pause)
         return max(grown, cost / self.share)
 
@@ -62,8 +62,8 @@ class NodeHealth:
 
     Attributes:
         state: online, suspect or offline.
-        failures: failed transactions in a row.
-        next_trial: when an offline node is asked again.
+        failures: consecutive failed transactions.
+        next_trial: time of the next trial of an offline node.
     """
 
     __slots__ = ("failures", "next_trial", "state")
@@ -75,22 +75,22 @@ class NodeHealth:
 
 
 class HealthBook(dict[int, NodeHealth]):
-    """Health of each node that was asked, by address. Without a policy nothing is noted."""
+    """Health of each node, by address. Without a policy nothing is recorded."""
 
-    def __init__(self, policy: HealthPolicy | None, nobody: Container[int | None] = (None,)) -> None:
-        """Addresses in `nobody` are no node's: the broadcast address, and none at all."""
+    def __init__(self, policy: HealthPolicy | None, untracked: Container[int | None] = (None,)) -> None:
+        """Track all addresses except `untracked`: the broadcast address, and None."""
         super().__init__()
         self._policy = policy
-        self._nobody = nobody
+        self._untracked = untracked
 
     def offline(self, node: int | None) -> NodeHealth | None:
-        """Return the health of a node that is offline, None where it is not."""
+        """Return the health of an offline node, None if it is not offline."""
         health = self.get(node) if node is not None else None
         return health if health is not None and health.state is OFFLINE else None
 
     def answered(self, node: int | None) -> bool:
-        """Note that a node is there; returns whether its state has changed."""
-        if self._policy is None or node is None or node in self._nobody:
+        """Record an answer of a node; return whether its state has changed."""
+        if self._policy is None or node is None or node in self._untracked:
             return False
         health = self.get(node)
         if health is None:
@@ -101,9 +101,9 @@ class HealthBook(dict[int, NodeHealth]):
         return changed
 
     def failed(self, node: int | None, now: float, cost: float) -> bool:
-        """Note a failed transaction that took `cost` seconds; returns whether the state has changed."""
+        """Record a failed transaction that took `cost` seconds; return whether the state has changed."""
         policy = self._policy
-        if policy is None or node is None or node in self._nobody:
+        if policy is None or node is None or node in self._untracked:
             return False
         health = self.setdefault(node, NodeHealth())
         before = health.state

@@ -1,29 +1,29 @@
-"""The asking side of a host port: a device takes packets that have no frame, and answers with a checksum.
+"""The host of a device that takes packets without a frame, and answers with a checksum.
 
-A packet is a command byte and words. Nothing marks where one begins, so a byte that is lost leaves host and
+A packet is a command byte and words. The start of a packet is not marked, so a lost byte leaves host and
 device out of step: the device waits for the rest of a packet and takes the next command for it. This engine
-never lets that pass in silence where it reads the checksums, and gets back in step by itself.
+detects that if it reads the checksums, and resynchronises by itself.
 
-It is driven like `MasterEngine` (see `qlinkgen.link.master`), and by the same drivers. States:
+It is used like `MasterEngine` (see `qlinkgen.link.master`), with the same drivers. States:
 
 ==========  ========================================  ====================================================
-state       meaning                                   left by
+state       meaning                                   transitions
 ==========  ========================================  ====================================================
-idle        nothing is asked                          `start` -> ready, or guard where out of step
-ready       a packet may be sent                      bytes_to_send -> selecting, waiting, or idle where
-                                                      nothing is waited for
-selecting   the context was sent, its answer comes    right: ready; wrong, late: guard
-waiting     the request was sent, its answer comes    right: idle; wrong, late: guard for the next attempt,
+idle        no transaction                            `start` -> ready, or guard if out of step
+ready       a packet may be sent                      bytes_to_send -> selecting, waiting, or idle if no
+                                                      answer is awaited
+selecting   waiting for the answer to the context     right: ready; wrong, late: guard
+waiting     waiting for the answer to the request     right: idle; wrong, late: guard for the next attempt,
                                                       or failed -> idle after the last
-guard       out of step; the line must get quiet      quiet: filling; not quiet in time: failed -> idle
-filling     one byte was sent to complete a packet    an answer, or silence to every byte: proving;
+guard       out of step; waiting for a quiet line     quiet: filling; not quiet in time: failed -> idle
+filling     one byte was sent to complete a packet    an answer, or silence after every byte: proving;
             that the device may wait for              silence: one more byte
-proving     a context, then the proof were sent       both right: ready; else guard, at most 5 times
+proving     context and proof were sent               both right: ready; else guard, at most 5 times
 ==========  ========================================  ====================================================
 
-A *context* is a request that decides what later ones act on, such as the current axis. A packet names the
-one that it needs, and it is sent before whenever it may not be in force: the first time, after another one,
-and after anything that did not fit, since the device may have taken what was left of a packet for another.
+A *context* is a request that determines what later ones act on, such as the current axis. A packet lists the
+one that it needs, which is sent first if it may not be in force: at first use, after another context, and
+after a wrong reply, since the device may have taken the rest of a packet for a context.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ class HostEngine:
 
     Attributes:
         codec: the generated module of the protocol.
-        timing: every deadline.
-        events: what happened, oldest first; the driver takes them out.
-        verbose: events tell of each request and answer too, not only of what went wrong.
-        count: counts of what happened.
-        in_step: host and device agree on where a packet begins, as far as is known.
-        context: class of the context in force, None where that is not known.
+        timing: all deadlines.
+        events: events, oldest first; the driver removes them.
+        verbose: also report each request and answer, not only irregularities.
+        count: counts of requests, answers and faults.
+        in_step: host and device agree on the start of packets, as far as known.
+        context: class of the context in force, None if unknown.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class HostEngine:
         *,
         checked: Collection[str] | None = None,
     ) -> None:
-        """`checked` are the names of the commands whose checksum is read; all of them unless given."""
+        """Make an engine; `checked` are the commands whose checksum is read, by default all."""
         self.codec = codec
         self.timing = timing
         self.rules = rules
@@ -83,7 +83,7 @@ class HostEngine:
         self._most_fills = timing.fills(longest)
         self._state = State.IDLE
         self._outcome: Reply | LinkError | None = None
-        # The packet of the transaction; what is asked at this moment: the same, a context, or the proof.
+        # The packet of the transaction, and the current request: its own, a context, or the proof.
         self._packet = Packet(rules.proof)
         self._wanted = self._sendable(rules.proof)
         self._asked = self._wanted
@@ -91,9 +91,9 @@ class HostEngine:
         self._listening = False
         self._need = 0
         self._buffer = b""
-        #: When everything has left that was handed over.
+        #: When all sent bytes have been transmitted.
         self._free_at = 0.0
-        #: Bytes to come that nobody reads, and until when they must have come.
+        #: Pending bytes to be discarded, and their deadline.
         self._owed = 0
         self._owed_until = 0.0
         self._tries = 0
@@ -104,7 +104,7 @@ class HostEngine:
         self._quiet_at = 0.0
         self._give_up_at = 0.0
         self._way = WayBack(rules.fill)
-        #: Kind and bytes of what came in place of an answer.
+        #: Kind and bytes of each reply that was not the answer.
         self._wrong: list[tuple[str, bytes]] = []
 
     # What a driver calls ------------------------------------------------------------------------------------
@@ -116,7 +116,7 @@ class HostEngine:
 
     @property
     def total(self) -> HostCounters:
-        """Counts of what happened."""
+        """Counts of requests, answers and faults."""
         return self.count
 
     def start(
@@ -127,24 +127,24 @@ class HostEngine:
         Args:
             request: message of the generated module, or a Packet.
             now: time.
-            attempts: how often it is sent at most; that of the timing unless given. A request that must not
-                be repeated is sent once whatever stands here.
-            trial: of no meaning to a host; the drivers hand it to every engine.
+            attempts: largest number of transmissions; by default that of the timing. A request that is unsafe
+                to repeat is sent once in any case.
+            trial: ignored by a host; drivers pass it to every engine.
 
         Raises:
-            EncodeError: of the generated module; the request holds what cannot be sent.
-            TypeError: it is no request of this protocol.
-            ValueError: attempts is not 1 or more.
-            RuntimeError: another transaction is under way.
+            EncodeError: of the generated module; a value cannot be sent.
+            TypeError: the message is not a request of this protocol.
+            ValueError: attempts is less than 1.
+            RuntimeError: another transaction is pending.
         """
         del trial
         if self._state is not State.IDLE:
-            raise RuntimeError("a transaction is under way; a host does one at a time")
+            raise RuntimeError("another transaction is pending; a host performs one at a time")
         packet = request if type(request) is Packet else Packet(request)
         command = self._commands.get(type(packet.request))
         if command is None:
             name = type(packet.request).__name__
-            raise TypeError(f"{name} was given; a request of this protocol is needed")
+            raise TypeError(f"{name} is not a request of this protocol")
         tries = command.tries
         if attempts is not None:
             tries = self.timing.attempts_of(command.definition, check_attempts(attempts))
@@ -158,14 +158,14 @@ class HostEngine:
         if self._wrong:
             self._wrong = []
         if self._owed and now > self._owed_until:
-            self._out_of_step(now, None, "checksums that were not to be read have not come")
+            self._out_of_step(now, None, "unread checksums were not received in time")
         if self.in_step:
             self._state = State.READY
         else:
             self._guard(self._quiet_at, now)
 
     def bytes_to_send(self, now: float) -> bytes:
-        """Return what the driver has to write now."""
+        """Return the bytes that the driver has to write now."""
         state = self._state
         if state is State.READY:
             return self._send(now)
@@ -176,7 +176,7 @@ class HostEngine:
         return b""
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that came."""
+        """Process received bytes."""
         self._way.heard = True
         if self._owed:
             data = self._without_owed(data)
@@ -190,7 +190,7 @@ class HostEngine:
             self._unasked(data, now)
 
     def next_timer(self) -> float | None:
-        """Return when the engine has to be called again although nothing came; None: not at all."""
+        """Return the time of the next call without received bytes; None if none is needed."""
         state = self._state
         if state is State.IDLE:
             return None
@@ -198,10 +198,10 @@ class HostEngine:
             return min(self._quiet_at, self._give_up_at)
         if self._listening:
             return self._deadline
-        return self._started  # at once: something is to be sent
+        return self._started  # immediately: there are bytes to send
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due."""
+        """Process expired timers."""
         if self._state is State.GUARD:
             if now < self._quiet_at and now >= self._give_up_at:
                 self._fail(BadReply, "line never became idle: unsolicited traffic", now)
@@ -209,24 +209,24 @@ class HostEngine:
             self._timed_out(now)
 
     def take(self) -> Reply:
-        """Return what the transaction that has just ended gave.
+        """Return the reply of the transaction that has just ended.
 
         Raises:
-            NoReply: no answer came.
-            BadReply: only damaged or wrong answers came.
+            NoReply: no reply was received.
+            BadReply: only corrupt or wrong replies were received.
             IllegalCommand: the device does not know the command.
         """
         outcome, self._outcome = self._outcome, None
         return settled(outcome)
 
     def abort(self, now: float) -> None:
-        """Give up the transaction under way: its answer may still come, and will answer nothing."""
+        """Give up the pending transaction; an answer that still arrives is discarded."""
         state = self._state
         if state is State.IDLE:
             return
         until = max(now, self._deadline) if self._listening else now
         if state is not State.READY:
-            self._out_of_step(now, self._packet.request, "a transaction was given up", until)
+            self._out_of_step(now, self._packet.request, "a transaction was aborted", until)
         self._state = State.IDLE
         self._outcome = None
 
@@ -275,7 +275,7 @@ class HostEngine:
         return asked.frame
 
     def _send_off(self, asked: Asked, now: float) -> bytes:
-        """Send a packet whose answer nobody reads."""
+        """Send a packet whose answer is discarded."""
         command = asked.command
         self.count.requests += 1
         self._sent_at = now
@@ -288,7 +288,7 @@ class HostEngine:
         return asked.frame
 
     def _line_up(self, asked: Asked, now: float) -> float:
-        """When the answer must be complete: behind all that is still being sent, and owed."""
+        """Return the deadline of the answer, after all bytes still being sent and owed."""
         begin = max(now, self._free_at)
         self._free_at = begin + len(asked.frame) * self._byte_time
         return begin + asked.command.answer_time + self._owed * self._byte_time
@@ -301,17 +301,17 @@ class HostEngine:
         return data[skipped:]
 
     def _unasked(self, data: bytes, now: float) -> None:
-        """Bytes have come that answer nothing."""
+        """Handle bytes that do not belong to an answer."""
         self.count.skipped += len(data)
         if self.in_step:
-            fault = self.codec.Fault("frame", 0, data, "nothing was asked")
+            fault = self.codec.Fault("frame", 0, data, "unsolicited bytes")
             self.count.count_damaged("frame")
             self.events.append(Damaged(now, None, fault))
-            self._out_of_step(now, None, "bytes came that nobody had asked for", received=data)
+            self._out_of_step(now, None, "unsolicited bytes", received=data)
         self._quiet_at = max(self._quiet_at, now + self.timing.quiet)
 
     def _arrived(self, now: float) -> None:
-        """What was to come has come, and perhaps more."""
+        """Handle the complete answer, and bytes after it."""
         if self._state is State.FILLING:
             self._filled()
             return
@@ -339,12 +339,12 @@ class HostEngine:
             if rest:
                 self._unasked(rest, now)
         elif rest:
-            self._wrong_answer("frame", data, f"{asked.NAME}: more came than its answer", now)
+            self._wrong_answer("frame", data, f"{asked.NAME}: bytes after the answer", now)
         else:
             self._go_on(asked, now)
 
     def _go_on(self, asked: Asked, now: float) -> None:
-        """A context or the proof was answered as it must be."""
+        """Continue after the correct answer to a context or the proof."""
         if self._state is State.PROVING and asked.request is self.rules.proof:
             self.in_step = True
             self.count.in_step += 1
@@ -358,7 +358,7 @@ class HostEngine:
     def _out_of_step(
         self, now: float, request: Framed | None, reason: str, until: float = 0.0, received: bytes = b""
     ) -> None:
-        """Nothing that was known of the device holds any more, until it has proved otherwise."""
+        """Discard all assumptions about the device until it is verified to be in step."""
         if self.in_step:
             self.count.out_of_step += 1
             self.events.append(OutOfStep(now, request, reason, received))
@@ -373,7 +373,7 @@ class HostEngine:
         self._quiet_at = max(now, until) + self.timing.quiet
 
     def _guard(self, quiet_at: float, now: float) -> None:
-        """Wait for a quiet line, which it may be by now."""
+        """Wait for a quiet line, which may be so already."""
         quiet = self.timing.quiet_after(self._way.silent)
         self._state = State.GUARD
         self._way.heard = False
@@ -387,7 +387,7 @@ class HostEngine:
         self._guard(now + self.timing.quiet_after(self._way.silent), now)
 
     def _send_fill(self, now: float) -> bytes:
-        """A device that waits for the rest of a packet must get it, or it takes the next command for that."""
+        """Send a fill byte: a device in the middle of a packet would take the next command for its rest."""
         byte = bytes((self._way.fill,))
         self._state = State.FILLING
         self._listening = True
@@ -401,28 +401,28 @@ class HostEngine:
         return byte
 
     def _filled(self) -> None:
-        """The device has answered a filling byte, or none: either way it waits for nothing any more."""
+        """Continue after an answer to a fill byte, or silence after all: the device is between packets."""
         self._way.completed = bool(self._buffer) and self._buffer[: self._check_size] != self.rules.refusal
         self._state = State.PROVING
         self._listening = False  # the next call of bytes_to_send asks
         self._buffer = b""
 
     def _proving(self) -> Framed:
-        """The packet that is next as a proof: two different ones, so that a late answer to one is noticed."""
+        """Return the next packet of the proof: two different ones, so that a late answer is detected."""
         context = self._packet.context if self._packet.context is not None else self.rules.context
         if context is not None and self.context is not type(context):
             return context
         return self.rules.proof
 
     def _lost_round(self, reason: str, error: type[LinkError], now: float) -> None:
-        """A context, or a round of getting back in step, has failed."""
+        """Handle a failed context, or a failed round of resynchronisation."""
         self._out_of_step(now, self._packet.request if self._attempt else None, reason)
         self._way.rounds += 1
         self._way.silent += not self._way.heard
         if self._way.rounds < ROUNDS and self._way.silent < SILENT_ROUNDS:
             self._guard_again(now)
         else:
-            self._fail(error, f"host and device are out of step, and did not get back: {reason}", now)
+            self._fail(error, f"host and device are out of step, and resynchronisation failed: {reason}", now)
 
     # The end of an attempt, and of a transaction ------------------------------------------------------------
 
@@ -455,9 +455,9 @@ class HostEngine:
         if data:
             self.count.count_damaged("truncated")
             self.count.skipped += len(data)
-        reason = f"{self._asked.NAME}: {len(data)} of {self._need} bytes came" if data else "no answer"
+        reason = f"{self._asked.NAME}: {len(data)} of {self._need} bytes received" if data else "no answer"
         if state is State.WAITING:
-            if data == self.rules.refusal:  # a device that does not know the command knows no words of it
+            if data == self.rules.refusal:  # a refusal of an unknown command has no words
                 self._wrong.append(("illegal", data))
             elif data:
                 self._wrong.append(("truncated", data))
@@ -472,7 +472,7 @@ class HostEngine:
             return
         kinds = {kind for kind, _ in self._wrong}
         if kinds == {"illegal"} and len(self._wrong) == self._attempt:
-            self._fail(IllegalCommand, "the device does not know this command: its checksum is 0", now)
+            self._fail(IllegalCommand, "unknown command: the checksum of the device is 0", now)
         elif kinds:
             self._fail(BadReply, f"received only invalid replies ({', '.join(sorted(kinds))})", now)
         else:
@@ -491,9 +491,9 @@ class HostEngine:
         request = self._packet.request
         sent = f"sent {self._attempt} times" if self._attempt != 1 else "sent once"
         if not self._attempt:
-            sent = "it was not sent"
+            sent = "not sent"
         elif not self._wanted.command.definition.repeat_safe and error is not IllegalCommand:
-            sent += "; it may have been carried out, and must not be repeated blindly"
+            sent += "; it may have been executed, so check before repeating it"
         self._outcome = error(
             f"{request.NAME}: {reason}; {sent}, {elapsed * 1e3:.1f} ms",
             attempts=self._attempt,

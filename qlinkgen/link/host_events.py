@@ -1,4 +1,4 @@
-"""What happens between a host and its device beside what happens on every line, and the counts of it."""
+"""Additional events and counts of a host: resynchronisation with its device."""
 
 from __future__ import annotations
 
@@ -9,42 +9,42 @@ from qlinkgen.link.counters import LinkCounters
 
 
 class OutOfStep(NamedTuple):
-    """What came does not fit: what was sent may have reached the device as something else."""
+    """A reply was wrong: the device may have received something other than the packet sent."""
 
     at: float
-    #: Request that was under way, None where none was.
+    #: The pending request, None without one.
     request: Message | None
     reason: str
     received: bytes
 
 
 class Filled(NamedTuple):
-    """A byte was sent to fill up a packet of which the device may not have everything."""
+    """A byte was sent to complete a packet that the device may have received incompletely."""
 
     at: float
     byte: int
 
 
 class InStep(NamedTuple):
-    """The device has answered as it must: host and device agree on where a packet begins."""
+    """The device has answered correctly: host and device agree on the start of packets."""
 
     at: float
-    #: Bytes that were sent to fill up.
+    #: Number of fill bytes sent.
     fills: int
-    #: An unfinished packet was filled up, and so the device has carried out something that nobody wanted.
+    #: The fill bytes have completed a packet, which the device has executed with a wrong value.
     completed: bool
 
 
 class HostCounters(LinkCounters):
-    """What a host has seen of its device.
+    """Counts of a host.
 
     Attributes:
-        contexts: packets that were sent to make another context current.
+        contexts: packets sent to select a context.
         illegal: answers that refuse a command.
-        out_of_step: times that something came that does not fit.
-        in_step: times that host and device came to agree again.
-        fills: bytes that were sent for that.
-        completed: unfinished packets that were filled up by them.
+        out_of_step: times that host and device got out of step.
+        in_step: times that they got back in step.
+        fills: fill bytes sent.
+        completed: incomplete packets that the fill bytes completed.
     """
 
     __slots__ = ("completed", "contexts", "fills", "illegal", "in_step", "out_of_step")

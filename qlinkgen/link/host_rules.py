@@ -1,4 +1,4 @@
-"""What a host knows of its protocol, and of each packet, before anything is sent."""
+"""Rules of a host's protocol and its commands, and the state of a request."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qlinkgen.link.host_timing import HostTiming
 
 
 class State:
-    """States of the engine; `qlinkgen.link.host` has the table of them."""
+    """States of the engine; see the table in `qlinkgen.link.host`."""
 
     IDLE = "idle"
     READY = "ready"
@@ -27,27 +27,27 @@ class HostCodec(Module, Protocol):
 
     @property
     def decode_response(self) -> Callable[[bytes, Any], Message]:  # Any: given `Asked` as the request
-        """Function that decodes an answer to a request."""
+        """Function that decodes the answer to a request."""
         ...
 
     @property
     def Fault(self) -> Callable[[str, int, bytes, str], Fault]:  # noqa: N802  # as the generated module has it
-        """Bytes that are no message."""
+        """Bytes that are not a message."""
         ...
 
 
 @dataclass(frozen=True)
 class HostRules:
-    """What a host has to know of its protocol beside the schema.
+    """Properties of a host's protocol that the schema does not express.
 
     Attributes:
-        proof: request that changes nothing and reads something, as the proof of being in step.
-        context: request that is sent before the proof where a packet names no context, None for none.
-        contexts: what a request leaves in force, by its class: the class of a context, or None where it is
-            not known what. Requests that leave everything as it was are not listed.
-        fill: byte that does the least harm, as a command and as data.
-        fills: other bytes for it, by the class of the request that was under way.
-        refusal: checksum by which a command is refused.
+        proof: request without side effects whose answer verifies that host and device are in step.
+        context: context request sent before the proof if the packet has no context; None for none.
+        contexts: context in force after a request, by its class: the class of a context request, or None if
+            unknown. Requests that do not change the context are not listed.
+        fill: the least harmful byte, both as a command and as data.
+        fills: other fill bytes, by the class of the pending request.
+        refusal: checksum of a refused command.
     """
 
     proof: Framed
@@ -59,7 +59,7 @@ class HostRules:
 
 
 class CommandRules:
-    """What is known of a command before it is asked: looked up once, not in each transaction."""
+    """Sizes, deadline and effect of a command, computed once instead of for each transaction."""
 
     __slots__ = (
         "answer_time", "check", "check_size", "definition", "head", "makes", "moves", "payload",
@@ -72,7 +72,7 @@ class CommandRules:
         self.response = response
         self.check = check and response is not None
         self.head = command.request.MAX_WIRE_SIZE - command.request.MAX_SIZE
-        # A packet has no frame that could tell its size, so each answer has one size; or there is none.
+        # Packets have no length, so every answer of a command has the same size, 0 if there is none.
         self.payload = response.MAX_SIZE if response else 0
         self.check_size = response.MAX_WIRE_SIZE - response.MAX_SIZE if response else 0
         self.answer_time = timing.deadline(command)
@@ -82,7 +82,7 @@ class CommandRules:
 
 
 class Asked:
-    """A request as it was sent: all that the check of its answer needs, without encoding it again."""
+    """A request as sent, with all that decoding its answer needs, without encoding it again."""
 
     __slots__ = ("ID", "NAME", "command", "frame", "payload", "request")
 
@@ -95,20 +95,20 @@ class Asked:
         self.payload = frame[command.head :]
 
     def to_bytes(self) -> bytes:
-        """Return the payload, like the request itself."""
+        """Return the payload."""
         return self.payload
 
 
 class WayBack:
-    """How far a host is on its way back into step.
+    """Progress of a resynchronisation.
 
     Attributes:
-        fill: byte to fill up with.
-        rounds: rounds that have failed in this transaction.
-        silent: how many of them without anything that came.
-        heard: something has come in this round.
-        fills: bytes that were sent in this round to fill up.
-        completed: they have completed a packet.
+        fill: the fill byte.
+        rounds: failed rounds of this transaction.
+        silent: failed rounds without any received byte.
+        heard: bytes were received in this round.
+        fills: fill bytes sent in this round.
+        completed: the fill bytes have completed a packet.
     """
 
     __slots__ = ("completed", "fill", "fills", "heard", "rounds", "silent")

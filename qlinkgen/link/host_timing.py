@@ -1,4 +1,4 @@
-"""How long a host waits for a device that has no time of its own."""
+"""Deadlines of a host and of its resynchronisation."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Self
 from qlinkgen.link.codec import Command, Module
 from qlinkgen.link.timing import QUIET_BYTES, Timing
 
-#: Times that getting back in step is tried in one transaction ...
+#: Most rounds of resynchronisation in one transaction ...
 ROUNDS = 5
-#: ... and how many of them may be without any answer: then the device is not there.
+#: ... and most rounds without any received byte: then the device is absent.
 SILENT_ROUNDS = 3
-#: After one of these the line has to be quiet so many times as long: an answer may be very late.
+#: Factor of the quiet time after each silent round: an answer may be very late.
 PATIENCE = 4
-#: Filling bytes that may get lost, or be lost in a packet that noise has begun.
+#: Additional fill bytes, which may get lost or belong to a packet begun by noise.
 SPARE = 4
 
 
@@ -23,8 +23,7 @@ class HostTiming(Timing):
     """The terms of every deadline between a host and its device, all in seconds.
 
     Attributes:
-        forgets: silence after which the device forgets a packet of which not everything has come; 0 where it
-            never does.
+        forgets: silence after which the device discards an incomplete packet; 0 if it never does.
     """
 
     forgets: float = 0.0
@@ -36,7 +35,7 @@ class HostTiming(Timing):
         """Make the timing of a protocol; see `Timing.of`."""
         if not 0 <= forgets < float("inf"):
             raise ValueError(
-                f"forgets: {forgets} was given; give seconds, or 0 for a device that never forgets"
+                f"forgets must be seconds, or 0 for a device that never discards a packet, not {forgets}"
             )
         plain = Timing.of(codec, baud=baud, host_slack=host_slack, paced=paced, attempts=attempts)
         terms = {each.name: getattr(plain, each.name) for each in fields(plain)}
@@ -44,26 +43,26 @@ class HostTiming(Timing):
 
     @property
     def quiet(self) -> float:
-        """Silence that the line must show after anything that does not fit."""
+        """Required silence after a wrong reply."""
         return max(self.on_wire(QUIET_BYTES), self.forgets) + self.host_slack
 
     def quiet_after(self, silent: int) -> float:
-        """Return the silence that the line must show after so many rounds without any answer."""
+        """Return the required silence after a number of rounds without any received byte."""
         return float(self.quiet * PATIENCE**silent)
 
     def fills(self, longest_request: int) -> int:
-        """How many bytes are sent at most to fill up a packet of which not everything has come."""
+        """Return the largest number of fill bytes for an incomplete packet."""
         return longest_request - 1 + SPARE
 
     def fill_deadline(self, answer: int) -> float:
-        """Time from handing over one byte until an answer of `answer` bytes must be complete."""
+        """Return the time from sending one byte until an answer of `answer` bytes must be complete."""
         return self.on_wire(1 + answer) + self.host_slack
 
     def worst_case(self, command: Command, attempts: int | None = None) -> float:
-        """Most seconds that a call can take, whatever is on the line.
+        """Return the longest duration of a call in seconds, for any traffic on the line.
 
-        Each attempt may need a context before it, and each of them, or a round that fails, the whole way back
-        into step: a quiet line, every filling byte, and two packets as the proof.
+        Each attempt may need a context before it, and after each failure a full resynchronisation: a quiet
+        line, all fill bytes, and two packets to verify it.
         """
         packet = self.on_wire(2 * self.longest_frame) + self.longest_allowance + self.host_slack
         fills = self.fills(self.longest_frame) * self.fill_deadline(self.longest_frame)

@@ -1,6 +1,6 @@
-"""The asking side of a bus: one transaction at a time, with repeats, deadlines and a quiet line between.
+"""The master of a bus: one transaction at a time, with repeats, deadlines and quiet times.
 
-The engine does no input or output and knows no clock. A driver does this, with `now` from its own clock::
+The engine does no input or output and has no clock. A driver calls it with `now` from its own clock::
 
     engine.start(request, now)
     while engine.busy:
@@ -10,17 +10,17 @@ The engine does no input or output and knows no clock. A driver does this, with 
         engine.handle_timer(now)
     reply = engine.take()
 
-States, and what leads from one to the next:
+States and transitions:
 
 ========  ==========================================  ====================================================
-state     meaning                                     left by
+state     meaning                                     transitions
 ========  ==========================================  ====================================================
-idle      nothing is asked                            `start` -> guard
-guard     a request waits for a quiet line            quiet: bytes_to_send -> waiting, or idle where nothing
-                                                      answers; not quiet in time: failed -> idle
-probe     two bytes are sent to see if they come      they came or their time is over -> guard
-          back; once, where the echo is "auto"
-waiting   an answer may come until the deadline       the answer -> idle; the deadline -> guard for the next
+idle      no transaction                              `start` -> guard
+guard     a request waits for a quiet line            quiet: bytes_to_send -> waiting, or idle without a
+                                                      response; not quiet in time: failed -> idle
+probe     two bytes are sent to detect an echo;       received or timed out -> guard
+          once, if the echo is "auto"
+waiting   waiting for the answer until the deadline   answer -> idle; deadline -> guard for the next
                                                       attempt, or failed -> idle after the last
 ========  ==========================================  ====================================================
 """
@@ -52,8 +52,8 @@ from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.timing import Timing, check_attempts
 from qlinkgen.link.transaction import Accepts, CommandTiming, Packet, Question, Reply, settled
 
-#: On a paced line nothing that is complete before the request has left can be its answer. Clocks of the two
-#: sides may differ by some percent.
+#: On a paced line, a frame complete before the request was transmitted is not its answer. The factor allows
+#: for a difference between the clocks of both sides.
 EARLY = 0.9
 
 IDLE = "idle"
@@ -63,16 +63,16 @@ WAITING = "waiting"
 
 
 class MasterEngine:
-    """The asking side of one bus.
+    """The master of one bus.
 
     Attributes:
         codec: the generated module of the protocol.
-        timing: every deadline.
-        events: what happened, oldest first; the driver takes them out.
-        verbose: events tell of each request and answer too, not only of what went wrong. Each costs half a
+        timing: all deadlines.
+        events: events, oldest first; the driver removes them.
+        verbose: also report each request and answer, not only irregularities. Each event costs half a
             microsecond.
-        counters: counts for each node, and under None what belongs to no node.
-        health: state of each node that was asked.
+        counters: counts for each node, and under None those without a node.
+        health: state of each node.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class MasterEngine:
         self.verbose = True
         self.counters: dict[int | None, LinkCounters] = {None: LinkCounters()}
         self._bus = codec.BUS
-        self.health = HealthBook(health, nobody=(None, self._bus.broadcast))
+        self.health = HealthBook(health, untracked=(None, self._bus.broadcast))
         self._commands = {
             command.request: CommandTiming(command, timing, hooks.get(name))
             for name, command in codec.COMMANDS.items()
@@ -108,7 +108,7 @@ class MasterEngine:
         self._request: Framed  #: set by `start`
         self._command: CommandTiming = next(iter(self._commands.values()))
         self._node: int | None = None
-        #: What was asked before, whose answer may still come.
+        #: The previous command and node, whose answer may still arrive.
         self._earlier: tuple[CommandTiming, int | None] | None = None
         self._frame = b""
         self._count = self.counters[None]
@@ -119,14 +119,14 @@ class MasterEngine:
         self._sent_at = 0.0
         self._earliest = 0.0
         self._deadline = 0.0
-        #: Nothing is sent before: a broadcast is still on the line, or a late answer may come.
+        #: Earliest time to send: a broadcast is still on the line, or a late answer may arrive.
         self._free_at = 0.0
         self._quiet_at = 0.0
         self._give_up_at = 0.0
         self._suspect = False
         self._received = b""
         self._break = EchoBroken(0.0, None, b"", b"")
-        #: Kind and bytes of what came in place of an answer.
+        #: Kind and bytes of each reply that was not the answer.
         self._wrong: list[tuple[str, bytes]] = []
         self._probe_until = 0.0
         self._probe_heard = b""
@@ -153,21 +153,22 @@ class MasterEngine:
         Args:
             request: message of the generated module.
             now: time.
-            attempts: how often it is sent at most; that of the timing unless given. A request that must not
-                be repeated is sent once whatever stands here.
-            trial: ask a node that is offline before its next trial is due; silence is not held against it.
+            attempts: largest number of transmissions; by default that of the timing. A request that is unsafe
+                to repeat is sent once in any case.
+            trial: ask an offline node before its next trial is due; a missing answer does not count as a
+                failure of the node.
 
         Raises:
-            EncodeError: of the generated module; the request holds what cannot be sent.
-            TypeError: it is no request of this protocol.
-            ValueError: attempts is not 1 or more.
+            EncodeError: of the generated module; a value cannot be sent.
+            TypeError: the message is not a request of this protocol.
+            ValueError: attempts is less than 1.
             NoReply: the node is offline, and its next trial is not due yet; nothing was sent.
-            RuntimeError: another transaction is under way.
+            RuntimeError: another transaction is pending.
         """
         if self._state is not IDLE:
-            raise RuntimeError("a transaction is under way; a bus does one at a time")
+            raise RuntimeError("another transaction is pending; a bus performs one at a time")
         if type(request) is Packet or (command := self._commands.get(type(request))) is None:
-            raise TypeError(f"{type(request).__name__} was given; a request of this protocol is needed")
+            raise TypeError(f"{type(request).__name__} is not a request of this protocol")
         tries = command.tries if attempts is None else self._tries_of(command, attempts)
         self._frame = self.codec.encode(request)
         if self._attempt:
@@ -183,7 +184,7 @@ class MasterEngine:
         self._tries = tries
         self._attempt = 0
         self._trial = trial
-        if self.health and not trial and command.response is not None:  # a stop costs no wait, so it is sent
+        if self.health and not trial and command.response is not None:  # without response there is no wait
             self._look_at_health(now)
         if self._wrong:
             self._wrong = []
@@ -199,7 +200,7 @@ class MasterEngine:
         return self.timing.attempts_of(command.definition, attempts)
 
     def bytes_to_send(self, now: float) -> bytes:
-        """Return what the driver has to write now."""
+        """Return the bytes that the driver has to write now."""
         if self._state is WAITING or self._state is IDLE or now < self._free_at:
             return b""
         if self._suspect and not self._line_is_quiet(now):
@@ -209,7 +210,7 @@ class MasterEngine:
         return self._send(now)
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that came."""
+        """Process received bytes."""
         if self._suspect:
             self._quiet_at = max(self._quiet_at, now + self._quiet)
         if self._probe_until and self._state is PROBING:
@@ -223,7 +224,7 @@ class MasterEngine:
             self._take_in(event, now)
 
     def next_timer(self) -> float | None:
-        """Return when the engine has to be called again although nothing came; None: not at all."""
+        """Return the time of the next call without received bytes; None if none is needed."""
         state = self._state
         if state is WAITING:
             return self._deadline
@@ -237,7 +238,7 @@ class MasterEngine:
         return due
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due."""
+        """Process expired timers."""
         state = self._state
         if state is WAITING:
             if now >= self._deadline:
@@ -249,21 +250,21 @@ class MasterEngine:
             self._fail(BadReply, "line never became idle: unsolicited traffic", now)
 
     def take(self) -> Reply:
-        """Return what the transaction that has just ended gave.
+        """Return the reply of the transaction that has just ended.
 
         Raises:
-            NoReply: no answer came.
-            BadReply: only damaged or wrong answers came.
-            Collision: the request came back changed.
+            NoReply: no reply was received.
+            BadReply: only corrupt or wrong replies were received.
+            Collision: the echo of the request was changed.
         """
         outcome, self._outcome = self._outcome, None
         return settled(outcome)
 
     def abort(self, now: float) -> None:
-        """Give up the transaction under way: its answer may still come, and will answer nothing."""
+        """Give up the pending transaction; an answer that still arrives is a stray."""
         if self._state is IDLE:
             return
-        if self._state is WAITING:  # nobody else may speak while the node still may
+        if self._state is WAITING:  # the node may still answer until the deadline
             self._free_at = max(now, self._deadline)
         self._distrust(max(now, self._free_at))
         self._state = IDLE
@@ -272,7 +273,7 @@ class MasterEngine:
     # Sending ------------------------------------------------------------------------------------------------
 
     def _send(self, now: float) -> bytes:
-        for event in self._decoder.finish():  # what a damaged frame has hidden may be a message
+        for event in self._decoder.finish():  # bytes inside a damaged frame may be a message
             self._take_in(event, now)
         frame = self._frame
         count = self._count
@@ -303,7 +304,7 @@ class MasterEngine:
         return now >= self._quiet_at
 
     def _distrust(self, now: float) -> None:
-        """An answer may come that nobody waits for any more: ask for a quiet line before the next request."""
+        """Require a quiet line before the next request, since a late answer may arrive."""
         self._suspect = True
         self._quiet_at = now + self._quiet
         self._give_up_at = now + self._quiet_limit
@@ -318,7 +319,7 @@ class MasterEngine:
         return PROBE
 
     def _without_probe(self, data: bytes, now: float) -> bytes:
-        """Look for the probe, which may have lost its head, or have noise before it."""
+        """Look for the probe, which may have lost its first byte, or follow noise."""
         heard = self._probe_heard = self._probe_heard + data
         if heard[:1] == PROBE[:1] or 0 < heard.find(PROBE) <= NOISE:
             self._probe_answered(found=True, now=now)
@@ -329,7 +330,7 @@ class MasterEngine:
         self._echo.mode = "expect" if found else "none"
         self.events.append(EchoFound(now, found))
         self._state = GUARD
-        if found:  # the rest of the probe may still be to come
+        if found:  # the rest of the probe may still arrive
             self._suspect = True
             self._quiet_at = now + self.timing.on_wire(len(PROBE))
         self._give_up_at = now + self._quiet_limit
@@ -338,7 +339,7 @@ class MasterEngine:
         echo = self._echo
         broken, expected = echo.broken, echo.outstanding
         rest = echo.cancel(data)
-        if echo.broken and not broken:  # told when it is known that the frame itself does not come behind it
+        if echo.broken and not broken:  # reported once the frame itself can no longer follow
             self._break = EchoBroken(now, self._node, expected, data)
         return rest
 
@@ -391,9 +392,9 @@ class MasterEngine:
         self.events.append(Stray(now, message, late))
 
     def _may_answer(self, command: CommandTiming, asked: int | None, message: Framed) -> bool:
-        """Whether a message is what a node that was asked would say, if to another attempt."""
-        anybody = command.answers_broadcast and asked == self._bus.broadcast
-        return type(message) is command.response and (anybody or self._address(message) == asked)
+        """Whether a message may be the answer of the asked node to an earlier attempt."""
+        any_node = command.answers_broadcast and asked == self._bus.broadcast
+        return type(message) is command.response and (any_node or self._address(message) == asked)
 
     def _damaged(self, fault: Fault, now: float) -> None:
         waiting = self._state is WAITING
@@ -418,9 +419,9 @@ class MasterEngine:
             self.events.append(self._break)
             self._echo.forget()
         if self._attempt > 1:
-            self._distrust(now)  # the answer to an earlier attempt may be on its way
+            self._distrust(now)  # the answer to an earlier attempt may still arrive
         if self._paced and self.codec.encode(response)[-1:] != self._received[-1:]:
-            self._free_at = now + self._byte_time  # the byte that is inserted behind a checksum's end
+            self._free_at = now + self._byte_time  # the byte inserted after the last byte of the checksum
         if self.health.answered(self._node):
             self._tell_health(now)
         if self.verbose:
@@ -440,7 +441,7 @@ class MasterEngine:
         if self._attempt < self._tries:
             self._state = GUARD
         elif self._echo.broken:
-            self._fail(Collision, "the request came back changed: another station was sending too", now)
+            self._fail(Collision, "the echo of the request was changed: another station was sending too", now)
         elif self._wrong:
             kinds = ", ".join(sorted({kind for kind, _ in self._wrong}))
             self._fail(BadReply, f"received only invalid replies ({kinds})", now)
@@ -462,12 +463,12 @@ class MasterEngine:
         self._state = IDLE
         self._count.failures += 1
         self.events.append(Failed(now, self._node, self._request, self._outcome))
-        # A line that does not let anybody ask says nothing of the node.
+        # A line that never becomes idle is not a failure of the node.
         if self._attempt and not self._trial and self.health.failed(self._node, now, elapsed + self._quiet):
             self._tell_health(now)
 
     def _look_at_health(self, now: float) -> None:
-        """Leave a node alone that is offline, but for its trials."""
+        """Refuse a request to an offline node, except for its trials."""
         health = self.health.offline(self._node)
         if health is None:
             return
@@ -475,8 +476,8 @@ class MasterEngine:
             self._count.refused += 1
             self.events.append(Refused(now, self._node, self._request))
             raise NoReply(
-                f"{self._request.NAME} to node {self._node}: not sent, since the node has not answered "
-                f"{health.failures} times; it is tried again in {health.next_trial - now:.2f} s",
+                f"{self._request.NAME} to node {self._node}: not sent, since {health.failures} transactions "
+                f"failed; next trial in {health.next_trial - now:.2f} s",
                 node=self._node,
             )
         self._tries = 1

@@ -1,10 +1,10 @@
-"""Listening to a bus: who asks whom, what answers, what is repeated, late or damaged. Nothing is ever sent.
+"""Passive listener of a bus: requests, responses, repeats, late and damaged frames.
 
-Nothing in a frame need tell a request from a response. What does:
+A frame need not state its direction. It is determined by these rules:
 
-1. A frame that answers the request before it, in time, is its response.
-2. Anything else that can be a request is one. The same bytes again, unanswered, are a repeat.
-3. What can only be a response answers the request before it too late, or nothing that was heard.
+1. A frame that answers the previous request, in time, is its response.
+2. Any other frame that can be a request is one. The same bytes again, unanswered, are a repeat.
+3. A frame that can only be a response is a late response to the previous request, or a stray one.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Asked(NamedTuple):
 
     at: float
     request: Framed
-    #: The request before it was the same and was not answered.
+    #: The previous request was the same and was not answered.
     repeat: bool
     frame: bytes
 
@@ -46,13 +46,13 @@ class Replied(NamedTuple):
     response: Framed
     #: Seconds from the end of the request to the end of the answer.
     delay: float
-    #: It came after the deadline.
+    #: It was received after the deadline.
     late: bool
     frame: bytes
 
 
 class Unanswered(NamedTuple):
-    """No answer to a request has come in time."""
+    """A request was not answered in time."""
 
     at: float
     request: Framed
@@ -62,7 +62,7 @@ Heard = Asked | Replied | Unanswered | Stray | Damaged
 
 
 class _Pending:
-    """The last request, and until when it may be answered."""
+    """The last request, and its deadline."""
 
     __slots__ = ("answered", "at", "command", "deadline", "reported", "request")
 
@@ -76,18 +76,18 @@ class _Pending:
 
 
 class Monitor:
-    """Reads a stream that carries both directions of a bus.
+    """Decodes a stream with both directions of a bus.
 
-    Bytes are looked at one at a time, at about a microsecond each, so that requests and answers that came in
-    one piece are told apart.
+    Bytes are processed one at a time, at about a microsecond each, so that requests and answers received in
+    one chunk are separated.
 
     Attributes:
-        heard: what was heard, oldest first; the caller takes it out.
-        bytes: bytes taken so far.
+        heard: events, oldest first; the caller removes them.
+        bytes: number of bytes processed.
     """
 
     def __init__(self, codec: Codec, timing: Timing, *, accepts: Mapping[str, Accepts] | None = None) -> None:
-        """`accepts` are the checks of a `MasterEngine`: what answers, where the shape does not say it all."""
+        """Listen to a protocol; `accepts` are the additional matching rules of a `MasterEngine`."""
         self.heard: deque[Heard] = deque()
         self.bytes = 0
         self._codec = codec
@@ -96,18 +96,18 @@ class Monitor:
         self._commands = {command.request: command for command in codec.COMMANDS.values()}
         self._requests = codec.StreamDecoder("request")
         self._responses = codec.StreamDecoder("response")
-        #: Faults that one of the two decoders has reported, by offset: it may be the wrong one of the two.
+        #: Faults reported by one of the two decoders, by offset; it may be that of the wrong direction.
         self._suspected: dict[int, Fault] = {}
         self._pending: _Pending | None = None
 
     @property
     def skipped(self) -> int:
-        """Bytes so far in no frame and no damaged one."""
+        """Number of bytes outside frames and damaged frames."""
         skipped: int = min(self._requests.counters.skipped, self._responses.counters.skipped)
         return skipped
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that were on the line."""
+        """Process bytes received from the line."""
         self.handle_timer(now)
         self.bytes += len(data)
         for byte in data:
@@ -118,14 +118,14 @@ class Monitor:
                 self._sort(asking, answering, now)
 
     def finish(self, now: float) -> None:
-        """The stream has ended."""
+        """End the stream."""
         self._sort(self._requests.finish(), self._responses.finish(), now)
         if self._pending is not None:
             self._pending.deadline = min(self._pending.deadline, now)
             self.handle_timer(now)
 
     def next_timer(self) -> float | None:
-        """Return when the request that waits is unanswered, None where none waits."""
+        """Return the deadline of the pending request, None without one."""
         pending = self._pending
         return None if pending is None or pending.reported else pending.deadline
 
@@ -148,7 +148,7 @@ class Monitor:
                 self.heard.append(Damaged(now, self._node_asked(now), fault))
         for request, response in _same_frames(asking, answering):
             if request is not None or response is not None:
-                self._suspected.clear()  # one of the two decoders was the wrong one
+                self._suspected.clear()  # reported by the decoder of the wrong direction
                 self._message(request, response, now)
 
     def _node_asked(self, now: float) -> int | None:
@@ -157,7 +157,7 @@ class Monitor:
         return address_of(pending.request) if pending is not None and waits else None
 
     def _message(self, request: Framed | None, response: Framed | None, now: float) -> None:
-        # The frame is the same one: each decoder has read it in its own way, or has refused it.
+        # Both events are of the same frame, decoded or refused in each direction.
         pending = self._pending
         if response is not None and pending is not None and self._fits(pending, response):
             in_time = not pending.answered and now < pending.deadline
@@ -188,24 +188,24 @@ class Monitor:
 
     def _asked(self, request: Framed, now: float) -> None:
         command = self._commands.get(type(request))
-        if command is None:  # a message of no command: anybody may send it, and nothing answers
+        if command is None:  # a message outside commands: sent by any node, without a response
             self.heard.append(Stray(now, request, late=False))
             return
         before = self._pending
-        if before is not None and not before.reported:  # the master has not waited for the deadline
+        if before is not None and not before.reported:  # the master did not wait for the deadline
             self.heard.append(Unanswered(now, before.request))
         repeat = before is not None and not before.answered and before.request == request
-        nobody = not addresses_that_answer(command, request, self._codec.BUS)
+        unanswerable = not addresses_that_answer(command, request, self._codec.BUS)
         self._pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
-        self._pending.answered = self._pending.reported = nobody
+        self._pending.answered = self._pending.reported = unanswerable
         self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))
 
 
 def _same_frames(
     asking: Sequence[Framed | Fault], answering: Sequence[Framed | Fault]
 ) -> Iterator[tuple[Framed | None, Framed | None]]:
-    """Pair what two decoders made of the same frames; a byte may complete several, where one was hidden."""
-    if len(asking) == len(answering):  # each has taken or refused the same ones
+    """Pair the events of two decoders for the same frames; a byte may complete several."""
+    if len(asking) == len(answering):  # both have decoded or refused the same frames
         yield from zip(map(_message_of, asking), map(_message_of, answering), strict=True)
         return
     responses = list(filter(is_message, answering))

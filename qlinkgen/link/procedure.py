@@ -1,7 +1,7 @@
-"""Procedures: what takes several transactions, written once for every kind of driver.
+"""Procedures: operations of several transactions, written once for every kind of driver.
 
-A procedure is a generator. It yields what it wants done, gets the outcome back as the value of the `yield`,
-and an error where a driver of its own would raise one::
+A procedure is a generator. It yields steps, and gets the outcome of each as the value of the `yield`, or its
+error as an exception::
 
     def double_check(node: int) -> Procedure[int]:
         first = yield Ask(qlink.MotorPositionRequest(node=node))
@@ -9,7 +9,7 @@ and an error where a driver of its own would raise one::
         again = yield Ask(qlink.MotorPositionRequest(node=node))
         return again.response.position - first.response.position
 
-A blocking driver runs it with `bus.run(double_check(3))`, one for asyncio with `await bus.run(...)`.
+Run it with `bus.run(double_check(3))` on a blocking driver, with `await bus.run(...)` on asyncio.
 """
 
 from __future__ import annotations
@@ -20,28 +20,28 @@ from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 from qlinkgen.errors import LinkError
 from qlinkgen.link.transaction import Question, Reply
 
-#: What a procedure tells on the way.
-Report: TypeAlias = Any  # each procedure tells of a class of its own, which its caller knows
+#: A progress report of a procedure.
+Report: TypeAlias = Any  # each procedure has its own class of reports
 
 
 class Ask(NamedTuple):
-    """Do a transaction; the value of the `yield` is its Reply."""
+    """Perform a transaction; the value of the `yield` is its Reply."""
 
     request: Question
-    #: None: as often as the timing says.
+    #: None: the default of the timing.
     attempts: int | None = None
     #: Ask a node that is offline before its next trial is due.
     trial: bool = False
 
 
 class Pause(NamedTuple):
-    """Let so many seconds pass, and others use the bus; the value is the time then."""
+    """Wait, with the bus free for others; the value is the time afterwards."""
 
     seconds: float
 
 
 class Tell(NamedTuple):
-    """Show the user how far it is; the value is None."""
+    """Report progress to the caller; the value is None."""
 
     report: Report
 
@@ -51,18 +51,18 @@ Outcome = TypeVar("Outcome")
 #: Yields steps, gets Reply, float or None, and returns an outcome.
 Procedure = Generator[Step, Any, Outcome]  # Any: which of them depends on the step
 
-#: What a transaction can fail with; a procedure may catch it where it has asked.
+#: Errors of a transaction, which a procedure may catch.
 FAILURES = (LinkError, OSError, ValueError, TypeError)
 
 
 class Runner(Generic[Outcome]):
-    """A procedure being run: a driver advances it, does what it wants, and leaves here what came of it.
+    """A running procedure: the driver advances it, performs the step, and stores the outcome here.
 
     Attributes:
-        wanted: what is to be done now.
-        outcome: what came of it.
-        failure: what it failed with.
-        result: what the procedure returned.
+        wanted: the current step.
+        outcome: its outcome.
+        failure: its error.
+        result: return value of the procedure.
     """
 
     __slots__ = ("_procedure", "failure", "outcome", "result", "wanted")
@@ -76,7 +76,7 @@ class Runner(Generic[Outcome]):
         self.failure: Exception | None = None
 
     def advance(self) -> bool:
-        """Go on to the next step; False at the end."""
+        """Advance to the next step; return False at the end."""
         outcome, failure = self.outcome, self.failure
         self.outcome = self.failure = None
         try:
@@ -90,5 +90,5 @@ class Runner(Generic[Outcome]):
         return True
 
     def close(self) -> None:
-        """Let the procedure clean up, if it has not ended."""
+        """Close the procedure, so that it cleans up if it has not ended."""
         self._procedure.close()

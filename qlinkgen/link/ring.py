@@ -1,37 +1,36 @@
-"""One node of a ring: takes its messages, sends the others on, and sends its own in between.
+"""One node of a ring: takes its messages, forwards the others, and sends its own in between.
 
-The engine does no input or output and knows no clock. A driver does this, with `now` from its own clock::
+The engine does no input or output and has no clock. A driver calls it with `now` from its own clock::
 
-    node.receive(data, now)  # what has come from the node before
-    node.handle_timer(now)  # when next_timer() has come
+    node.receive(data, now)  # bytes from the previous node
+    node.handle_timer(now)  # at next_timer()
     port.write(node.bytes_to_send(now))
 
-A message is known to be for this node as soon as its header is there: the address in it is 1. Every other one
-goes to the next node with the address one lower, in the header and in the end byte; what stands between is
-not looked at. With cut-through, which is the default, a byte is sent on when it has come, so a node delays a
-message by one byte time. `cut_through=False` keeps a message until its end has come and sends nothing on that
-is broken; each node then delays it by its whole length.
+A message is for this node if the address in its header is 1. Others are forwarded with the address
+decremented in the header and in the end byte; the payload is not checked. With cut-through, the default, each
+byte is forwarded on reception, so a node delays a message by one byte time. `cut_through=False` stores a
+message until its end, and forwards only intact ones; each node then delays it by its whole length.
 
-**What becomes of a message that turns out broken after its head was sent on.** It is ended there and then by
-an end byte with the address 0. That is the address of no header, so the node behind sees an end that does not
-belong to the message, drops it, tells a frame error, and ends it in the same way for the node behind itself:
-the receiver drops it, each node on the way knows, and the line is free for the next message at once. Broken
-are: an end byte with another address than the header, a header before the end, more bytes than any message
-has, and silence for longer than `patience`. The payload is judged by the receiver alone.
+**A message that turns out broken after its head was forwarded** is terminated by an end byte with the address
+0. No header has that address, so the next node sees an end that does not match, drops the message, reports a
+frame error, and terminates it in the same way for its successor: the receiver drops it, each node on the way
+reports it, and the line is free for the next message immediately. A message is broken by an end byte with
+another address than the header, a header before the end, more bytes than any message has, or silence for
+longer than `patience`. Only the receiver checks the payload.
 
-States, and what leads from one to the next:
+States and transitions:
 
 =========  ===========================================  ==================================================
-state      meaning                                      left by
+state      meaning                                      transitions
 =========  ===========================================  ==================================================
-closed     no message is under way                      header -> taking, passing or blocking, or hunting
-                                                        where its address is 0; other byte: -> hunting
-taking     a message for this node                      end byte -> closed; silence, length -> hunting;
+closed     between messages                             header -> taking, passing or blocking; with
+                                                        address 0, or another byte -> hunting
+taking     in a message for this node                   end byte -> closed; silence, length -> hunting;
                                                         header -> the state of the new message
-passing    a message for another one                    the same
-blocking   a message for another one, while nothing     the same
-           may be sent through this node
-hunting    bytes behind a fault that was told           header -> as from closed
+passing    in a message for another node                the same
+blocking   in a message for another node, while this    the same
+           node does not forward
+hunting    in bytes after a reported fault              header -> as from closed
 =========  ===========================================  ==================================================
 """
 
@@ -54,12 +53,12 @@ from qlinkgen.link.ring_events import (
     Taken,
 )
 
-#: Events that are kept for one who does not fetch them.
+#: Most events that are kept if the driver does not remove them.
 EVENTS_KEPT = 4096
-#: Bytes that the transmit buffer holds, unless told otherwise: four messages of full length.
+#: Default size of the transmit buffer: four messages of full length.
 ROOM = 1040
-#: Seconds of silence inside a message after which it is given up, unless told otherwise. Far more than the
-#: operating system ever stops a program for, since that looks the same.
+#: Default silence in seconds after which an incomplete message is broken. Far longer than the operating
+#: system suspends a program, which looks the same.
 PATIENCE = 0.5
 
 CLOSED = "closed"
@@ -71,7 +70,7 @@ _OPEN = frozenset({TAKING, PASSING, BLOCKING})
 
 
 class Marking(Protocol):
-    """Where header and end byte hold what; see the class of that name beside a generated module."""
+    """Layout of header and end byte; see the class of that name in the support module."""
 
     marker: int
     address_shift: int
@@ -87,12 +86,12 @@ class RingCodec(Encoder, Protocol):
 
     @property
     def BUS(self) -> Bus:  # noqa: N802  # as the generated module has it
-        """Who is on the line, and how fast it is."""
+        """Nodes and speed of the line."""
         ...
 
     @property
     def MARKING(self) -> Marking:  # noqa: N802
-        """Where header and end byte hold what."""
+        """Layout of header and end byte."""
         ...
 
     @property
@@ -102,7 +101,7 @@ class RingCodec(Encoder, Protocol):
 
     @property
     def DecodeError(self) -> type[Exception]:  # noqa: N802
-        """What `decode` raises."""
+        """The error of `decode`."""
         ...
 
     @property
@@ -116,12 +115,12 @@ class RingNode:
 
     Attributes:
         codec: the generated module of the protocol.
-        cut_through: messages are sent on while they still come.
-        passes: messages to others are sent on at all; otherwise they are dropped and counted.
-        netstat: what has gone wrong since somebody has set it to 0.
-        counters: what it has seen.
-        events: what happened, oldest first; the driver takes them out.
-        verbose: events tell of each message too, not only of what went wrong.
+        cut_through: messages are forwarded while being received.
+        passes: messages to others are forwarded; otherwise they are dropped and counted.
+        netstat: errors since it was set to 0.
+        counters: counts of messages and faults.
+        events: events, oldest first; the driver removes them.
+        verbose: also report each message, not only faults.
     """
 
     def __init__(
@@ -134,27 +133,27 @@ class RingNode:
         patience: float = PATIENCE,
         room: int = ROOM,
     ) -> None:
-        """Make a node that has just been switched on.
+        """Make a node as just switched on.
 
         Args:
             codec: the generated module of the protocol.
             on_message: called with each message to this node and the time.
-            cut_through: send messages on while they still come, not only when they are complete.
-            baud: speed of the line where bytes take their time. An own message then begins only when the
-                transmitter has sent everything before it, so that it never holds up more than it must.
-            patience: seconds of silence inside a message after which it is given up.
-            room: bytes that the transmit buffer holds.
+            cut_through: forward messages while receiving them, not only when they are complete.
+            baud: speed of a paced line. An own message then begins only when the transmitter has sent
+                everything before it, so that it delays forwarded messages as little as possible.
+            patience: seconds of silence inside a message after which it is broken.
+            room: size of the transmit buffer in bytes.
 
         Raises:
-            ValueError: a number is out of its range.
+            ValueError: a number is out of range.
         """
         marking = codec.MARKING
         if baud is not None and baud <= 0:
-            raise ValueError(f"baud: {baud} was given; give bits a second, or None where bytes take no time")
+            raise ValueError(f"baud must be bits per second, or None for an unpaced line, not {baud}")
         if not 0 < patience < float("inf"):
-            raise ValueError(f"patience: {patience} s was given; give seconds above 0 that end")
+            raise ValueError(f"patience must be above 0 s and finite, not {patience}")
         if room < marking.most + 2:
-            raise ValueError(f"room: {room} was given; a message takes up to {marking.most + 2} bytes")
+            raise ValueError(f"room must be {marking.most + 2} or more, the longest message, not {room}")
         self.codec = codec
         self.cut_through = cut_through
         self.passes = True
@@ -179,10 +178,10 @@ class RingNode:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what is under way, as when the node is switched off. Counters and status stay."""
+        """Discard messages being received or sent, as by switching off. Counters and status are kept."""
         self._state = CLOSED
-        self._held = bytearray()  # the message under way, from its header on, as it came
-        self._out = bytearray()  # to be sent on
+        self._held = bytearray()  # the message being received, from its header on
+        self._out = bytearray()  # bytes to forward
         self._queue: deque[bytes] = deque()  # own messages
         self._queued = 0
         self._asked = float("-inf")  # when the first of them came
@@ -190,7 +189,7 @@ class RingNode:
     # receiving
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes from the node before; the last one came at `now`."""
+        """Process bytes from the previous node; the last one was received at `now`."""
         self._last = now
         marks = data.translate(self._marks)
         position = 0
@@ -218,7 +217,7 @@ class RingNode:
                 self._out += piece
 
     def _mark(self, byte: int, now: float) -> None:
-        """Take a header or an end byte."""
+        """Process a header or an end byte."""
         state = self._state
         if byte & self._id_mask != self._end_bits:
             if state in _OPEN:
@@ -284,7 +283,7 @@ class RingNode:
     # faults
 
     def _break(self, kind: str, text: str, now: float, state: str = "") -> None:
-        """The message under way is broken: tell it, and the nodes behind as well."""
+        """Report the current message as broken, and terminate it for the following nodes."""
         begun = (state or self._state) == PASSING and self.cut_through
         if begun:
             self._out.append(self._marker | self._end_bits)
@@ -306,10 +305,10 @@ class RingNode:
     # sending
 
     def send(self, message: Message, now: float) -> bool:
-        """Put an own message into the transmit buffer; False where it has no room, and was not taken.
+        """Put an own message into the transmit buffer; return False if it is full.
 
         Raises:
-            EncodeError: of the generated module; nothing was put anywhere.
+            EncodeError: of the generated module; the buffer is unchanged.
         """
         frame = self.codec.encode(message)
         if self._queued + len(frame) > self._room:
@@ -323,17 +322,17 @@ class RingNode:
         return True
 
     def refuse(self, now: float) -> None:
-        """An own message is given up, since it found no room: count it, and set the status."""
+        """Count an own message discarded because the buffer is full, and set the status."""
         self.counters.refused += 1
         self.raise_status(NetStat.TX_TIMEOUT, now)
 
     @property
     def idle(self) -> bool:
-        """Nothing waits to be sent, and no message is being sent on."""
+        """Whether nothing is to be sent and no message is being forwarded."""
         return not self._queue and not self._out and self._state != PASSING
 
     def bytes_to_send(self, now: float) -> bytes:
-        """Return what goes to the next node now: first what is sent on, then own messages."""
+        """Return the bytes for the next node: first forwarded ones, then own messages."""
         self.handle_timer(now)
         data = bytes(self._out)
         if data:
@@ -349,7 +348,7 @@ class RingNode:
         return data
 
     def _own(self, count: int) -> bytes:
-        """Take so many messages out of the transmit buffer."""
+        """Take a number of messages out of the transmit buffer."""
         data = b"".join(self._queue.popleft() for _ in range(count))
         self._queued -= len(data)
         self.counters.sent += count
@@ -362,7 +361,7 @@ class RingNode:
     # time
 
     def next_timer(self) -> float | None:
-        """Return when something is to be sent or given up, None where nothing is under way."""
+        """Return when to send bytes or to give up a message, None if neither is pending."""
         if self._out:
             return self._last
         open_until = self._last + self._patience if self._state in _OPEN else None
@@ -372,7 +371,7 @@ class RingNode:
         return open_until
 
     def handle_timer(self, now: float) -> None:
-        """Give up a message that does not go on."""
+        """Break a message after too long a silence."""
         if self._state in _OPEN and now >= self._last + self._patience:
             self._break("truncated", f"no byte for {self._patience:g} s inside a message", now)
             self._state = HUNTING

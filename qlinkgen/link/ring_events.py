@@ -1,6 +1,6 @@
-"""What a node of a ring has seen, as data: events, counters, and the network status.
+"""Events, counters and network status of a ring node.
 
-Times are those that the engine was given.
+Times are those passed to the engine.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ from qlinkgen.link.codec import Message
 
 
 class NetStat(IntFlag):
-    """What has gone wrong since the status was cleared (Network Status)."""
+    """Errors since the status was cleared (Network Status)."""
 
     #: A message found no room in the transmit buffer in time.
     TX_TIMEOUT = 1
-    #: The port did not take what was to be sent from the buffers.
+    #: The port did not accept the bytes to send.
     TX_BUFFER = 2
     #: The checksum of a message to this node was wrong, and the message was dropped.
     RX_CRC = 4
-    #: An incomplete or corrupt message has come.
+    #: An incomplete or corrupt message was received.
     RX_FRAME = 8
 
 
 class Taken(NamedTuple):
-    """A message to this node has come; told where the engine is verbose."""
+    """A message to this node was received; reported if the engine is verbose."""
 
     at: float
     message: Message
@@ -33,53 +33,53 @@ class Taken(NamedTuple):
 
 
 class Passed(NamedTuple):
-    """A message to another node was sent on to its end; told where the engine is verbose."""
+    """A message to another node was forwarded completely; reported if the engine is verbose."""
 
     at: float
-    #: As it came: the address has not been lowered yet.
+    #: As received, with the address not yet decremented.
     frame: bytes
 
 
 class Queued(NamedTuple):
-    """A message of this node went into the transmit buffer; told where the engine is verbose."""
+    """A message of this node was put into the transmit buffer; reported if the engine is verbose."""
 
     at: float
     message: Message
 
 
 class Broken(NamedTuple):
-    """A message, or bytes in none, that is not in order."""
+    """An invalid message, or bytes outside a message."""
 
     at: float
-    #: frame, crc, unknown, range, or truncated where the line fell silent.
+    #: frame, crc, unknown, range; truncated after silence.
     kind: str
-    #: The bytes in question, as they came.
+    #: Its bytes, as received.
     raw: bytes
-    #: What is wrong with them.
+    #: Description of the fault.
     text: str
-    #: Its head was sent on before this was known, and has been ended as broken.
+    #: Its head had been forwarded before, and was terminated as broken.
     cut_short: bool
 
 
 class Blocked(NamedTuple):
-    """A message to another node was not sent on: this one does not pass messages yet."""
+    """A message to another node was not forwarded: this node does not forward yet."""
 
     at: float
-    #: Its header, as it came.
+    #: Its header, as received.
     header: int
 
 
 class Dropped(NamedTuple):
-    """A message to this node was in order, but the node could not keep all of it."""
+    """A message to this node was valid, but the node could not store all of it."""
 
     at: float
     message: Message
-    #: What is lost, and why.
+    #: Description of the loss and its reason.
     text: str
 
 
 class StatusRaised(NamedTuple):
-    """A bit of the network status was set that had not been."""
+    """A bit of the network status was newly set."""
 
     at: float
     bit: NetStat
@@ -89,18 +89,18 @@ RingEvent = Taken | Passed | Queued | Broken | Blocked | Dropped | StatusRaised
 
 
 class RingCounters:
-    """Counts of one node. They only go up: read twice and subtract.
+    """Counts of one node. They only increase: read twice and subtract.
 
     Attributes:
         sent: own messages handed to the port.
-        taken: messages to this node that were in order.
-        passed: messages sent on to their end.
-        passed_bytes: bytes sent on, those of broken messages included.
-        cut_short: broken messages whose head had been sent on already.
-        blocked: messages that were not sent on since the node does not pass any yet.
-        refused: own messages that were given up, since the transmit buffer had no room.
-        faults: what was not in order, by kind: frame, crc, unknown, range, truncated.
-        skipped: bytes in no message, behind a fault that was counted.
+        taken: valid messages to this node.
+        passed: messages forwarded completely.
+        passed_bytes: bytes forwarded, including those of broken messages.
+        cut_short: broken messages whose head had already been forwarded.
+        blocked: messages discarded because the node does not forward yet.
+        refused: own messages discarded because the transmit buffer was full.
+        faults: faults by kind: frame, crc, unknown, range, truncated.
+        skipped: bytes outside messages, after a counted fault.
     """
 
     __slots__ = (
@@ -128,7 +128,7 @@ class RingCounters:
 
     @property
     def total_faults(self) -> int:
-        """Faults of all kinds."""
+        """Number of faults of all kinds."""
         return sum(self.faults.values())
 
     def as_dict(self) -> dict[str, int | dict[str, int]]:

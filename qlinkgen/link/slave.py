@@ -1,4 +1,4 @@
-"""The answering side: one node of a bus."""
+"""The engine of a slave: one node of a bus."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from qlinkgen.link.echo import EchoCanceller
 
 
 class Node(Protocol):
-    """What a node does; `SlaveHandlers` of a generated bus module has a method for each command."""
+    """The behaviour of a node; `SlaveHandlers` of a generated bus module has a method for each command."""
 
-    #: Address that the node answers to. A request may change it.
+    #: Address of the node. A request may change it.
     number: int
 
-    # Any: a node handles messages of its own protocol alone.
+    # Any: a node handles only messages of its own protocol.
     def handle(self, request: Any, now: float) -> Message | None:
-        """Do what a request says; return the response, None where there is none."""
+        """Execute a request; return the response, or None to send nothing."""
         ...
 
 
 class SlaveCounters:
-    """What a slave has seen.
+    """Counts of a slave.
 
     Attributes:
         requests: requests to this node.
         broadcasts: requests to all nodes.
         answers: responses handed to the port.
-        replaced: responses that were not sent before somebody else spoke: nobody waits for them any more.
+        replaced: responses discarded because another frame arrived before they were sent.
         foreign: frames to and from other nodes.
-        damaged: damaged frames, by kind. The answers of other nodes are read as requests and often count
+        damaged: damaged frames, by kind. The answers of other nodes are decoded as requests and often count
             here.
     """
 
@@ -48,11 +48,11 @@ class SlaveCounters:
 
 
 class SlaveEngine:
-    """Finds the requests to a node in what is on the line, and hands out its answers.
+    """Decodes the requests to a node, and encodes its responses.
 
     Attributes:
-        node: what the node does.
-        counters: what it has seen.
+        node: the behaviour of the node.
+        counters: counts of frames.
     """
 
     def __init__(
@@ -66,25 +66,23 @@ class SlaveEngine:
     ) -> None:
         """Make the engine of one node.
 
-        A request is complete before the byte that may be inserted behind its checksum has come; the answer
-        waits for that one, too.
+        A request is complete before the byte that may be inserted after its checksum arrives; the answer
+        waits for that byte, too.
 
         Args:
             codec: the generated module of the protocol.
-            node: what the node does.
-            turnaround: seconds from the request to its answer, so that the asker can stop sending.
-            baud: speed of the line, that of the schema unless given.
-            echo: whether the adapter hands back what is sent. An answer can be the same bytes as its request:
-                with an echo that is not expected, the node would answer itself without end.
+            node: the behaviour of the node.
+            turnaround: seconds from the request to its answer, so that the master can release the line.
+            baud: speed of the line, by default that of the schema.
+            echo: whether the adapter echoes sent bytes. An answer can be the same bytes as its request, so
+                with an unexpected echo the node would answer itself endlessly.
         """
         if echo not in ("expect", "none"):
             raise ValueError(
-                f'echo: {echo!r} was given; a slave is told "expect" or "none", it sends no probe'
+                f"echo must be 'expect' or 'none' for a slave, which sends no probe, not {echo!r}"
             )
         if not 0 <= turnaround < float("inf"):
-            raise ValueError(
-                f"turnaround: {turnaround} s was given; an answer cannot come before its request"
-            )
+            raise ValueError(f"turnaround must be 0 s or more and finite, not {turnaround}")
         self.node = node
         self.counters = SlaveCounters()
         self._encode = codec.encode
@@ -102,7 +100,7 @@ class SlaveEngine:
         self._due = 0.0
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that are on the line."""
+        """Process bytes received from the line."""
         if self._echo.active:
             data = self._echo.cancel(data)
         self._last = data[-1:]
@@ -116,7 +114,7 @@ class SlaveEngine:
     def _heard(self, request: Framed, now: float) -> None:
         if self._echo.active and self._echo.is_own(self._encode(request)):
             return
-        if self._answer:  # the asker has given up on it, or there would be silence
+        if self._answer:  # the master no longer waits for it, as it sends again
             self.counters.replaced += 1
             self._answer = b""
         address = address_of(request)
@@ -137,7 +135,7 @@ class SlaveEngine:
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
 
     def bytes_to_send(self, now: float) -> bytes:
-        """Return the answer that is due."""
+        """Return the answer if it is due."""
         answer = self._answer
         if not answer or now < self._due:
             return b""
@@ -148,5 +146,5 @@ class SlaveEngine:
         return answer
 
     def next_timer(self) -> float | None:
-        """Return when an answer is due, None where none waits."""
+        """Return when an answer is due, None without an answer."""
         return self._due if self._answer else None

@@ -1,4 +1,4 @@
-"""What is asked, and what came of it."""
+"""Requests to an engine, and their outcome."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from qlinkgen.link.timing import Timing
 
 @final
 class Packet(NamedTuple):
-    """A request to the device at a host port, and how it is to be sent."""
+    """A request to the device at a host port, and how to send it."""
 
     request: Framed
-    #: Request that must be in force before, None where it does not matter.
+    #: Context request that must be in force before; None if it does not matter.
     context: Framed | None = None
-    #: Read the checksum; None: as the engine does with this command.
+    #: Whether to read the checksum; None: the engine's setting for this command.
     check: bool | None = None
 
 
-#: What an engine may be asked.
+#: A request of a master or a host.
 Question = Framed | Packet
 
 
 class Reply(NamedTuple):
-    """The outcome of a transaction that did not fail."""
+    """The outcome of a successful transaction."""
 
-    #: None where nothing answers.
+    #: None for a request without a response.
     response: Any  # the class that the request asks for; the calls of a generated bus module name it
-    #: How often the request was sent.
+    #: Number of transmissions of the request.
     attempts: int
     #: Seconds from the call to the answer.
     elapsed: float
-    #: When the answer came; where nothing answers, when the request was sent.
+    #: Time of the answer; for a request without a response, the time of sending.
     at: float
     #: Seconds from sending the last attempt to the answer.
     response_time: float
 
 
-#: Whether a response is acceptable for a request, where more is known than its shape.
+#: An additional rule whether a response matches a request.
 Accepts = Callable[[Any, Any], bool]  # Any: a request and a response of the classes of one command
 
 
 class CommandTiming:
-    """What is known of a command before it is asked: looked up once, not in each transaction."""
+    """Response and deadlines of a command, computed once instead of for each transaction."""
 
     __slots__ = (
         "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "response",
@@ -64,9 +64,9 @@ class CommandTiming:
 
 
 def settled(outcome: Reply | LinkError | None) -> Reply:
-    """Return the outcome of a transaction that has ended, or raise it."""
+    """Return the reply of a finished transaction, or raise its error."""
     if isinstance(outcome, LinkError):
         raise outcome
     if outcome is None:
-        raise RuntimeError("no transaction has ended")
+        raise RuntimeError("no finished transaction")
     return outcome

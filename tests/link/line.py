@@ -1,4 +1,4 @@
-"""A line that is a script: bytes at times, and what an engine makes of them."""
+"""A scripted line: bytes at given times, and the events of an engine."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def make(
 
 @dataclass
 class Run:
-    """One transaction as it went."""
+    """The course of one transaction."""
 
     reply: Reply | None = None
     error: LinkError | None = None
@@ -70,7 +70,7 @@ def drive(
     trial: bool = False,
     limit: int = 10_000,
 ) -> Run:
-    """Do one transaction while bytes arrive at given times; the engine is called at each of its timers.
+    """Perform one transaction while bytes arrive at given times; the engine is called at each of its timers.
 
     As drivers do, what came before is read when the transaction begins.
     """
@@ -103,27 +103,27 @@ def drive(
 
 
 def pieces(data: bytes, at: float, size: int = 1, every: float = BYTE) -> list[tuple[float, bytes]]:
-    """Data cut into pieces that arrive one behind the other."""
+    """Data cut into pieces that arrive one after the other."""
     cuts = range(0, len(data), size)
     return [(at + every * place, data[cut : cut + size]) for place, cut in enumerate(cuts)]
 
 
 def changed(data: bytes, index: int, mask: int = 0x40) -> bytes:
-    """Data with one byte that is another."""
+    """Data with one byte changed."""
     out = bytearray(data)
     out[index] ^= mask
     return bytes(out)
 
 
 def taken(engine: MasterEngine) -> list[Event]:
-    """The events so far, taken out of the engine."""
+    """Remove and return the events so far."""
     events = list(engine.events)
     engine.events.clear()
     return events
 
 
 class Node:
-    """A station of little brain: `answer` says what it returns to a request."""
+    """A simple node: `answer` returns the response to a request."""
 
     def __init__(self, number: int, answer: Callable[[Any], Any] | None = None) -> None:
         self.number = number
@@ -135,7 +135,7 @@ class Node:
         return self._answer(request)
 
     def usual(self, request: Any) -> Any:
-        """What a node returns whose state is of no interest."""
+        """Return the response of a node without state."""
         node, kind = self.number, type(request)
         if kind is qlink.MotionRequest:
             return qlink.MotionResponse(node=node, counter=request.counter, fifo_space=200)
@@ -166,7 +166,7 @@ def bus(*numbers: int, **options: Any) -> tuple[Wire, VirtualPort, list[Node]]:
 
 
 def ends_in_mark(make_response: Callable[[int], Any]) -> Any:
-    """The first of many messages whose checksum ends in A5, so that one more byte follows it on the wire."""
+    """The first message whose checksum ends in A5, so that one more byte follows it on the wire."""
     return next(
         message
         for number in range(1 << 16)
@@ -174,7 +174,7 @@ def ends_in_mark(make_response: Callable[[int], Any]) -> Any:
     )
 
 
-#: Arguments that a request must be given.
+#: Required arguments of requests.
 NEEDED: dict[str, dict[str, Any]] = {
     "motor_request": {"motor_data": b"?"},
     "read": {"size": 2},
@@ -184,6 +184,6 @@ NEEDED: dict[str, dict[str, Any]] = {
 
 
 def request_of(command: Any, node: int = 3) -> Any:
-    """A request of a command, to a node where one can be asked."""
+    """A request of a command, to a node if it has an address."""
     address = 0 if command.addressing == "broadcast" else node
     return command.request(node=address, **NEEDED.get(command.name, {}))

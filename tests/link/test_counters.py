@@ -1,4 +1,4 @@
-"""Each counter stands beside the event that causes it."""
+"""Each counter agrees with the events that it counts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ GOT = qlink.MotorPositionResponse(node=3).to_frame()
 
 
 def recounted(events: list[Event]) -> LinkCounters:  # noqa: C901  # a table
-    """The counters that a run of events makes."""
+    """The counters computed from events."""
     total = LinkCounters()
     broken = False
     for event in events:
@@ -93,11 +93,11 @@ def test_sums_over_a_bad_line(seed: int, echo: Any) -> None:
             outcomes["answered" if reply.response is not None else "told"] += 1
         except LinkError:
             outcomes["failed"] += 1
-            port.sleep(0.005)  # where every node is offline, nothing else would let time pass
+            port.sleep(0.005)  # with all nodes offline, time does not advance otherwise
     assert not engine.busy
     expected = recounted(events).as_dict()
     counted = engine.total.as_dict()
-    del counted["skipped"], expected["skipped"]  # bytes of no frame are only counted
+    del counted["skipped"], expected["skipped"]  # bytes outside frames have no event
     assert counted == expected
     assert counted["answers"] == outcomes["answered"] > 0
     assert int(str(counted["failures"])) + int(str(counted["refused"])) == outcomes["failed"] > 0

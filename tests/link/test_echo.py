@@ -1,4 +1,4 @@
-"""Two-wire adapters that hand back what is sent: whole, in pieces, in part, changed, or not at all."""
+"""Two-wire adapters that echo sent bytes: whole, in pieces, in part, changed, or not at all."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SENT = ASK.to_frame()
 GOT = ANSWER.to_frame()
 DEADLINE = 27 * BYTE + SLACK
 
-#: Requests that a good answer equals to the last bit, or may.
+#: Requests whose answers are, or may be, the same bytes.
 AMBIGUOUS = [
     (qlink.NodeResetRequest(node=3), qlink.NodeResetResponse(node=3)),
     (qlink.ClearFifoRequest(node=3), qlink.ClearFifoResponse(node=3)),
@@ -67,7 +67,7 @@ class TestExpected:
         engine = make(echo="expect", slack=0.02)
         run = once(ASK, *(part for _, part in pieces(SENT, 0.0, size)), engine=engine)
         assert isinstance(run.error, NoReply)
-        assert run.error.received == b""  # the echo is nothing that came
+        assert run.error.received == b""  # the echo is not part of the received bytes
         assert engine.total.missing_echoes == engine.total.collisions == 0
 
     @pytest.mark.parametrize("size", [1, 2, 100])
@@ -108,7 +108,7 @@ class TestExpected:
         arrivals = [(at, changed(SENT, 4)) for at in (0.002, 0.046, 0.09)]
         run = drive(engine, ASK, arrivals)
         assert isinstance(run.error, Collision)
-        assert "came back changed" in str(run.error)
+        assert "echo of the request was changed" in str(run.error)
         assert run.error.attempts == 3
         assert engine.counters[3].collisions == 3
         assert engine.counters[3].missing_echoes == 0
@@ -138,7 +138,7 @@ class TestExpected:
 
 @ambiguous
 class TestAmbiguousCommands:
-    """The echo is never taken for the answer, however it comes."""
+    """The echo is never taken for the answer, in any chunks."""
 
     def test_nothing_but_the_echo(self, request_: Any, response: Any) -> None:
         assert response.to_frame() == request_.to_frame()
@@ -179,7 +179,7 @@ class TestAmbiguousCommands:
             assert isinstance(once(request_, changed(frame, index)).error, LinkError)
 
     def test_the_echo_of_a_broadcast_that_is_late(self, request_: Any, response: Any) -> None:
-        """An adapter holds bytes back, and the broadcast's echo comes behind the next request."""
+        """An adapter holds bytes back, and the broadcast's echo arrives after the next request."""
         for size in (1, 4, 100):
             sync = qlink.NodeSyncRequest(node=0, counter=5)
             frame = request_.to_frame()
@@ -287,7 +287,7 @@ class TestBroadcasts:
 
 
 class TestAuto:
-    """Two bytes of zero before the first request show what the adapter does."""
+    """Two zero bytes before the first request detect the echo."""
 
     UNTIL = 2 * BYTE + 3 * BYTE + SLACK
 
@@ -296,8 +296,8 @@ class TestAuto:
         [
             ([(0.0005, PROBE)], True),
             ([(0.0005, b"\x00"), (0.0006, b"\x00")], True),
-            ([(0.0005, b"\x00")], True),  # the adapter's receiver was switched on too late
-            ([(0.0005, b"\xff\x00\x00")], True),  # switching it on made a spike
+            ([(0.0005, b"\x00")], True),  # the adapter enabled its receiver too late
+            ([(0.0005, b"\xff\x00\x00")], True),  # enabling it caused a spike
             ([(0.0004, b"\xff"), (0.0005, b"\x00\x00")], True),
             ([(0.0004, b"\xff"), (0.0005, b"\x00"), (0.0006, b"\x00")], True),
             ([], False),
@@ -315,7 +315,7 @@ class TestAuto:
         echo = SENT if found else b""
         again = drive(engine, ASK, [(1.0018, echo + GOT)], now=1.0, attempts=1)
         assert again.response == ANSWER
-        assert again.frames == [SENT]  # asked once and for all
+        assert again.frames == [SENT]  # the probe is sent only once
         assert engine.total.partial_echoes == 0
 
     def test_the_first_request_waits_for_it(self) -> None:

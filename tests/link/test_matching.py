@@ -1,4 +1,4 @@
-"""Which frame is the answer to a question, and which is not."""
+"""Which frames answer a request, and which do not."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ THEN = 0.0075
 
 
 def answered(request: Any, *responses: Any, paced: bool = True) -> Any:
-    """The response that a master takes, None where it takes none."""
+    """The response that a master accepts, None if it accepts none."""
     engine = make(slack=0.01, paced=paced)
     run = drive(engine, request, [(THEN, response.to_frame()) for response in responses], attempts=1)
     assert (run.reply is None) == (engine.total.answers == 0)
@@ -50,7 +50,7 @@ class TestEveryCommand:
 
 
 class TestEchoes:
-    """What an answer has to repeat."""
+    """Fields that an answer has to repeat."""
 
     def test_the_counter_of_a_motion(self) -> None:
         request = qlink.MotionRequest(node=3, counter=200)
@@ -124,7 +124,7 @@ def _crc(body: bytes) -> bytes:
 
 
 class TestEarly:
-    """On a paced line nothing that is complete before the request has left can be its answer."""
+    """On a paced line a frame complete before the request was transmitted is not its answer."""
 
     REQUEST = qlink.LoopBackRequest(node=3, data=bytes(25))
     RESPONSE = qlink.LoopBackResponse(node=3, data=bytes(25))

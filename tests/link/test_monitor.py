@@ -1,4 +1,4 @@
-"""Both directions of a bus in one stream, and who said what."""
+"""Both directions of a bus in one stream, with senders and receivers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def monitor(codec: Any = qlink) -> Monitor:
 
 
 def heard(*stream: tuple[float, Any], finish: bool = False) -> list[Any]:
-    """What a monitor makes of messages and bytes at given times."""
+    """The events of a monitor for messages and bytes at given times."""
     listener = monitor()
     for at, part in stream:
         listener.receive(part if isinstance(part, bytes) else part.to_frame(), at)
@@ -315,7 +315,7 @@ def test_other_protocols(name: str) -> None:
 
 
 def test_frames_that_were_hidden_in_a_false_one_are_all_told() -> None:
-    """Without stuffing a false beginning may claim several frames, which come to light at the same byte."""
+    """Without stuffing a false start may cover several frames, which are found at the same byte."""
     codec = module("kitchen_sink")
     request, news = (
         build("kitchen_sink", protocol("kitchen_sink").by_name[f"{name}.request"])

@@ -1,4 +1,4 @@
-"""A late answer never answers the next question: the line has to be quiet first, for a limited time."""
+"""A late answer never answers the next request: the line has to be quiet first, for a limited time."""
 
 from __future__ import annotations
 

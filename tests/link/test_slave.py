@@ -1,4 +1,4 @@
-"""One node: what it hears of all that is on the line, and when it answers."""
+"""One node: the requests that it decodes, and when it answers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def slave(answer: Any = None, *, turnaround: float = 0.0) -> tuple[SlaveEngine, 
 
 
 def heard(*frames: Any, answer: Any = None) -> tuple[bytes, SlaveEngine, Node]:
-    """What a slave sends after it has heard some messages."""
+    """The bytes that a slave sends after some messages."""
     engine, node = slave(answer)
     for frame in frames:
         engine.receive(frame if isinstance(frame, bytes) else frame.to_frame(), 0.0)
@@ -111,7 +111,7 @@ class TestTurnaround:
 
     @pytest.mark.parametrize("bad", [-0.001, float("inf"), float("nan")])
     def test_bad(self, bad: float) -> None:
-        with pytest.raises(ValueError, match=f"turnaround: {bad}"):
+        with pytest.raises(ValueError, match=f"turnaround must be .* not {bad}"):
             slave(turnaround=bad)
 
     @pytest.mark.parametrize(
@@ -123,11 +123,11 @@ class TestTurnaround:
             qlink.NodeStartRequest(node=3),  # a request that nothing answers
         ],
     )
-    def test_an_answer_that_nobody_waits_for_any_more_is_not_sent(self, other: Any) -> None:
+    def test_a_superseded_answer_is_not_sent(self, other: Any) -> None:
         engine, _ = slave(turnaround=0.001)
         engine.receive(ASK.to_frame(), 0.0)
         engine.receive(other.to_frame(), 0.0005)
-        replaced = not isinstance(other, qlink.MotorPositionResponse)  # which is no request, and not heard
+        replaced = not isinstance(other, qlink.MotorPositionResponse)  # not a request, so not decoded
         assert engine.counters.replaced == replaced
         assert (engine.bytes_to_send(1.0) == b"") == replaced
 
@@ -228,7 +228,7 @@ AMBIGUOUS = [
 
 
 class TestEcho:
-    """A two-wire adapter hands an answer back, and some answers are the same bytes as their requests."""
+    """A two-wire adapter echoes an answer, and some answers are the same bytes as their requests."""
 
     @pytest.mark.parametrize("request_", AMBIGUOUS, ids=lambda request: request.NAME)
     @pytest.mark.parametrize("size", [1, 4, 99])

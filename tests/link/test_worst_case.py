@@ -1,4 +1,4 @@
-"""Whatever is on the line: each call ends within its worst case."""
+"""Each call ends within its worst case, for any traffic on the line."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ garbage = st.one_of(
     st.builds(lambda frame, end: frame[:end], st.sampled_from(FRAMES), st.integers(1, 60)),
 )
 gaps = st.one_of(st.floats(0.0002, 0.05), st.sampled_from([0.0001, 0.002, 0.0021, 0.00226, 0.02]))
-#: What comes, over and over, each so long after the one before.
+#: Received bytes, repeated endlessly, with the pause before each.
 streams = st.lists(st.tuples(gaps, garbage), max_size=8)
-#: What is asked, after how long a pause, how often, and whether it is given up after so many steps.
+#: Requests, with the pause before, the attempts, and the number of steps before an abort.
 calls = st.lists(
     st.tuples(
         st.integers(0, len(REQUESTS) - 1),
@@ -79,14 +79,14 @@ class Session:
         self.next = next(self.arrivals)
 
     def pause(self, seconds: float) -> None:
-        """What comes while nothing is asked is read before the next request, as drivers do."""
+        """Bytes received between transactions are read before the next request, as drivers do."""
         self.now += seconds
         while self.next[0] <= self.now:
             self.engine.receive(self.next[1], self.now)
             self.next = next(self.arrivals)
 
     def ask(self, request: Any, attempts: int | None, steps: int | None) -> int:
-        """Ask, and give up after some steps if told so; returns the number of steps."""
+        """Perform a transaction, or abort it after some steps; return the number of steps."""
         engine, begun = self.engine, self.now
         command = next(each for each in engine.codec.COMMANDS.values() if each.request is type(request))
         worst = engine.timing.worst_case(command, attempts)

@@ -191,10 +191,10 @@ def test_the_transmit_buffer_has_an_end() -> None:
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        ({"baud": 0}, "baud: 0 was given"),
-        ({"patience": 0.0}, "patience: 0.0 s was given"),
-        ({"patience": float("inf")}, "patience: inf s was given"),
-        ({"room": 259}, "room: 259 was given; a message takes up to 260 bytes"),
+        ({"baud": 0}, "baud must be bits per second"),
+        ({"patience": 0.0}, "patience must be above 0 s and finite, not 0.0"),
+        ({"patience": float("inf")}, "patience must be above 0 s and finite, not inf"),
+        ({"room": 259}, "room must be 260 or more, the longest message, not 259"),
     ],
 )
 def test_wrong_arguments(options: dict[str, Any], complaint: str) -> None:
