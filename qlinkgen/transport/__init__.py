@@ -1,7 +1,7 @@
-"""Ports: bytes in and out of real lines, ptys and memory.
+"""Ports: byte streams over serial lines, ptys and memory.
 
-`open_port` opens a device or URL, `open_pty` makes a port for another program to open, `memory_pair` joins
-two ends in this process. All are a `Port`, and fail with the `PortError` family of `qlinkgen.errors`.
+`open_port` opens a device or URL, `open_pty` makes a port for another program to open, `memory_pair` connects
+two ends in this process. All are a `Port`, and raise the `PortError` family of `qlinkgen.errors`.
 """
 
 from qlinkgen.transport.memory import MemoryPort, memory_pair, memory_ring

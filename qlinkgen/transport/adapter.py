@@ -1,6 +1,6 @@
-"""What the kernel tells about the hardware behind a terminal: driver, latency, whether bytes take time.
+"""Reads the kernel's information on the hardware of a terminal: driver, latency, pacing.
 
-Everything here is looked up, nothing is changed. Linux tells; elsewhere all of it is unknown.
+Nothing is changed. The information is available on Linux; elsewhere all of it is unknown.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from pathlib import Path
 
 from qlinkgen.transport.port import Ability
 
-#: Where the kernel shows its devices.
+#: The kernel's list of terminals.
 SYSFS = Path("/sys")
 
-#: Where the processor is described; a virtual one says so.
+#: Description of the processor, which tells a virtual machine.
 CPUINFO = Path("/proc/cpuinfo")
 
 #: Major numbers of the slave ends of ptys: Unix98 and, long ago, BSD (Documentation/admin-guide/devices.txt).
 _PTY_MAJORS = frozenset({3, *range(136, 144)})
 
-#: Drivers of adapters that always have a UART behind them; cdc_acm, for one, often has none.
+#: Drivers of adapters that always have a UART; cdc_acm, for example, often has none.
 _UART_BRIDGES = frozenset(
     {
         "ark3116",
@@ -40,25 +40,26 @@ _UART_BRIDGES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Adapter:
-    """What is behind a terminal.
+    """The hardware of a terminal.
 
     Attributes:
-        driver: the kernel's driver, such as `ftdi_sio`; empty where it is not known.
-        latency: most seconds that received bytes are held back, None where the driver does not tell.
-        source: where that number comes from, or why there is none.
-        paced: bytes take their time on a line.
+        driver: the kernel's driver, such as `ftdi_sio`; empty if unknown.
+        latency: longest time in seconds that received bytes are held back, None if the driver does not report
+            it.
+        source: source of that number, or why it is unknown.
+        paced: bytes are transmitted at the baud rate.
     """
 
     driver: str = ""
     latency: float | None = None
-    source: str = "this system does not tell"
+    source: str = "not available on this system"
     paced: Ability = Ability.UNKNOWN
 
 
 def look_up(descriptor: int) -> Adapter:
-    """Return what is known of the open terminal.
+    """Return the hardware of an open terminal.
 
-    It is found by device number, so links such as those in /dev/serial/by-id lead to the same place.
+    It is found by device number, so links such as those in /dev/serial/by-id give the same result.
     """
     if sys.platform != "linux":
         return Adapter()
@@ -67,7 +68,7 @@ def look_up(descriptor: int) -> Adapter:
     if entry.is_dir():
         return _of_device(entry)
     if os.major(number) in _PTY_MAJORS:
-        return Adapter("pty", 0.0, "a pty hands bytes on at once", Ability.NO)
+        return Adapter("pty", 0.0, "a pty delivers bytes immediately", Ability.NO)
     return Adapter()
 
 
@@ -76,7 +77,7 @@ def _of_device(entry: Path) -> Adapter:
     driver = _link_name(entry / "device" / "driver")
     latency = _latency_timer(entry / "device" / "latency_timer")
     if latency is None:
-        source = f"the driver {driver} does not tell" if driver else "no driver is named, so nothing tells"
+        source = f"the driver {driver} does not report it" if driver else "the driver is unknown"
     else:
         source = f"latency_timer of {driver or 'the driver'} (/sys/class/tty/{name}/device/latency_timer)"
     return Adapter(driver, latency, source, _paced(entry, driver))
@@ -90,7 +91,7 @@ def _link_name(link: Path) -> str:
 
 
 def _latency_timer(file: Path) -> float | None:
-    # Milliseconds. Only ftdi_sio has it, and says 1 while low latency is on.
+    # Milliseconds. Only ftdi_sio has it, and reports 1 in low-latency mode.
     try:
         return int(file.read_text("ascii")) / 1000
     except (OSError, ValueError):
@@ -106,7 +107,7 @@ def _paced(entry: Path, driver: str) -> Ability:
 
 
 def _is_virtual() -> bool:
-    # The UART of a virtual machine sends at any baud rate without taking time for it.
+    # The UART of a virtual machine sends immediately at any baud rate.
     try:
         return "hypervisor" in CPUINFO.read_text("ascii", "replace")
     except OSError:

@@ -1,7 +1,7 @@
-"""The driver for asyncio: the same engine, awaited.
+"""The asyncio driver of masters and hosts.
 
-The event loop rounds waits up to a millisecond, so deadlines are kept a little less precisely than by the
-blocking driver.
+The event loop rounds timeouts up to a millisecond, so deadlines are less precise than those of the blocking
+driver.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ _Result = TypeVar("_Result")
 
 
 class AsyncMaster(MasterDriver):
-    """Asks on one bus, from any number of tasks of one event loop: one transaction at a time.
+    """Performs transactions on one bus, for any number of tasks of one event loop, one at a time.
 
     Attributes:
         engine: deadlines, counters, health.
-        port: where it asks.
+        port: the port of the bus.
         on_event: called with each event of the engine, in the loop's thread.
     """
 
@@ -36,15 +36,15 @@ class AsyncMaster(MasterDriver):
         self._lock = asyncio.Lock()
 
     async def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
-        """Ask, and return the answer with the number of attempts and the time that it took.
+        """Send a request, and return the answer with the number of attempts and the time taken.
 
-        A task that is cancelled leaves the bus usable: the next request waits for a quiet line.
+        After the cancellation of a task the bus is usable: the next request waits for a quiet line.
 
         Raises:
-            NoReply: no answer came, or the node is offline and not due yet.
-            BadReply: only damaged or wrong answers came.
-            Collision: the request came back changed.
-            PortLost: the port went away.
+            NoReply: no reply was received, or the node is offline and its trial is not due.
+            BadReply: only corrupt or wrong replies were received.
+            Collision: the echo of the request was changed.
+            PortLost: the port was lost.
             EncodeError: of the generated module; nothing was sent.
         """
         async with self._lock:
@@ -63,16 +63,16 @@ class AsyncMaster(MasterDriver):
     async def run(
         self, procedure: Procedure[Outcome], progress: Callable[[Report], None] | None = None
     ) -> Outcome:
-        """Run a procedure to its end; `progress` is called with what it tells on the way."""
+        """Run a procedure to its end; `progress` is called with each report."""
         runner = Runner(procedure)
-        async with aclosing(self._each(runner)) as reports:  # else it would clean up at some later time
+        async with aclosing(self._each(runner)) as reports:  # so that it cleans up now
             async for report in reports:
                 if progress is not None:
                     progress(report)
         return runner.result
 
     def iterate(self, procedure: Procedure[Outcome]) -> AsyncGenerator[Report, None]:
-        """Run a procedure as an iterator over what it tells; it goes on as the iterator is asked for more."""
+        """Run a procedure as an iterator over its reports; it advances with the iterator."""
         return self._each(Runner(procedure))
 
     async def _each(self, runner: Runner[Outcome]) -> AsyncGenerator[Report, None]:
@@ -106,7 +106,7 @@ class AsyncMaster(MasterDriver):
 
 
 async def read(port: Port, timeout: float) -> bytes:
-    """Read a port without holding up the loop."""
+    """Read a port without blocking the loop."""
     if data := port.read(0):
         return data
     if port.fileno() is None:
@@ -116,7 +116,7 @@ async def read(port: Port, timeout: float) -> bytes:
 
 
 async def sleep(port: Port, seconds: float) -> None:
-    """Let time pass on a port's clock without holding up the loop."""
+    """Sleep on a port's clock without blocking the loop."""
     if port.fileno() is None:  # its clock may be a simulated one
         await _in_thread(port.sleep, seconds)
     else:
@@ -126,11 +126,11 @@ async def sleep(port: Port, seconds: float) -> None:
 def watch(
     port: Port, come: Callable[[], object], closed: Callable[[], object]
 ) -> tuple[int | None, Callable[[], None]]:
-    """Have the running loop call `come` when bytes can be read, and `closed` once the port is closed.
+    """Let the running loop call `come` when bytes can be read, and `closed` once the port is closed.
 
     Returns:
-        The descriptor, None where the port has none and nothing is watched; and a function that ends the
-        watch, after which the port may close its descriptor. It may be called any number of times.
+        The descriptor, None for a port without one, which is not watched; and a function that ends the watch,
+        after which the port may close its descriptor. It may be called any number of times.
     """
     loop = asyncio.get_running_loop()
     thread = threading.get_ident()
@@ -144,7 +144,7 @@ def watch(
         if threading.get_ident() == thread or loop.is_closed():
             end()
             return
-        with suppress(RuntimeError):  # the loop was closed meanwhile, and with it all its watches
+        with suppress(RuntimeError):  # the loop was closed meanwhile, with all its watches
             loop.call_soon_threadsafe(end)
 
     descriptor = held.enter_context(port.hold(wake))
@@ -160,7 +160,7 @@ def _unwatch(loop: asyncio.AbstractEventLoop, descriptor: int) -> None:
 
 
 async def _readable(port: Port, timeout: float) -> None:
-    """Return when bytes can be read, the port is closed, or the time is over."""
+    """Return when bytes can be read, the port is closed, or after the timeout."""
     loop = asyncio.get_running_loop()
     ready: asyncio.Future[None] = loop.create_future()
 
@@ -178,7 +178,7 @@ async def _readable(port: Port, timeout: float) -> None:
 
 
 async def _in_thread(function: Callable[[float], _Result], seconds: float) -> _Result:
-    """Call in a thread; a cancelled caller still waits for it, since a port serves one at a time."""
+    """Call in a thread; a cancelled caller still waits for it, since a port allows one call at a time."""
     call = asyncio.ensure_future(asyncio.to_thread(function, seconds))
     cancelled: asyncio.CancelledError | None = None
     while not call.done():
@@ -187,6 +187,6 @@ async def _in_thread(function: Callable[[float], _Result], seconds: float) -> _R
         except asyncio.CancelledError as error:
             cancelled = error
     if cancelled is not None:
-        call.exception()  # looked at, so that asyncio does not complain of it
+        call.exception()  # retrieved, so that asyncio does not log it
         raise cancelled
     return call.result()

@@ -1,4 +1,4 @@
-"""The blocking driver: calls that return when the answer is there. The precise one of the two."""
+"""The blocking driver of masters and hosts; its deadlines are more precise than those of asyncio."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from qlinkgen.transport.port import Port
 
 
 class BlockingMaster(MasterDriver):
-    """Asks on one bus.
+    """Performs transactions on one bus.
 
-    Any number of threads may use it: a lock of this bus is held for one transaction at a time. Two buses
-    never wait for one another.
+    Any number of threads may use it: a lock of this bus is held during each transaction. Different buses do
+    not wait for one another.
 
     Attributes:
         engine: deadlines, counters, health.
-        port: where it asks.
-        on_event: called with each event of the engine, in the thread that asked.
+        port: the port of the bus.
+        on_event: called with each event of the engine, in the calling thread.
     """
 
     def __init__(self, engine: Asker, port: Port, *, on_event: Callable[[Event], None] | None = None) -> None:
         super().__init__(engine, port, on_event)
-        self._lock = threading.RLock()  # so that on_event may ask in its turn
+        self._lock = threading.RLock()  # reentrant, since on_event may send requests
         self._asking: int | None = None  # the thread that holds it
         tell_of_forks(self)
 
     def transact(self, request: Question, *, attempts: int | None = None, trial: bool = False) -> Reply:
-        """Ask, and return the answer with the number of attempts and the time that it took.
+        """Send a request, and return the answer with the number of attempts and the time taken.
 
         Raises:
-            NoReply: no answer came, or the node is offline and not due yet.
-            BadReply: only damaged or wrong answers came.
-            Collision: the request came back changed.
-            PortLost: the port went away.
+            NoReply: no reply was received, or the node is offline and its trial is not due.
+            BadReply: only corrupt or wrong replies were received.
+            Collision: the echo of the request was changed.
+            PortLost: the port was lost.
             EncodeError: of the generated module; nothing was sent.
         """
         port = self.port
@@ -60,7 +60,7 @@ class BlockingMaster(MasterDriver):
                 self._asking = outer
 
     def after_fork(self) -> None:
-        """Give up a transaction of another thread, which does not exist in a forked child."""
+        """Abort a transaction of another thread, which does not exist in a forked child."""
         self._lock = threading.RLock()
         if self._asking not in {None, threading.get_ident()}:
             self._asking = None
@@ -68,7 +68,7 @@ class BlockingMaster(MasterDriver):
                 self.engine.abort(self.port.now())
 
     def run(self, procedure: Procedure[Outcome], progress: Callable[[Report], None] | None = None) -> Outcome:
-        """Run a procedure to its end; `progress` is called with what it tells on the way."""
+        """Run a procedure to its end; `progress` is called with each report."""
         runner = Runner(procedure)
         try:
             while runner.advance():
@@ -80,7 +80,7 @@ class BlockingMaster(MasterDriver):
             runner.close()
 
     def iterate(self, procedure: Procedure[Outcome]) -> Generator[Report, None, Outcome]:
-        """Run a procedure as an iterator over what it tells; it goes on as the iterator is asked for more."""
+        """Run a procedure as an iterator over its reports; it advances with the iterator."""
         runner = Runner(procedure)
         try:
             while runner.advance():
@@ -92,7 +92,7 @@ class BlockingMaster(MasterDriver):
             runner.close()
 
     def _do(self, runner: Runner[Outcome]) -> Tell | None:
-        """Do what a procedure wants; return what it wants to tell."""
+        """Perform a step of a procedure; return a report."""
         step = runner.wanted
         if isinstance(step, Ask):
             try:

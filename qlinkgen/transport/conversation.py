@@ -1,4 +1,4 @@
-"""What every driver does with an engine and a port, apart from waiting."""
+"""The loop of every driver around an engine and a port, except for waiting."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Question, Reply
 from qlinkgen.transport.port import Ability, Port
 
-#: Where a port cannot say how long it holds bytes back, the slowest of the common adapters is assumed: the
-#: timer of FTDI's is 16 ms unless it is set.
+#: Latency in seconds of a port that does not report it: that of the slowest common adapter, FTDI's default
+#: timer of 16 ms.
 ASSUMED_LATENCY = 0.016
-#: A process that is not of real time may be woken so much later than it asked for.
+#: Wake-up delay of a process without real-time priority.
 WAKE_UP = 0.004
-#: A pty or a socket leads to another program, which may have to wait for a processor before it answers.
+#: Wake-up delay of the program at the other end of a pty or a socket.
 OTHER_PROGRAM = 0.02
-#: What has come since the last transaction is read away before the next; more of it is an endless stream,
-#: which the deadlines deal with.
+#: Most reads that discard bytes received since the last transaction; the deadlines handle an endless stream.
 STALE_READS = 16
 
 
@@ -33,7 +32,7 @@ def host_slack(port: Port) -> float:
 
 
 def timing_of(codec: Module, port: Port, *, slack: float | None = None, attempts: int = 3) -> Timing:
-    """Make the timing of a protocol on a port; `slack` replaces what the port says of itself."""
+    """Make the timing of a protocol on a port; `slack` replaces the value derived from the port."""
     return Timing.of(
         codec,
         baud=port.baud,
@@ -44,11 +43,11 @@ def timing_of(codec: Module, port: Port, *, slack: float | None = None, attempts
 
 
 class Asker(Protocol):
-    """What a driver needs of an engine that asks: `MasterEngine` on a bus, `HostEngine` at a host port."""
+    """The interface of engines that send requests: `MasterEngine` on a bus, `HostEngine` at a host port."""
 
-    #: What happened, oldest first.
+    #: Events, oldest first.
     events: deque[Event]
-    #: Whether the events tell of every request and answer.
+    #: Whether every request and answer is an event.
     verbose: bool
 
     @property
@@ -58,7 +57,7 @@ class Asker(Protocol):
 
     @property
     def total(self) -> LinkCounters:
-        """Counts of what happened."""
+        """Counts of requests, answers and faults."""
         ...
 
     def start(self, request: Question, now: float, *, attempts: int | None, trial: bool) -> None:
@@ -66,36 +65,36 @@ class Asker(Protocol):
         ...
 
     def bytes_to_send(self, now: float) -> bytes:
-        """Return what is to be written now."""
+        """Return the bytes to write now."""
         ...
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that came."""
+        """Process received bytes."""
         ...
 
     def next_timer(self) -> float | None:
-        """Return when to call again, None where the transaction is over."""
+        """Return the time of the next call, None after the transaction."""
         ...
 
     def handle_timer(self, now: float) -> None:
-        """Do what is due."""
+        """Process expired timers."""
         ...
 
     def take(self) -> Reply:
-        """Return the outcome, or raise it."""
+        """Return the reply, or raise the error."""
         ...
 
     def abort(self, now: float) -> None:
-        """Give the transaction up."""
+        """Abort the transaction."""
         ...
 
 
 class MasterDriver:
-    """What the drivers have in common.
+    """Base class of the drivers.
 
     Attributes:
         engine: deadlines, counters, health.
-        port: where it asks.
+        port: the port of the bus.
     """
 
     def __init__(self, engine: Asker, port: Port, on_event: Callable[[Event], None] | None) -> None:
@@ -105,7 +104,7 @@ class MasterDriver:
 
     @property
     def on_event(self) -> Callable[[Event], None] | None:
-        """Function that is called with each event, by the thread or task that asks; None: nobody is told."""
+        """Function called with each event, in the calling thread or task; None to discard events."""
         return self._on_event
 
     @on_event.setter
@@ -129,9 +128,9 @@ class MasterDriver:
 def conversation(
     engine: Asker, port: Port, request: Question, attempts: int | None, *, trial: bool
 ) -> Generator[float, bytes, Reply]:
-    """One transaction: yields how long to wait for bytes, is sent those that came.
+    """Perform one transaction: yields the timeout of a read, takes the bytes read.
 
-    Closed before its end it gives the transaction up; the next one then waits for a quiet line.
+    Closing it early aborts the transaction; the next one then waits for a quiet line.
     """
     now = port.now()
     for _ in range(STALE_READS):

@@ -1,4 +1,4 @@
-"""Why a port could not be opened, in words that say what to do."""
+"""Errors of opening a port, with their cause and fix."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from qlinkgen.errors import PortBusy, PortError, PortMissing
 if sys.platform != "win32":
     import grp
 
-#: Where the kernel shows its processes.
+#: The kernel's list of processes.
 PROC = Path("/proc")
 
 _BUSY = {errno.EBUSY, errno.EAGAIN}
@@ -27,7 +27,7 @@ _URLS = "write socket://HOST:PORT for plain TCP, or rfc2217://HOST:PORT for a se
 
 
 def explain(name: str, error: Exception) -> PortError:
-    """Turn what pyserial or the system raised when `name` was opened into an error of ours."""
+    """Convert an error of pyserial or the system on opening `name` to a PortError."""
     if "://" in name:
         return _explain_url(name, error)
     number = _errno(error)
@@ -38,18 +38,18 @@ def explain(name: str, error: Exception) -> PortError:
     if number in _MISSING:
         return missing(name)
     if number in _NO_TERMINAL:
-        return PortError(f"{name} is no serial port; {_ports_here()}", port=name)
+        return PortError(f"{name} is not a serial port; {_ports_here()}", port=name)
     return PortError(f"{name} cannot be opened: {_words(error)}; {_ports_here()}", port=name)
 
 
 def _errno(error: Exception) -> int | None:
-    # pyserial keeps the number sometimes, and sometimes only the error that it was handling.
+    # pyserial sets the number, or only the context.
     for each in (error, error.__context__):
         if isinstance(each, OSError) and each.errno is not None:
             return each.errno
         if each is not None and type(each).__module__ == "termios" and each.args:
             return int(each.args[0])
-    # On Windows only the text tells.
+    # On Windows only the text has it.
     text = str(error)
     named = {"PermissionError": errno.EBUSY, "FileNotFoundError": errno.ENOENT}
     return next((number for word, number in named.items() if word in text), None)
@@ -72,25 +72,23 @@ def _explain_url(name: str, error: Exception) -> PortError:
 
 
 def check_url(name: str) -> None:
-    """Refuse a network's URL without host or port: pyserial fails over them in words that help nobody."""
+    """Refuse a network URL without host or port, for which pyserial's error is unclear."""
     parts = urlsplit(name)
     if parts.scheme not in {"socket", "rfc2217"}:
         return
     try:
         complete = bool(parts.hostname) and parts.port is not None
-    except ValueError:  # a port that is no number, or too large
+    except ValueError:  # the port is not a number, or too large
         complete = False
     if not complete:
         raise PortError(f"{name} has no host and port (1 to 65535); {_URLS}", port=name)
 
 
 def missing(name: str) -> PortMissing:
-    """Return the error for a port that is not there, with those that are."""
-    what = (
-        f"there is no port {name!r}" if not os.path.lexists(name) else f"there is no hardware behind {name}"
-    )
+    """Return the error for a missing port, with a list of existing ones."""
+    what = f"port {name!r} does not exist" if not os.path.lexists(name) else f"{name} has no hardware"
     if Path(name).is_symlink() and not Path(name).exists():
-        what = f"{name} leads to {Path(name).readlink()}, which is not there"
+        what = f"{name} is a link to {Path(name).readlink()}, which does not exist"
     return PortMissing(f"{what}; {_ports_here()}", port=name)
 
 
@@ -101,17 +99,15 @@ def _ports_here() -> str:
         each.device + (f" ({each.description})" if each.description not in {None, "", "n/a"} else "")
         for each in sorted(list_ports.comports())
     ]
-    return (
-        f"ports here: {', '.join(ports)}" if ports else "no serial port is here: is the adapter plugged in?"
-    )
+    return f"available ports: {', '.join(ports)}" if ports else "no serial ports found: connect the adapter"
 
 
 def busy(name: str) -> PortBusy:
-    """Return the error for a port that another program has, with that program where it can be found out."""
+    """Return the error for a port in use, with the name of the program if it can be determined."""
     who = holders(name)
     if who:
         return PortBusy(f"{name} is in use by {', '.join(who)}; end it, or use another port", port=name)
-    return PortBusy(f"{name} is in use by another program; `sudo fuser -v {name}` says by which", port=name)
+    return PortBusy(f"{name} is in use by another program; find it with `sudo fuser -v {name}`", port=name)
 
 
 def _forbidden(name: str) -> PortBusy:
@@ -122,7 +118,7 @@ def _forbidden(name: str) -> PortBusy:
         group = grp.getgrgid(state.st_gid).gr_name
     except KeyError:
         group = str(state.st_gid)
-    why = f"this user may not open {name} ({stat.filemode(state.st_mode)}, group {group})"
+    why = f"no permission to open {name} ({stat.filemode(state.st_mode)}, group {group})"
     if state.st_mode & stat.S_IRGRP and state.st_mode & stat.S_IWGRP and state.st_gid:
         return PortBusy(f"{why}; `sudo usermod -aG {group} $USER`, then log out and in again", port=name)
     fix = 'a udev rule with GROUP="dialout", MODE="0660" opens it to the members of dialout'
@@ -130,33 +126,33 @@ def _forbidden(name: str) -> PortBusy:
 
 
 def holders(name: str) -> list[str]:
-    """Return the programs that hold a port, as far as this user may know, such as `minicom (process 812)`."""
+    """Return the programs that hold a port, if visible to this user, such as `minicom (process 812)`."""
     numbers = _lockers(name) or _openers(name)
     return [f"{_program(number)} (process {number})" for number in numbers]
 
 
 def _lockers(name: str) -> list[int]:
-    """Processes with a lock on the device file. Every user may read this list."""
+    """Return the processes with a lock on the device file. Every user may read this list."""
     try:
         state = Path(name).stat()
         locks = (PROC / "locks").read_text("ascii").splitlines()
     except OSError:
         return []
     file = f"{os.major(state.st_dev):02x}:{os.minor(state.st_dev):02x}:{state.st_ino}"
-    # Such as "1: FLOCK  ADVISORY  WRITE 812 00:18:3 0 EOF"; -1 is a process that cannot be seen from here.
+    # Such as "1: FLOCK  ADVISORY  WRITE 812 00:18:3 0 EOF"; -1 is an invisible process.
     rows = [line.split() for line in locks]
     return sorted({int(row[4]) for row in rows if row[5:6] == [file] and row[4].isdigit()})
 
 
 def _openers(name: str) -> list[int]:
-    """Processes that have the device open, of those that this user may look into."""
+    """Return the processes that have the device open, among those visible to this user."""
     device = os.path.realpath(name)
     found = []
     for folder in PROC.glob("[0-9]*/fd"):
         try:
             if any(os.path.realpath(link) == device for link in folder.iterdir()):
                 found.append(int(folder.parent.name))
-        except OSError:  # not ours, or gone meanwhile
+        except OSError:  # not permitted, or ended meanwhile
             continue
     return sorted(found)
 

@@ -1,7 +1,7 @@
 """Objects with locks in a process that forks.
 
-A lock that another thread holds during a fork stays held in the child for ever, because that thread does not
-exist there. Such objects are told in the child, before anything else runs, and make new locks.
+A lock held by another thread during a fork stays locked in the child, because that thread does not exist
+there. `after_fork` of such objects is called in the child before anything else, and makes new locks.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from weakref import WeakSet
 
 
 class Forkable(Protocol):
-    """An object that has to know that it is in a forked child."""
+    """An object that must be notified in a forked child."""
 
     def after_fork(self) -> None:
-        """Forget the other threads. Called in the child, by its only thread."""
+        """Discard the state of other threads. Called in the child, by its only thread."""
 
 
 _alive: WeakSet[Forkable] = WeakSet()

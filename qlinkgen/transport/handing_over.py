@@ -1,4 +1,4 @@
-"""How a thread of ours ends when something fails in it: no traceback, and the failure is not lost."""
+"""Passes an exception of a background thread to the thread that uses it, without a traceback on stderr."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from types import TracebackType
 
 
 class HandOver:
-    """Gives whatever ends a block to a function, which keeps it for the thread that can deal with it."""
+    """Passes an exception from the block to a callback and suppresses it."""
 
     def __init__(self, keep: Callable[[BaseException], None]) -> None:
         self._keep = keep

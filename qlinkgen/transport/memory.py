@@ -1,4 +1,4 @@
-"""Two ports joined in this process: a null modem without an operating system."""
+"""Ports connected within this process: a null modem in memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _CAPABILITIES = Capabilities(
 
 
 class _Lane:
-    """Bytes under way in one direction."""
+    """Bytes in transit in one direction."""
 
     __slots__ = ("__weakref__", "changed", "data", "ended")
 
@@ -48,7 +48,7 @@ class MemoryPort(Port):
         self._closed = False
 
     def read(self, timeout: float) -> bytes:
-        """See `Port.read`. What the other end wrote before it closed is read before `PortLost` is raised."""
+        """See `Port.read`. Bytes written before the other end closed are read before `PortLost` is raised."""
         lane = self._incoming
         with lane.changed:
             lane.changed.wait_for(lambda: lane.data or lane.ended, max(timeout, 0.0))
@@ -60,7 +60,7 @@ class MemoryPort(Port):
             return data
 
     def write(self, data: bytes) -> None:
-        """See `Port.write`. Nothing is ever held back, so this does not wait."""
+        """See `Port.write`. The buffer is unlimited, so this does not wait."""
         lane = self._outgoing
         with lane.changed:
             self._check_open()
@@ -88,22 +88,22 @@ class MemoryPort(Port):
 def memory_pair(
     baud: int = 115200, *, names: tuple[str, str] = ("memory:a", "memory:b")
 ) -> tuple[MemoryPort, MemoryPort]:
-    """Return two ports; what is written to one is read from the other, at once.
+    """Return two connected ports; bytes written to one can be read from the other immediately.
 
     Args:
-        baud: speed that both say they have; only arithmetic uses it.
-        names: how error texts call them.
+        baud: nominal speed, used only in arithmetic.
+        names: names in error texts.
     """
     there, back = _Lane(), _Lane()
     return MemoryPort(names[0], baud, back, there), MemoryPort(names[1], baud, there, back)
 
 
 def memory_ring(count: int, baud: int = 115200) -> list[MemoryPort]:
-    """Return ports in a ring: what is written to one is read from the next, from the last from the first.
+    """Return ports in a ring: each writes to the next one, the last to the first.
 
     Args:
-        count: ports, at least 1.
-        baud: speed that all say they have; only arithmetic uses it.
+        count: number of ports, at least 1.
+        baud: nominal speed, used only in arithmetic.
     """
     lanes = [_Lane() for _ in range(count)]
     return [

@@ -1,4 +1,4 @@
-"""The one place where the command line and the protocols open ports."""
+"""Opens ports for the command line and the protocols."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ def open_port(
 
     Args:
         name: see `SerialPort`, also for the other arguments.
-        baud: bits a second.
+        baud: bits per second.
         parity: none, even or odd.
         stop_bits: 1 or 2.
         rs485: let the driver switch an RS485 transceiver.
         direction: function that switches it.
-        low_latency: ask the driver for received bytes at once.
-        reopen: after a loss was raised, open the port again at its next use; see `ReopeningPort`.
+        low_latency: ask the driver to deliver received bytes immediately.
+        reopen: after a reported loss, reopen the port at its next use; see `ReopeningPort`.
 
     Raises:
-        ValueError: an argument is out of its range.
-        PortError: the port cannot be opened as asked: PortMissing, PortBusy, CapabilityMissing.
+        ValueError: an argument is out of range.
+        PortError: the port cannot be opened: PortMissing, PortBusy, CapabilityMissing.
     """
 
     def opener() -> Port:

@@ -1,4 +1,4 @@
-"""What a driver needs of a port: bytes in, bytes out, a clock, and what the port can do."""
+"""The interface of ports: reading, writing, a clock, and capabilities."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from qlinkgen.errors import PortLost
 
 
 class Ability(Enum):
-    """Whether a port can do something. Many can not say, and that is a third answer."""
+    """Whether a port has an ability; unknown for many ports."""
 
     YES = "yes"
     NO = "no"
@@ -27,16 +27,16 @@ class Ability(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a port can do, as found when it was opened.
+    """Capabilities of a port, determined when it was opened.
 
     Attributes:
-        exclusive: other programs are kept out while it is open here. On a pty only those that lock ports too.
-        low_latency: the driver hands bytes on as soon as they come.
+        exclusive: other programs cannot open it meanwhile. On a pty, only those that lock ports too.
+        low_latency: the driver delivers bytes as soon as they are received.
         rs485: the driver switches the direction of an RS485 transceiver.
-        paced: bytes take their time on a line at the baud rate; no on a pty, where they arrive at once.
-        latency: most seconds that driver and adapter hold received bytes back, None where that is unknown.
-        latency_source: where that number comes from, or why there is none, for people.
-        driver: name of the kernel's driver, empty where it is not known.
+        paced: bytes are transmitted at the baud rate; not so on a pty, where they arrive immediately.
+        latency: longest time in seconds that driver and adapter hold received bytes back, None if unknown.
+        latency_source: source of that number, or why it is unknown.
+        driver: name of the kernel's driver, empty if unknown.
     """
 
     exclusive: Ability = Ability.UNKNOWN
@@ -49,13 +49,13 @@ class Capabilities:
 
 
 class Port(ABC):
-    """A byte stream both ways. A port belongs to one driver; it has no lock of its own.
+    """A bidirectional byte stream. A port belongs to one driver and has no lock.
 
     Attributes:
-        name: what the user opened, for error texts.
-        baud: speed of the line in bits a second; on a port that is not paced only the arithmetic uses it.
-        capabilities: what the port can do.
-        own_clock: its time is not the real one, and stands still while nobody reads or sleeps.
+        name: device or URL, for error texts.
+        baud: speed of the line in bits per second; on an unpaced port it only serves arithmetic.
+        capabilities: capabilities of the port.
+        own_clock: the port has a simulated clock, which advances only in `read` and `sleep`.
     """
 
     name: str
@@ -64,47 +64,47 @@ class Port(ABC):
     own_clock: bool = False
 
     def now(self) -> float:
-        """Seconds on the clock of this port; only differences mean anything."""
+        """Return the time of this port's clock in seconds; only differences are meaningful."""
         return time.monotonic()
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass on the clock of this port."""
+        """Sleep on the clock of this port."""
         time.sleep(seconds)
 
     @abstractmethod
     def read(self, timeout: float) -> bytes:
-        """Return what has come, at once if there is anything, else as soon as something comes.
+        """Return received bytes, immediately if there are any, else as soon as some arrive.
 
-        Returns b"" when `timeout` seconds brought nothing; 0 only looks.
+        Returns b"" after `timeout` seconds without a byte; a timeout of 0 polls.
 
         Raises:
-            PortLost: the port went away, or was closed.
+            PortLost: the port was lost or closed.
         """
 
     @abstractmethod
     def write(self, data: bytes) -> None:
-        """Hand all bytes to the system in one go; they may still be on their way when this returns.
+        """Pass all bytes to the system in one call; they may not be transmitted when this returns.
 
         Raises:
-            PortLost: the port went away, or was closed.
+            PortLost: the port was lost or closed.
         """
 
     @abstractmethod
     def close(self) -> None:
-        """Give the port back, whatever other threads do with it. Closing twice does no harm.
+        """Close the port, even while other threads use it. Closing twice is allowed.
 
-        Calls that wait return at once with `PortLost`. A descriptor is closed when the last call has left it.
+        Waiting calls raise `PortLost` immediately. The descriptor is closed after the last of them.
         """
 
     def fileno(self) -> int | None:
-        """Return a descriptor that becomes readable when bytes come, None where there is none.
+        """Return a descriptor that becomes readable when bytes arrive, None for a port without one.
 
         Another thread may close the port at any time; see `hold` for a descriptor to wait on.
         """
         return None
 
     def hold(self, wake: Callable[[], object]) -> AbstractContextManager[int | None]:  # noqa: ARG002
-        """Keep the descriptor, None where there is none, from being closed while a block waits on it.
+        """Keep the descriptor, if the port has one, from being closed while a block waits on it.
 
         Args:
             wake: called by the thread that closes the port meanwhile; the block must then end soon.
@@ -124,5 +124,5 @@ class Port(ABC):
 
 
 def closed_here(name: str) -> PortLost:
-    """Return the error for the use of a port that this program has closed."""
+    """Return the error for using a port that this program has closed."""
     return PortLost(f"{name} was closed here; open it again to use it", port=name)

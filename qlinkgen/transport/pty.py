@@ -1,7 +1,7 @@
-"""A serial port that any program can open, with us at its other end: a pseudo-terminal.
+"""A pseudo-terminal: a serial port that other programs can open, with its other end in this process.
 
-The kernel gives a pty two ends. The slave end has a device name like /dev/pts/7 and behaves like a serial
-port to who opens it; the master end is `PtyPort`. It is used by simulated nodes, and by tests.
+A pty has two ends. The slave end has a device name like /dev/pts/7 and behaves like a serial port; the master
+end is `PtyPort`. It is used by simulated nodes and by tests.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from qlinkgen.transport.stream import CHUNK, DescriptorChannel, StreamPort
 if sys.platform != "win32":
     import tty
 
-#: Where the kernel keeps the slave ends.
+#: Directory of the slave ends.
 _SLAVES = Path("/dev/pts")
 
 _CAPABILITIES = Capabilities(
@@ -28,22 +28,22 @@ _CAPABILITIES = Capabilities(
     rs485=Ability.NO,
     paced=Ability.NO,
     latency=0.0,
-    latency_source="a pty hands bytes on at once",
+    latency_source="a pty delivers bytes immediately",
 )
 
-#: Seconds that a full buffer is given before it is emptied; a reader needs microseconds.
+#: Seconds before a full buffer is emptied; a reader needs microseconds.
 _STALL = 0.05
 
 
 class PtyChannel(DescriptorChannel):
-    """The master end. A line does not wait for listeners: when the buffer is full, what is in it is lost.
+    """The master end. Like a line, it does not wait for a reader: a full buffer is discarded.
 
     Attributes:
-        dropped: bytes that nobody has read.
+        dropped: number of discarded bytes.
     """
 
     def __init__(self, master: int, slave: int) -> None:
-        """Take over both descriptors."""
+        """Take ownership of both descriptors."""
         super().__init__(master, _STALL)
         self._master = master
         self._slave = slave
@@ -54,11 +54,11 @@ class PtyChannel(DescriptorChannel):
         self.dropped += waiting
         if waiting or self._wait(0, writable=True):
             return data
-        self.dropped += len(data)  # a program has stopped the pty, so nothing can be taken out
+        self.dropped += len(data)  # a program has stopped the pty, so its buffer cannot be emptied
         return data[:0]
 
     def _throw_away(self) -> int:
-        # Our own descriptor of the slave end takes from the same buffer as the reader that is missing.
+        # Reading from our descriptor of the slave end empties the buffer in place of the missing reader.
         count = 0
         with contextlib.suppress(BlockingIOError):
             while data := os.read(self._slave, CHUNK):
@@ -77,25 +77,23 @@ class PtyPort(StreamPort):
 
     Attributes:
         path: device name of the slave end.
-        link: symbolic link to it, if one was asked for; removed when the port is closed.
+        link: symbolic link to it, if requested; removed when the port is closed.
     """
 
     def __init__(self, link: str | os.PathLike[str] | None = None, *, baud: int = 115200) -> None:
         """See `open_pty`."""
         if sys.platform == "win32":
             raise CapabilityMissing(
-                "this system has no pty; use memory_pair() or a pair of virtual COM ports"
+                "this system has no ptys; use memory_pair() or a pair of virtual COM ports"
             )
         try:
             master, slave = os.openpty()
         except OSError as error:
-            raise PortError(
-                f"the system gives no pty: {error.strerror}; close some, or raise its limit"
-            ) from error
+            raise PortError(f"cannot open a pty: {error.strerror}; close some, or raise the limit") from error
         path = os.ttyname(slave)
         super().__init__(path if link is None else str(link), baud)
-        # Our own descriptor of the slave end stays open: without one the master would read EIO whenever no
-        # program has the slave end.
+        # Our descriptor of the slave end stays open: otherwise the master would read EIO whenever no program
+        # has the slave end open.
         self._pty = PtyChannel(master, slave)
         self._use(self._pty)
         self.path = path
@@ -115,11 +113,11 @@ class PtyPort(StreamPort):
 
     @property
     def dropped(self) -> int:
-        """Bytes that were thrown away because no program has read them in time."""
+        """Number of bytes discarded because no program has read them in time."""
         return self._pty.dropped
 
     def _unlink(self) -> None:
-        """Remove the link, unless it leads elsewhere by now."""
+        """Remove the link, unless it points elsewhere by now."""
         link, self.link = self.link, None
         with contextlib.suppress(OSError):
             if link is not None and str(link.readlink()) == self.path:
@@ -130,9 +128,10 @@ def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) 
     """Open a new pty and return its master end, raw and without echo.
 
     Args:
-        link: path for a symbolic link to the slave end, so that its name is known beforehand. A link that a
-            killed program has left behind is replaced; anything else is left alone.
-        baud: speed that the port says it has; only arithmetic uses it.
+        link: path for a symbolic link to the slave end, so that its name is known beforehand. A link left by
+            a
+            killed program is replaced; other files are not.
+        baud: nominal speed, used only in arithmetic.
 
     Raises:
         PortError: the link cannot be made; PortBusy: it is that of a running program.
@@ -142,7 +141,7 @@ def open_pty(link: str | os.PathLike[str] | None = None, *, baud: int = 115200) 
 
 
 def _make_link(link: Path, target: str) -> Path:
-    """Put a link in its place in one step, so that there is never a moment without one."""
+    """Create or replace a link atomically."""
     if os.path.lexists(link):
         _check_stale(link, target)
     new = link.with_name(f".{link.name}.{os.urandom(4).hex()}")
@@ -160,17 +159,17 @@ def _make_link(link: Path, target: str) -> Path:
 
 
 def _check_stale(link: Path, target: str) -> None:
-    """Refuse to replace anything but the link of a killed program, whose number `target` may have got."""
+    """Refuse to replace anything but the link of a killed program, whose pty number `target` may reuse."""
     if not link.is_symlink() or (link.exists() and link.resolve().parent != _SLAVES):
         raise PortError(
-            f"{link} is there already and is no link to a pty, so it is left alone; "
+            f"{link} exists and is not a link to a pty, so it is not replaced; "
             "remove it, or choose another path",
             port=str(link),
         )
     device = str(link.resolve())
     if device != target and link.exists() and pty_lock.is_locked(device, link):
         raise PortBusy(
-            f"{link} leads to {device} and belongs to a program that is running; end that program, or "
+            f"{link} is a link to {device} and belongs to a running program; stop that program, or "
             "choose another path",
             port=str(link),
         )

@@ -1,10 +1,10 @@
-"""Whether the program that made a link to a pty is still running.
+"""Determines whether the program that made a link to a pty is still running.
 
-The kernel gives the number of a pty that is gone to the next terminal that is opened, so the link of a killed
-simulator may lead to a shell, or to another simulator. A lock on the slave end tells: it covers one byte,
-whose place follows from the path of the link, and ends with the program that holds it. It belongs to one
-opening of the device, so other openings in the same process do not end it, and it is independent of the
-`flock` by which serial programs keep one another out.
+The kernel reuses the number of a closed pty for the next terminal, so the link of a killed simulator may
+point to a shell, or to another simulator. A lock on the slave end decides: it covers one byte, whose offset
+follows from the path of the link, and ends with its program. It belongs to one opening of the device, so
+other openings in the same process do not end it, and it is independent of the `flock` by which serial
+programs exclude one another.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ _FLOCK = struct.Struct("hhqqi4x")
 
 
 def lock(slave: int, link: Path) -> None:
-    """Say that this process makes a link to a pty, as far as the system has such locks."""
+    """Lock the link of this process, if the system has such locks."""
     if sys.platform == "linux":
         fcntl.fcntl(slave, fcntl.F_OFD_SETLK, _byte_of(link))
 
 
 def is_locked(device: str, link: Path) -> bool:
-    """Return whether the maker of a link to a pty is running; where nothing tells, whether the pty exists."""
+    """Return whether the program of a link is running; on systems without locks, whether the pty exists."""
     try:
         slave = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     except FileNotFoundError:

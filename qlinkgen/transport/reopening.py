@@ -1,4 +1,4 @@
-"""A port that comes back when it is plugged in again. Only for those who ask for it."""
+"""A port that is reopened after the adapter was reconnected; optional."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from qlinkgen.transport.port import Port, closed_here
 
 
 class ReopeningPort(Port):
-    """Opens its port again after it was lost, at the first use after the caller was told by a `PortLost`.
+    """Reopens a lost port at the first use after the loss was reported by `PortLost`.
 
-    So a loss is never hidden: what was on its way is gone, and the caller must know. While the port stays
-    away every use raises `PortLost`. The lost port is closed at once, because the kernel gives a replugged
-    adapter a new number while the old one is held. After `close` it stays closed.
+    So a loss is never hidden, since bytes in transit are lost. While the port is missing every use raises
+    `PortLost`. The lost port is closed immediately, because the kernel gives a reconnected adapter a new
+    number while the old one is in use. After `close` it stays closed.
 
-    A descriptor from `fileno` or `hold` is good until the next `PortLost`; ask again after it.
+    A descriptor from `fileno` or `hold` is valid until the next `PortLost`; get a new one after it.
 
     Attributes:
-        reopened: how often the port has come back.
+        reopened: number of times the port was reopened.
     """
 
     def __init__(self, opener: Callable[[], Port]) -> None:
         """Open the port the first time; its errors are the opener's own.
 
         Args:
-            opener: opens the port, such as `lambda: SerialPort("/dev/ttyUSB0")`. A name that stays with the
-                adapter, as in /dev/serial/by-id, finds it at any plug.
+            opener: opens the port, such as `lambda: SerialPort("/dev/ttyUSB0")`. A stable name of the
+                adapter, as in /dev/serial/by-id, works at any socket.
         """
         self._opener = opener
         self._closed = Event()
@@ -72,7 +72,7 @@ class ReopeningPort(Port):
 
     @contextmanager
     def hold(self, wake: Callable[[], object]) -> Iterator[int | None]:
-        """See `Port.hold`. Where another use finds the port lost, that closes it and wakes as well."""
+        """See `Port.hold`. If another call finds the port lost, that closes it and wakes as well."""
         with self._present().hold(wake) as descriptor:
             yield descriptor
 
@@ -84,12 +84,12 @@ class ReopeningPort(Port):
         with self._lock:
             if self._closed.is_set():
                 raise closed_here(self.name)
-            if self._port is not None:  # another thread was quicker
+            if self._port is not None:  # another thread was first
                 return self._port
             try:
                 port = self._opener()
             except PortError as error:
-                raise PortLost(f"{self.name} is still away: {error}", port=self.name) from error
+                raise PortLost(f"{self.name} is still missing: {error}", port=self.name) from error
             self.reopened += 1
             self._take(port)
         if self._closed.is_set():  # by a signal handler meanwhile
@@ -97,9 +97,9 @@ class ReopeningPort(Port):
         return port
 
     def _drop(self, port: Port, error: PortLost) -> PortLost:
-        """Close a lost port, and return the error that says why it was lost.
+        """Close a lost port, and return the error with the cause.
 
-        Where another thread has closed the lost port before, this thread has only seen that.
+        If another thread has closed the lost port before, that is the cause seen by this thread.
         """
         with self._lock:
             if self._port is port:
@@ -121,6 +121,6 @@ class ReopeningPort(Port):
         self._lock = RLock()
 
     def fileno(self) -> int | None:
-        """Return the descriptor of the port as it is open now, None while it is away."""
+        """Return the current descriptor of the port, None while it is missing."""
         port = self._port
         return None if port is None else port.fileno()

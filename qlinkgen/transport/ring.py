@@ -1,11 +1,11 @@
-"""Drivers that keep a node of a ring at work, for blocking programs.
+"""Drivers of a ring node for blocking programs.
 
-A node must send the messages of others on while the program at it does something else, or nothing. So
-`NodeThread` has a thread that reads the port, and the program's calls only look at what it has left behind.
-A call that sends writes to the port itself, so it waits for no other thread.
+A node must forward messages while its program is busy or waiting. So `NodeThread` has a thread that reads the
+port, and the program's calls only read its buffers. A call that sends writes to the port itself, so it does
+not wait for another thread.
 
-On a port with a clock of its own, such as a simulated one, time stands still while nobody reads, and nothing
-is lost by reading only when the program waits: `PumpedNode` does that, in the thread that calls.
+A port with its own clock, such as a simulated one, only needs to be read while the program waits, since its
+time does not advance otherwise: `PumpedNode` does that, in the calling thread.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ T = TypeVar("T")
 
 
 class PumpedNode(RingDriver):
-    """Keeps a node at work while the program waits for it, and only then; for ports with their own clock.
+    """Runs a node while the program waits; for ports with their own clock.
 
     Attributes:
         node: the engine.
-        port: where it receives and transmits.
+        port: the port of the node.
         on_event: called with each event of the engine.
     """
 
@@ -47,7 +47,7 @@ class PumpedNode(RingDriver):
         return self.port.now()
 
     def act(self, function: Callable[[float], T]) -> T:
-        """See `RingDriver.act`; what has come is taken first."""
+        """See `RingDriver.act`; received bytes are processed first."""
         with self._lock:
             self._step(self.port.read(0))
             now = self.port.now()
@@ -72,7 +72,7 @@ class PumpedNode(RingDriver):
         self.pause(GIVE_WAY)
 
     def pause(self, seconds: float) -> None:
-        """Let time pass, and the node work."""
+        """Sleep while the node runs."""
         self.until(lambda _now: None, seconds)
 
     def _step(self, data: bytes) -> None:
@@ -89,7 +89,7 @@ class PumpedNode(RingDriver):
 
 
 def drive(port: Port, node: RingNode, *, on_event: OnEvent | None = None) -> RingDriver:
-    """Return the driver that suits a port: a thread, or none where the port has a clock of its own."""
+    """Return the driver for a port: with a thread, or without one if the port has its own clock."""
     if port.own_clock:
         return PumpedNode(port, node, on_event=on_event)
     return NodeThread(port, node, on_event=on_event)

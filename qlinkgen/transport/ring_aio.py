@@ -1,8 +1,8 @@
-"""Drivers that keep a node of a ring at work in an event loop.
+"""Drivers of a ring node in an event loop.
 
-At a port with a descriptor the loop calls the node whenever bytes come or a timer is due: no task has to run
-for that, so the node sends on while every task of the program waits. A port without a descriptor is read by a
-task, in a thread. A port with a clock of its own is read while a task waits for the node.
+On a port with a descriptor the loop calls the node whenever bytes arrive or a timer expires, without a task,
+so the node forwards while all tasks of the program wait. A port without a descriptor is read by a task, in a
+thread. A port with its own clock is read while a task waits for the node.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class AsyncRingDriver(ABC):
-    """What a client for asyncio needs of whatever keeps its node at work; see `RingDriver`."""
+    """The interface that asyncio clients use; see `RingDriver`."""
 
     node: RingNode
 
@@ -32,15 +32,15 @@ class AsyncRingDriver(ABC):
 
     @abstractmethod
     def act(self, function: Callable[[float], T]) -> T:
-        """Do something with the node, then send what it wants to send."""
+        """Call an action on the node, then send the bytes of the node."""
 
     @abstractmethod
     async def until(self, attempt: Callable[[float], T | None], timeout: float | None) -> T | None:
-        """Try something now and whenever the node has seen something; None when the time is over."""
+        """Try something now and after each event of the node; return None after the timeout."""
 
     @abstractmethod
     async def give_way(self) -> None:
-        """Let the node and other tasks work for a moment."""
+        """Yield to the node and other tasks for a moment."""
 
     @abstractmethod
     async def pause(self, seconds: float) -> None:
@@ -48,20 +48,20 @@ class AsyncRingDriver(ABC):
 
     @abstractmethod
     async def close(self) -> None:
-        """Stop. Closing twice does no harm."""
+        """Stop the driver. Closing twice is allowed."""
 
 
 class AsyncNode(AsyncRingDriver):
-    """Keeps a node at work in the running event loop.
+    """Runs a node in the running event loop.
 
     Attributes:
         node: the engine.
-        port: where it receives and transmits; it belongs to this driver from now on.
+        port: the port of the node, owned by this driver.
         on_event: called with each event of the engine, in the loop's thread.
     """
 
     def __init__(self, port: Port, node: RingNode, *, on_event: OnEvent | None = None) -> None:
-        """Begin to receive and to send on.
+        """Start receiving and forwarding.
 
         Raises:
             RuntimeError: no event loop is running.
@@ -71,7 +71,7 @@ class AsyncNode(AsyncRingDriver):
         self.on_event = on_event
         self._loop = asyncio.get_running_loop()
         self._io = NodeIo(port, node)
-        self._waiting: dict[asyncio.Future[None], None] = {}  # the first to wait is the first to look
+        self._waiting: dict[asyncio.Future[None], None] = {}  # in order of waiting
         self._failure: BaseException | None = None
         self._closed = False
         self._timer: asyncio.TimerHandle | None = None
@@ -101,7 +101,7 @@ class AsyncNode(AsyncRingDriver):
         self._io.report(self.on_event)
 
     def _after(self, now: float) -> None:
-        """Set the timer, and let tasks look again."""
+        """Set the timer, and wake waiting tasks."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -154,7 +154,7 @@ class AsyncNode(AsyncRingDriver):
         """See `RingDriver.act`.
 
         Raises:
-            PortLost: the port went away.
+            PortLost: the port was lost.
         """
         self._check()
         now = self.port.now()
@@ -167,7 +167,7 @@ class AsyncNode(AsyncRingDriver):
         """See `RingDriver.until`.
 
         Raises:
-            PortLost: the port went away.
+            PortLost: the port was lost.
         """
         deadline = None if timeout is None else self.port.now() + timeout
         while True:
@@ -183,7 +183,7 @@ class AsyncNode(AsyncRingDriver):
             await self._change(None if deadline is None else deadline - now)
 
     async def _change(self, seconds: float | None) -> None:
-        """Return when the node has seen something, or some time has passed."""
+        """Return after an event of the node, or after some time."""
         changed: asyncio.Future[None] = self._loop.create_future()
         self._waiting[changed] = None
         try:
@@ -198,7 +198,7 @@ class AsyncNode(AsyncRingDriver):
         await self._change(GIVE_WAY)
 
     async def pause(self, seconds: float) -> None:
-        """Let time pass; the node and other tasks go on."""
+        """Sleep while the node and other tasks run."""
         await asyncio.sleep(seconds)
 
     def _check(self) -> None:
@@ -208,10 +208,10 @@ class AsyncNode(AsyncRingDriver):
             raise closed_here(self.port.name)
 
     async def close(self) -> None:
-        """Send what is still to be sent, and close the port."""
+        """Send the buffered bytes, and close the port."""
         if self._closed:
             return
-        with contextlib.suppress(OSError):  # a port that is lost has nothing left to send
+        with contextlib.suppress(OSError):  # a lost port cannot send
             await self.until(lambda _now: self.node.idle or None, FLUSH)
         self._closed = True
         self._let_go()
@@ -222,11 +222,11 @@ class AsyncNode(AsyncRingDriver):
 
 
 class AsyncPumpedNode(AsyncRingDriver):
-    """Keeps a node at work while tasks wait for it; for ports with their own clock.
+    """Runs a node while tasks wait for it; for ports with their own clock.
 
     Attributes:
         node: the engine.
-        port: where it receives and transmits.
+        port: the port of the node.
         on_event: called with each event of the engine.
     """
 
@@ -241,7 +241,7 @@ class AsyncPumpedNode(AsyncRingDriver):
         return self.port.now()
 
     def act(self, function: Callable[[float], T]) -> T:
-        """See `RingDriver.act`; what has come is taken first."""
+        """See `RingDriver.act`; received bytes are processed first."""
         self._step(self.port.read(0))
         now = self.port.now()
         result = function(now)
@@ -249,7 +249,7 @@ class AsyncPumpedNode(AsyncRingDriver):
         return result
 
     async def until(self, attempt: Callable[[float], T | None], timeout: float | None) -> T | None:
-        """See `RingDriver.until`; other tasks get their turn after each piece that comes."""
+        """See `RingDriver.until`; other tasks run after each received chunk."""
         self._step(self.port.read(0))
         limit = float("inf") if timeout is None else self.port.now() + timeout
         while (value := attempt(now := self.port.now())) is None and now < limit:
@@ -263,7 +263,7 @@ class AsyncPumpedNode(AsyncRingDriver):
         await self.pause(GIVE_WAY)
 
     async def pause(self, seconds: float) -> None:
-        """Let time pass, and the node work."""
+        """Sleep while the node runs."""
         await self.until(lambda _now: None, seconds)
 
     def _step(self, data: bytes) -> None:
@@ -276,7 +276,7 @@ class AsyncPumpedNode(AsyncRingDriver):
 
 
 def drive_async(port: Port, node: RingNode, *, on_event: OnEvent | None = None) -> AsyncRingDriver:
-    """Return the driver that suits a port."""
+    """Return the driver for a port."""
     if port.own_clock:
         return AsyncPumpedNode(port, node, on_event=on_event)
     return AsyncNode(port, node, on_event=on_event)

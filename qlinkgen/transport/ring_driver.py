@@ -1,4 +1,4 @@
-"""What keeps a node of a ring at work: the interface that clients use, and what every driver does."""
+"""Drivers of a ring node: the interface that clients use, and the common implementation."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from qlinkgen.link.ring_events import NetStat, RingEvent
 from qlinkgen.transport.port import Port
 
 T = TypeVar("T")
-#: Seconds after which a thread that can not be woken looks what there is to do.
+#: Polling interval in seconds of a thread that cannot be woken.
 LOOK = 0.05
-#: The same while own messages wait for a transmitter that takes its time.
+#: The same while own messages wait for a paced transmitter.
 LOOK_OFTEN = 0.002
-#: Seconds that a program gives way when it asks again and again whether something has come.
+#: Seconds that a polling program yields to the node.
 GIVE_WAY = 0.001
-#: Seconds that closing waits for what is still to be sent.
+#: Longest time in seconds to send buffered bytes on closing.
 FLUSH = 1.0
 
 OnEvent = Callable[[RingEvent], object]
 
 
 class NodeIo:
-    """What every driver does with an engine and a port, apart from waiting.
+    """Common implementation of the drivers around an engine and a port, except for waiting.
 
     Attributes:
         node: the engine.
-        port: where it receives and transmits.
+        port: the port of the node.
     """
 
     def __init__(self, port: Port, node: RingNode) -> None:
@@ -37,7 +37,7 @@ class NodeIo:
         self.port = port
 
     def step(self, data: bytes) -> float:
-        """Let the engine take bytes and send what is due; return the time."""
+        """Pass bytes to the engine and send its output; return the time."""
         now = self.port.now()
         if data:
             self.node.receive(data, now)
@@ -45,7 +45,7 @@ class NodeIo:
         return now
 
     def flush(self, now: float) -> None:
-        """Send what is due."""
+        """Send the output of the engine."""
         if data := self.node.bytes_to_send(now):
             try:
                 self.port.write(data)
@@ -54,19 +54,19 @@ class NodeIo:
                 raise
 
     def wait_at_most(self, now: float, limit: float) -> float:
-        """Return for how long to wait for bytes."""
+        """Return the timeout of the next read."""
         timer = self.node.next_timer()
         return limit if timer is None else max(0.0, min(limit, timer - now))
 
     def report(self, on_event: OnEvent | None) -> None:
-        """Tell what has happened; without anybody to tell the engine keeps the latest."""
+        """Report events; without a callback the engine keeps the latest ones."""
         events = self.node.events
         while on_event is not None and events:
             on_event(events.popleft())
 
 
 class RingDriver(ABC):
-    """What a client needs of whatever keeps its node at work."""
+    """The interface that clients use."""
 
     node: RingNode
 
@@ -76,23 +76,23 @@ class RingDriver(ABC):
 
     @abstractmethod
     def act(self, function: Callable[[float], T]) -> T:
-        """Do something with the node while nobody else does, then send what it wants to send."""
+        """Call an action with exclusive access to the node, then send the output of the node."""
 
     @abstractmethod
     def until(self, attempt: Callable[[float], T | None], timeout: float | None) -> T | None:
-        """Try something now and whenever the node has seen something, until it returns a value.
+        """Try something now and after each event of the node, until it returns a value.
 
-        Returns None when `timeout` seconds have passed without one; None waits for ever.
+        Returns None after `timeout` seconds; a timeout of None waits for ever.
         """
 
     @abstractmethod
     def give_way(self) -> None:
-        """Let the node work for a moment."""
+        """Yield to the node for a moment."""
 
     @abstractmethod
     def pause(self, seconds: float) -> None:
-        """Let time pass."""
+        """Sleep on the clock of the node."""
 
     @abstractmethod
     def close(self) -> None:
-        """Stop. Closing twice does no harm."""
+        """Stop the driver. Closing twice is allowed."""

@@ -1,4 +1,4 @@
-"""A thread that keeps a node of a ring at work, whatever the program does."""
+"""A thread that runs a ring node independently of the program."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ class _Waker(Protocol):
 
 
 class NodeThread(RingDriver):
-    """Keeps a node at work in a thread of its own.
+    """Runs a node in its own thread.
 
     Attributes:
         node: the engine.
-        port: where it receives and transmits; it belongs to this driver from now on.
+        port: the port of the node, owned by this driver.
         on_event: called with each event of the engine, in the thread of the node.
     """
 
     def __init__(self, port: Port, node: RingNode, *, on_event: OnEvent | None = None) -> None:
-        """Begin to receive and to send on."""
+        """Start receiving and forwarding."""
         self.node = node
         self.port = port
         self.on_event = on_event
@@ -74,18 +74,17 @@ class NodeThread(RingDriver):
                 data = self._waker.wait(timeout)
 
     def fail(self, failure: BaseException) -> None:
-        """Keep a failure for the thread that uses the node next."""
+        """Keep an error for the next call of the program."""
         with self._changed:
             self._failure = failure
             self._changed.notify_all()
 
     def after_fork(self) -> None:
-        """Fail in a forked child, which has no thread that keeps the node at work."""
+        """Fail in a forked child, in which the thread does not exist."""
         self._changed = threading.Condition()
         if not self._closing:
             self._failure = PortLost(
-                f"{self.port.name} belongs to the process that opened it, and this one was forked from it; "
-                "open the port here, after the fork",
+                f"{self.port.name} belongs to the parent process; open the port after the fork",
                 port=self.port.name,
             )
 
@@ -95,7 +94,7 @@ class NodeThread(RingDriver):
         """See `RingDriver.act`.
 
         Raises:
-            PortLost: the port went away.
+            PortLost: the port was lost.
         """
         with self._changed:
             self._check()
@@ -109,7 +108,7 @@ class NodeThread(RingDriver):
         """See `RingDriver.until`.
 
         Raises:
-            PortLost: the port went away.
+            PortLost: the port was lost.
         """
         with self._changed:
             deadline = None if timeout is None else self.port.now() + timeout
@@ -128,7 +127,7 @@ class NodeThread(RingDriver):
         return value
 
     def _leave(self) -> None:
-        """Wake the thread where there is something that it does not know of."""
+        """Wake the thread if there is new work for it."""
         if self.node.next_timer() is not None or (self.on_event is not None and self.node.events):
             self._waker.wake()
 
@@ -138,7 +137,7 @@ class NodeThread(RingDriver):
             self._changed.wait(GIVE_WAY)
 
     def pause(self, seconds: float) -> None:
-        """Let time pass; the node goes on."""
+        """Sleep while the node runs."""
         self.port.sleep(seconds)
 
     def _check(self) -> None:
@@ -148,16 +147,16 @@ class NodeThread(RingDriver):
             raise closed_here(self.port.name)
 
     def close(self) -> None:
-        """Send what is still to be sent, stop the thread, and close the port.
+        """Send the buffered bytes, stop the thread, and close the port.
 
         Raises:
-            Exception: what `on_event` has raised; the port is closed all the same.
+            Exception: an exception of `on_event`; the port is closed all the same.
         """
         if self._closing:
             return
         failure = self._failure
         if failure is None:
-            with contextlib.suppress(PortError):  # a port that is lost has nothing left to send
+            with contextlib.suppress(PortError):  # a lost port cannot send
                 self.until(lambda _now: self.node.idle or None, FLUSH)
         self._closing = True
         self._waker.stop()
@@ -187,7 +186,7 @@ def _waker(port: Port, driver: NodeThread) -> _Waker:
 
 
 class _Pipe:
-    """Waits for bytes at a descriptor, and can be woken."""
+    """Waits for bytes on a descriptor, and can be woken."""
 
     def __init__(self, port: Port, descriptor: int) -> None:
         self._port = port
@@ -206,7 +205,7 @@ class _Pipe:
         if not ready:
             return b""
         self._waker.clear()
-        return self._port.read(0)  # raises where the port was closed
+        return self._port.read(0)  # raises if the port was closed
 
     def wake(self) -> None:
         self._waker.wake()
@@ -219,7 +218,7 @@ class _Pipe:
 
 
 class _Slices:
-    """Waits for bytes at a port that has no descriptor: a little at a time."""
+    """Waits for bytes on a port without a descriptor, in short intervals."""
 
     def __init__(self, port: Port, driver: NodeThread) -> None:
         self._port = port
@@ -233,7 +232,7 @@ class _Slices:
         pass
 
     def stop(self) -> None:
-        self._port.close()  # so that a read that waits returns
+        self._port.close()  # ends a waiting read
 
     def release(self) -> None:
         pass

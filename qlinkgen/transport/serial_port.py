@@ -1,7 +1,7 @@
 """Serial ports of this machine and of the network, opened by pyserial.
 
-Where there is a file descriptor, bytes are read and written through it and pyserial only sets the port up;
-elsewhere (Windows, rfc2217:// and other URLs) pyserial reads and writes.
+On ports with a file descriptor, bytes are read and written through it and pyserial only configures the port;
+on others (Windows, rfc2217:// and other URLs) pyserial reads and writes.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ _DIRECT = frozenset({"", "hwgrep", "socket"})
 #: pyserial's own timeout, set once: changing it costs 6 us, and on rfc2217:// a round trip.
 _SLICE = 0.01
 
-#: Seconds between looks at a port during the last part of a wait, which is shorter than a slice.
+#: Polling interval in seconds during the last part of a wait, which is shorter than a slice.
 _LOOK = 0.0002
 
 _PARITIES = {"none": "N", "even": "E", "odd": "O"}
 
 
 class PyserialChannel:
-    """Reads and writes by pyserial, for ports without a descriptor that could be used directly."""
+    """Reads and writes by pyserial, for ports without a usable descriptor."""
 
     def __init__(self, serial: settings.SerialStream) -> None:
         self._serial = serial
         self._woken = False
 
     def read(self, timeout: float) -> bytes:
-        """Return what is there, else what comes first."""
+        """Return available bytes, else the first ones to arrive."""
         limit = time.monotonic() + timeout
         while not self._serial.in_waiting:
             left = limit - time.monotonic()
@@ -58,13 +58,13 @@ class PyserialChannel:
             try:
                 data += self._serial.read(min(size, CHUNK - len(data)))
             except SYSTEM_ERRORS:
-                if data:  # first what has come; the next read fails again
+                if data:  # the next read raises again
                     break
                 raise
         return data
 
     def write(self, data: bytes) -> None:
-        """Hand over all bytes."""
+        """Write all bytes."""
         self._serial.write(data)
 
     def drain(self) -> None:
@@ -72,14 +72,14 @@ class PyserialChannel:
         self._serial.flush()
 
     def fileno(self) -> int | None:
-        """Return None: there is nothing to wait on."""
+        """Return None: these ports have no descriptor to wait on."""
         return None
 
     def wake(self) -> None:
-        """End a read within a slice, and a write where pyserial can: on Windows."""
+        """End a read within a slice, and on Windows a write."""
         self._woken = True
         if (cancel := getattr(self._serial, "cancel_write", None)) is not None:
-            with contextlib.suppress(*SYSTEM_ERRORS):  # a port that is gone waits for nothing
+            with contextlib.suppress(*SYSTEM_ERRORS):  # a lost port does not wait
                 cancel()
 
     def close(self) -> None:
@@ -87,24 +87,24 @@ class PyserialChannel:
 
 
 class SerialPort(StreamPort):
-    """A serial port: 8 data bits, raw, without flow control, for this program alone.
+    """A serial port: 8 data bits, raw, without flow control, exclusive to this program.
 
     Args:
         name: a device such as /dev/ttyUSB0, /dev/serial/by-id/... or COM3; or a URL of pyserial such as
-            socket://HOST:PORT (bytes as they are) or rfc2217://HOST:PORT (a serial device server).
-        baud: bits a second. On a pty and on socket:// it only serves arithmetic.
+            socket://HOST:PORT (raw bytes) or rfc2217://HOST:PORT (a serial device server).
+        baud: bits per second. On a pty and on socket:// it only serves arithmetic.
         parity: none, even or odd.
         stop_bits: 1 or 2.
-        low_latency: ask the driver to hand on received bytes at once. It may refuse; see `capabilities`.
-        rs485: let the driver switch the transceiver's direction; True for its usual settings.
-        direction: called with True before bytes are sent, with False when the last has left and before the
-            port is opened, for a transceiver that the caller switches himself.
+        low_latency: ask the driver to deliver received bytes immediately. It may refuse; see `capabilities`.
+        rs485: let the driver switch the transceiver's direction; True for its default settings.
+        direction: called with True before bytes are sent, with False after the last was transmitted and
+            before the port is opened, for a transceiver switched by the caller.
 
     Raises:
-        ValueError: an argument is out of its range.
-        PortMissing: there is no such port, or nobody answers at the URL.
-        PortBusy: another program has it, or this user may not open it.
-        CapabilityMissing: the driver cannot do the baud rate or `rs485`.
+        ValueError: an argument is out of range.
+        PortMissing: the port does not exist, or the server of the URL does not respond.
+        PortBusy: another program uses it, or this user lacks the permission.
+        CapabilityMissing: the driver does not support the baud rate or `rs485`.
         PortError: it is not a serial port.
     """
 
@@ -122,7 +122,7 @@ class SerialPort(StreamPort):
         _check(name, baud, parity, stop_bits)
         if rs485 and direction is not None:
             raise ValueError(
-                "rs485 and direction: either the driver or the caller switches, so give one of them"
+                "rs485 and direction exclude each other: the driver or the caller switches; pass one of them"
             )
         super().__init__(name, baud)
         self._direction = direction
@@ -143,7 +143,7 @@ class SerialPort(StreamPort):
     def _make_channel(self) -> Channel:
         if sys.platform == "win32" or _scheme(self.name) not in _DIRECT:
             return PyserialChannel(self._serial)
-        # A buffer of 4096 bytes that is full may take its whole length to have room again.
+        # A full buffer of 4096 bytes may have no room until all of it is transmitted.
         return DescriptorChannel(self._serial.fileno(), stall=1 + CHUNK * 10 / self.baud)
 
     def _set_up(self, *, low_latency: bool, rs485: bool | RS485Settings | None) -> Capabilities:
@@ -155,7 +155,7 @@ class SerialPort(StreamPort):
         settings.check_baud(descriptor, self.name, self.baud)
         settings.make_raw(descriptor)
         accepted = low_latency and settings.set_low_latency(self._serial)
-        adapter = look_up(descriptor)  # afterwards: low latency changes what it finds
+        adapter = look_up(descriptor)  # after low latency was set, which changes the result
         if adapter.paced is not Ability.NO:
             settings.shut_out(descriptor)
             self._held.callback(settings.let_in, descriptor)
@@ -164,17 +164,17 @@ class SerialPort(StreamPort):
     def _set_up_remote(self, descriptor: int | None, rs485: bool | RS485Settings | None) -> Capabilities:
         if rs485 or self._direction is not None:
             raise CapabilityMissing(
-                f"{self.name}: a transceiver's direction can be switched at a port of this machine only; "
+                f"{self.name}: only a local port can switch a transceiver's direction; "
                 "let the device server or the adapter switch it",
                 port=self.name,
             )
         if descriptor is None:
-            return Capabilities(latency_source="the port is reached through pyserial, which does not tell")
+            return Capabilities(latency_source="pyserial does not report it")
         settings.send_at_once(descriptor)
-        return Capabilities(paced=Ability.NO, latency_source="a network does not tell")
+        return Capabilities(paced=Ability.NO, latency_source="not available for a network connection")
 
     def write(self, data: bytes) -> None:
-        """See `Port.write`. With `direction` it returns when the last byte has left."""
+        """See `Port.write`. With `direction` it returns after the last byte was transmitted."""
         if self._direction is None or self._gone or self._gate.is_shut:
             super().write(data)
             return
@@ -203,12 +203,12 @@ def _scheme(name: str) -> str:
 
 def _open(name: str, baud: int, parity: str, stop_bits: int) -> settings.Serial:
     check_url(name)
-    import serial  # noqa: PLC0415  # takes 9 ms, and simulated ports do without
+    import serial  # noqa: PLC0415  # takes 9 ms, and simulated ports do not need it
 
     options = {"parity": parity, "stopbits": stop_bits, "timeout": _SLICE, "exclusive": True}
     try:
         opened: settings.Serial = serial.serial_for_url(name, baud, **options)
-    except (*SYSTEM_ERRORS, ValueError) as error:  # ValueError: a URL that pyserial does not know
+    except (*SYSTEM_ERRORS, ValueError) as error:  # ValueError: a URL unknown to pyserial
         raise explain(name, error) from error
     return opened
 

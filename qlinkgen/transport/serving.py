@@ -1,4 +1,4 @@
-"""Answering on a port: a slave, or several of them, in real time."""
+"""Serves slaves on a port in real time."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Callable, Generator
 from qlinkgen.link.slave import SlaveEngine
 from qlinkgen.transport.port import Port
 
-#: Seconds after which a server looks whether it is to stop, while nothing comes.
+#: Seconds between checks of `stop` on an idle line.
 LOOK = 0.1
 
 
 def serve(port: Port, *slaves: SlaveEngine, stop: Callable[[], bool] = lambda: False) -> None:
-    """Answer for slaves on a port until `stop()` is true.
+    """Serve slaves on a port until `stop()` is true.
 
     Raises:
-        PortLost: the port went away.
+        PortLost: the port was lost.
     """
     steps = _serving(port, slaves)
     timeout = next(steps)
@@ -24,8 +24,8 @@ def serve(port: Port, *slaves: SlaveEngine, stop: Callable[[], bool] = lambda: F
 
 
 async def serve_async(port: Port, *slaves: SlaveEngine, stop: Callable[[], bool] = lambda: False) -> None:
-    """Do the same in an event loop, where a cancelled task stops it too."""
-    from qlinkgen.transport import aio  # noqa: PLC0415  # asyncio costs blocking servers 50 ms
+    """Do the same in an event loop, where cancelling the task stops it too."""
+    from qlinkgen.transport import aio  # noqa: PLC0415  # importing asyncio takes 50 ms
 
     steps = _serving(port, slaves)
     timeout = next(steps)
@@ -34,7 +34,7 @@ async def serve_async(port: Port, *slaves: SlaveEngine, stop: Callable[[], bool]
 
 
 def _serving(port: Port, slaves: tuple[SlaveEngine, ...]) -> Generator[float, bytes, None]:
-    """Yields how long to wait for bytes, is sent those that came."""
+    """Serve slaves: yields the timeout of a read, takes the bytes read."""
     data = b""
     while True:
         now = port.now()

@@ -1,6 +1,6 @@
-"""What is set at an open serial port beyond pyserial's own settings: latency, RS485, exclusive use.
+"""Settings of an open serial port beyond those of pyserial: latency, RS485, exclusive use.
 
-All of it but `RS485Settings` is Linux's; the other systems have nothing like it, or no interface to it.
+All except `RS485Settings` are specific to Linux.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ if sys.platform != "win32":
     import fcntl
     import termios
 
-#: From the kernel's asm-generic/ioctls.h and linux/serial.h; Python's termios has no names for them.
+#: From the kernel's asm-generic/ioctls.h and linux/serial.h; Python's termios lacks them.
 _TCGETS2 = 0x802C542A
 _TIOCGRS485 = 0x542E
 _RS485_ENABLED = 1
 
-#: Share by which both ends may differ: ten bits later the receiver must still sample within the right one.
+#: Largest relative difference between both ends: after ten bits the receiver must still sample the right one.
 _BAUD_TOLERANCE = 0.025
 
 
 class SerialStream(Protocol):
-    """How bytes go through an open port of pyserial, which has no types."""
+    """Interface of an open port of pyserial, which has no types: bytes."""
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that can be read at once."""
+        """Number of bytes available."""
         ...
 
     def read(self, size: int, /) -> bytes:
-        """Return so many bytes, or those that came within the timeout."""
+        """Return a number of bytes, or those received within the timeout."""
         ...
 
     def write(self, data: bytes, /) -> int | None:
-        """Hand over bytes."""
+        """Write bytes."""
         ...
 
     def flush(self) -> None:
@@ -52,7 +52,7 @@ class SerialStream(Protocol):
 
 
 class Serial(SerialStream, Protocol):
-    """An open port of pyserial; not every kind of port has what is not a method."""
+    """An open port of pyserial; some kinds of port lack the attributes."""
 
     rs485_mode: object
     set_low_latency_mode: Callable[[bool], None]
@@ -68,12 +68,12 @@ class Serial(SerialStream, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RS485Settings:
-    """How the driver switches the direction of an RS485 transceiver by RTS.
+    """Settings of the driver for switching the direction of an RS485 transceiver by RTS.
 
     Attributes:
         rts_level_for_tx: RTS while sending.
         rts_level_for_rx: RTS while receiving.
-        loopback: receive what is sent.
+        loopback: receive sent bytes.
         delay_before_tx: seconds between switching and the first bit, in whole milliseconds.
         delay_before_rx: seconds between the last bit and switching back, in whole milliseconds.
     """
@@ -86,15 +86,15 @@ class RS485Settings:
 
 
 def set_rs485(serial: Serial, name: str, wanted: RS485Settings) -> None:
-    """Make the driver switch the transceiver. Raises CapabilityMissing where it cannot."""
-    from serial.rs485 import RS485Settings as Settings  # noqa: PLC0415  # few need it
+    """Make the driver switch the transceiver. Raises CapabilityMissing if it cannot."""
+    from serial.rs485 import RS485Settings as Settings  # noqa: PLC0415  # rarely needed
 
     try:
         serial.rs485_mode = Settings(**asdict(wanted))
     except (ValueError, NotImplementedError) as error:
         raise CapabilityMissing(
-            f"{name}: its driver cannot switch an RS485 transceiver; leave rs485 out if the adapter switches "
-            "by itself, as most USB ones do, or give direction= a function that does it",
+            f"{name}: its driver cannot switch an RS485 transceiver; omit rs485 if the adapter switches "
+            "by itself, as most USB ones do, or pass a function as direction=",
             port=name,
         ) from error
 
@@ -112,7 +112,7 @@ def rs485_state(descriptor: int) -> Ability:
 
 
 def set_low_latency(serial: Serial) -> bool:
-    """Ask the driver to hand on bytes at once (ASYNC_LOW_LATENCY). Returns whether it agreed."""
+    """Ask the driver to deliver bytes immediately (ASYNC_LOW_LATENCY). Return whether it accepted."""
     try:
         serial.set_low_latency_mode(True)
     except (ValueError, NotImplementedError, AttributeError):  # refused; another system; another kind of port
@@ -121,12 +121,12 @@ def set_low_latency(serial: Serial) -> bool:
 
 
 def check_baud(descriptor: int, name: str, wanted: int) -> None:
-    """Compare with the speed that the driver has really set: many take any number and do what they can."""
+    """Compare with the actual speed of the driver: many accept any number and round it."""
     actual = _actual_baud(descriptor)
     if actual and abs(actual / wanted - 1) > _BAUD_TOLERANCE:
         raise CapabilityMissing(
-            f"{name} cannot do {wanted} baud: its driver has set {actual} instead; "
-            "choose a rate that it knows, or another adapter",
+            f"{name} does not support {wanted} baud: its driver has set {actual} instead; "
+            "choose a supported rate, or another adapter",
             port=name,
         )
 
@@ -144,7 +144,7 @@ def _actual_baud(descriptor: int) -> int:
 
 
 def make_raw(descriptor: int) -> None:
-    """Finish what pyserial leaves: an empty read means the end, and a break is no interrupt."""
+    """Complete the raw mode of pyserial: an empty read means the end, and a break does not interrupt."""
     if sys.platform == "win32":
         return
     state = termios.tcgetattr(descriptor)
@@ -154,20 +154,20 @@ def make_raw(descriptor: int) -> None:
 
 
 def shut_out(descriptor: int) -> None:
-    """Keep out programs that do not ask for a lock, too (only root is still let in)."""
+    """Also exclude programs that do not ask for a lock (except those of root)."""
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
             fcntl.ioctl(descriptor, termios.TIOCEXCL)
 
 
 def let_in(descriptor: int) -> None:
-    """End `shut_out`: the kernel does so by itself only when nobody at all has the port open any more."""
+    """End `shut_out`: the kernel does so only when the port is closed in all processes."""
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
             fcntl.ioctl(descriptor, termios.TIOCNXCL)
 
 
 def send_at_once(descriptor: int) -> None:
-    """Make TCP send small writes without waiting for an acknowledgement of the one before."""
+    """Make TCP send small writes without waiting for earlier acknowledgements (TCP_NODELAY)."""
     with contextlib.suppress(OSError), socket.socket(fileno=os.dup(descriptor)) as own:
         own.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -10,10 +10,10 @@ from qlinkgen.transport.forking import tell_of_forks
 
 
 class Waker:
-    """Wakes a thread that waits for `descriptor` beside others. For any thread and for signal handlers.
+    """Wakes a thread that waits on `descriptor` and others. For any thread and for signal handlers.
 
     Attributes:
-        descriptor: can be read after `wake`, until `clear`. Good until `close`.
+        descriptor: readable after `wake`, until `clear`. Valid until `close`.
     """
 
     def __init__(self) -> None:
@@ -32,14 +32,14 @@ class Waker:
                     os.write(self._write_end, b"!")
 
     def clear(self) -> None:
-        """Forget every `wake` so far."""
+        """Undo every earlier `wake`."""
         with self._lock:
             if self._open:
                 with contextlib.suppress(BlockingIOError):  # not woken
                     os.read(self.descriptor, 4096)
 
     def close(self) -> None:
-        """Close the pipe, once no thread waits for it any more. Closing twice does no harm."""
+        """Close the pipe, once no thread waits on it. Closing twice is allowed."""
         with self._lock:
             if self._open:
                 self._open = False
@@ -47,7 +47,7 @@ class Waker:
                 os.close(self.descriptor)
 
     def after_fork(self) -> None:
-        """Part from the parent: its pipe would wake it, and a thread that is not here may hold the lock."""
+        """Make a new pipe and lock: the parent shares the old pipe, and its threads may hold the lock."""
         self._lock = RLock()
         if self._open:
             ends = os.pipe()

@@ -135,7 +135,7 @@ def test_a_wrong_file_is_found_before_the_port_is_opened(
     assert (result.code, result.out) == (1, "")
     assert words in result.err
     assert str(file) in result.err
-    assert "there is no port" not in result.err
+    assert "does not exist" not in result.err
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_a_wrong_file_is_found_before_the_port_is_opened(
         (("--node", "x"), 2, "--node x: not a node"),
         ((), 2, "Missing option '--node'"),
         (("--node", "3", "--patience", "-1"), 2, "--patience -1: not a number of seconds"),
-        (("--node", "3"), 1, "there is no port '/dev/not-there'"),
+        (("--node", "3"), 1, "port '/dev/not-there' does not exist"),
     ],
 )
 def test_errors(qlinkgen: Run, program: Path, arguments: tuple[str, ...], code: int, text: str) -> None:

@@ -275,7 +275,7 @@ def test_two_at_one_port() -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (("/dev/not-there",), 1, "there is no port '/dev/not-there'"),
+        (("/dev/not-there",), 1, "port '/dev/not-there' does not exist"),
         (("x", "--protocol", "trio", "--slack", "1"), 2, "--slack requires a bus with a master"),
         (("x", "--protocol", "mc1231a"), 2, "`qlinkgen decode mc1231a --direction request --raw < x`"),
         (("x", "--protocol", "nope"), 2, "unknown schema 'nope'"),

@@ -197,7 +197,7 @@ def test_a_port_that_goes_away() -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (("/dev/not-there",), 1, "there is no port '/dev/not-there'"),
+        (("/dev/not-there",), 1, "port '/dev/not-there' does not exist"),
         (("x", "--protocol", "qlink"), 2, "qlink is not a ring; use `qlinkgen monitor PORT"),
         (("x", "--count", "0"), 2, "--count"),
         (("x", "--seconds", "soon"), 2, "--seconds soon: not a number of seconds"),

@@ -63,9 +63,9 @@ def test_progress_on_a_terminal() -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
-        (("/dev/not-there",), 1, "there is no port '/dev/not-there'"),
+        (("/dev/not-there",), 1, "port '/dev/not-there' does not exist"),
         (("",), 2, "give a device such as /dev/ttyUSB0, or a URL"),
-        (("/dev/null",), 1, "is no serial port"),
+        (("/dev/null",), 1, "is not a serial port"),
         (("nonsense://x",), 1, "nonsense://x"),
         (("x", "--nodes", "0-3"), 2, "nodes are 1..16"),
         (("x", "--slack", "-1"), 2, "--slack -1: not a number of seconds"),

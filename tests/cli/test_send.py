@@ -259,7 +259,7 @@ def test_a_message_that_nothing_answers(qlinkgen: Run, silent: PtyPort, path: Pa
 def test_no_port(qlinkgen: Run) -> None:
     result = qlinkgen("send", "/dev/not-there", "qlink", "motor_position", "--node", "3")
     assert (result.code, result.out) == (1, "")
-    assert "there is no port '/dev/not-there'" in result.err
+    assert "port '/dev/not-there' does not exist" in result.err
 
 
 def test_a_schema_without_a_speed(qlinkgen: Run, thermo: Path, silent: PtyPort) -> None:

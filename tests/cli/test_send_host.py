@@ -84,4 +84,4 @@ def test_a_command_error(qlinkgen: Run) -> None:
 def test_a_missing_port(qlinkgen: Run) -> None:
     result = send(qlinkgen, "/dev/not-there", "get_pos")
     assert (result.code, result.out) == (1, "")
-    assert "there is no port" in result.err
+    assert "does not exist" in result.err

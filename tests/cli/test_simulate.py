@@ -231,7 +231,7 @@ def test_a_link_that_cannot_be_made(qlinkgen: Run, tmp_path: Path) -> None:
     taken.write_text("mine")
     result = qlinkgen("simulate", "qlink", "--link", taken)
     assert (result.code, result.out) == (1, "")
-    assert "is there already and is no link to a pty" in result.err
+    assert "exists and is not a link to a pty" in result.err
     assert taken.read_text() == "mine"
 
 

@@ -1,4 +1,4 @@
-"""Ptys, a fake sysfs, and answers of a driver that this machine does not have."""
+"""Ptys, a fake sysfs, and a simulated serial driver."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ import pytest
 from qlinkgen.transport import PtyPort, adapter, open_pty
 from tests.cli.conftest import qlinkgen  # noqa: F401  # the fixture that runs the command line
 
-#: Seconds that nothing here needs; a wait that long has failed.
+#: Time limit in seconds; a longer wait has failed.
 PATIENCE = 20.0
 
 
 def descriptors() -> int:
-    """How many descriptors this process has open."""
+    """Number of open descriptors of this process."""
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
@@ -37,7 +37,7 @@ def pty() -> Iterator[PtyPort]:
 
 @pytest.fixture
 def disguise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disguise:
-    """Return a function that gives a device an entry in a sysfs of its own."""
+    """Return a function that makes an entry for a device in a fake sysfs."""
     monkeypatch.setattr(adapter, "SYSFS", tmp_path / "sys")
 
     def dress(path: str, driver: str = "", latency_timer: str | None = None, *, uart: bool = False) -> Path:
@@ -96,7 +96,7 @@ class Driver:
 
 @pytest.fixture
 def driver(monkeypatch: pytest.MonkeyPatch) -> Driver:
-    """A driver in front of the kernel; it can nothing until it is told."""
+    """A simulated driver, without abilities until they are registered."""
     pretended = Driver(fcntl.ioctl)
     monkeypatch.setattr(fcntl, "ioctl", pretended.ioctl)
     return pretended

@@ -1,4 +1,4 @@
-"""What sysfs says about the hardware behind a terminal."""
+"""Reading the hardware of a terminal from sysfs."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def terminal(pty: PtyPort) -> Iterator[int]:
 
 @pytest.fixture
 def cpuinfo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the processor is described, when it is."""
+    """The description of the processor, if any."""
     monkeypatch.setattr(adapter, "CPUINFO", tmp_path / "cpuinfo")
     return tmp_path / "cpuinfo"
 
 
 @pytest.fixture
 def dressed(pty: PtyPort, disguise: Disguise) -> Callable[[str], PtyPort]:
-    """A pty that looks like a driver's."""
+    """A pty that looks like a device of a driver."""
 
     def dress(driver: str) -> PtyPort:
         disguise(pty.path, driver, uart=driver == "serial8250")
@@ -66,12 +66,12 @@ def test_a_timer_that_cannot_be_read(terminal: int, pty: PtyPort, disguise: Disg
     disguise(pty.path, "ftdi_sio", content)
     found = adapter.look_up(terminal)
     assert found.latency is None
-    assert found.source == "the driver ftdi_sio does not tell"
+    assert found.source == "the driver ftdi_sio does not report it"
 
 
 def test_no_driver(terminal: int, pty: PtyPort, disguise: Disguise) -> None:
     disguise(pty.path)
-    assert adapter.look_up(terminal) == adapter.Adapter("", None, "no driver is named, so nothing tells")
+    assert adapter.look_up(terminal) == adapter.Adapter("", None, "the driver is unknown")
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_paced_where_that_is_sure(
 
 def test_pty_and_what_is_not_known(terminal: int) -> None:
     assert adapter.look_up(terminal) == adapter.Adapter(
-        "pty", 0.0, "a pty hands bytes on at once", Ability.NO
+        "pty", 0.0, "a pty delivers bytes immediately", Ability.NO
     )
     nothing = os.open(os.devnull, os.O_RDWR)
     try:

@@ -44,7 +44,7 @@ CLOSED = "was closed here"
 
 
 class Opened(NamedTuple):
-    """A port, and what has to be closed after it."""
+    """A port, and the resources to close after it."""
 
     port: Port
     rest: ExitStack
@@ -107,13 +107,13 @@ with_descriptor = pytest.mark.parametrize(
 
 
 def numbers() -> set[int]:
-    """The descriptors that are open here, without that of the folder they are read from."""
+    """The open descriptors, without that of the folder they are listed from."""
     found = [int(each.name) for each in Path("/proc/self/fd").iterdir()]
     return {each for each in found if os.path.lexists(f"/proc/self/fd/{each}")}
 
 
 class Foreign:
-    """Socket pairs that have got the numbers of closed descriptors, and some bytes to read at each end."""
+    """Socket pairs that reuse the numbers of closed descriptors, with some bytes to read at each end."""
 
     def __init__(self, wanted: set[int]) -> None:
         self.ends: list[socket.socket] = []
@@ -145,7 +145,7 @@ class Opening:
         self.used = numbers() - before
 
     def foreign(self) -> Foreign:
-        """Take over the numbers that are free, of those that the port has used."""
+        """Reuse the free descriptor numbers among those of the port."""
         return Foreign(self.used - numbers())
 
 
@@ -166,18 +166,18 @@ class Users:
         for each in self.threads:
             each.start()
         self.begun.wait(PATIENCE)
-        time.sleep(0.002)  # for the calls to wait where they wait
+        time.sleep(0.002)  # so that the calls are waiting
 
     def _use(self, call: Callable[[], object]) -> None:
         self.begun.wait(PATIENCE)
         try:
             while True:
                 call()
-        except BaseException as error:  # noqa: BLE001  # the test looks at it
+        except BaseException as error:  # noqa: BLE001  # checked by the test
             self.errors.append(error)
 
     def check(self, *, closed: str = CLOSED) -> None:
-        """All have ended, with the one right error."""
+        """All calls have ended, with the expected error."""
         for each in self.threads:
             each.join(PATIENCE)
             assert not each.is_alive()
@@ -188,7 +188,7 @@ class Users:
 
 
 def hold(port: Port) -> None:
-    """Wait at a port's descriptor as the drivers do that are woken by more than bytes."""
+    """Wait on a port's descriptor and a waker, as drivers do."""
     woken = threading.Event()
     with port.hold(woken.set) as descriptor:
         assert descriptor is not None
@@ -205,7 +205,7 @@ CALLS: dict[str, Callable[[Port], Callable[[], object]]] = {
 }
 
 
-#: pyserial's loop:// waits without end for room, which no real port does.
+#: pyserial's loop:// waits for room without a limit, unlike real ports.
 PAIRS = [
     (kind, call)
     for kind in KINDS
@@ -345,7 +345,7 @@ def test_the_thread_of_a_ring_node_is_told(kind: str) -> None:
 
 
 async def _in_loop(opening: Opening, begin: Callable[[], Any], *, elsewhere: bool) -> None:
-    """Close a port while tasks use it, and see that the loop still watches what has got its numbers."""
+    """Close a port while tasks use it, and check that the loop still watches sockets with its old numbers."""
     tasks = [asyncio.ensure_future(begin()) for _ in range(2)]
     await asyncio.sleep(0.005)
     if elsewhere:
@@ -408,7 +408,7 @@ def test_tasks_are_told(kind: str, use: str, elsewhere: bool) -> None:
             await node.close()
 
     if kind == "pyserial" and use == "transact":
-        return  # it hears itself
+        return  # it receives its own bytes
     with opened(kind) as opening:
         asyncio.run(run(opening))
 
@@ -463,7 +463,7 @@ def test_a_simulated_port() -> None:
 
 
 def test_reopening_after_a_loss_by_several_threads() -> None:
-    """A thread that is told late of a loss must not close the port that another has opened again."""
+    """A thread that learns of a loss late must not close the port reopened by another thread."""
     made: list[Port] = []
 
     def opener() -> Port:

@@ -1,4 +1,4 @@
-"""`qlinkgen doctor`: what it finds, what it advises, what it refuses."""
+"""`qlinkgen doctor`: its findings, recommendations and errors."""
 
 from __future__ import annotations
 
@@ -22,12 +22,14 @@ def test_text(qlinkgen: Run, pty: PtyPort) -> None:
     rows = [line.split() for line in result.lines]
     assert ["driver", "pty"] in rows
     assert [row[:3] for row in rows if row[:1] == ["exclusive"]] == [["exclusive", "yes", "other"]]
-    assert "latency      0 us   a pty hands bytes on at once" in result.lines
+    assert "latency      0 us   a pty delivers bytes immediately" in result.lines
     assert any(line.startswith("allowance      260 us  three byte times") for line in result.lines)
-    assert "note: this is no real line: its timing says nothing about one" in result.lines
+    assert (
+        "note: bytes ignore the baud rate here: the timing differs from that of a serial line" in result.lines
+    )
     assert "fix:" not in result.out
     assert "local echo" not in result.out
-    assert pty.read(0) == b""  # nothing is sent unless it is asked for
+    assert pty.read(0) == b""  # nothing is sent without --probe
 
 
 def test_json(qlinkgen: Run, pty: PtyPort) -> None:
@@ -78,8 +80,8 @@ def test_low_latency_refused(qlinkgen: Run, pty: PtyPort, disguise: Disguise) ->
         f"note: the driver cp210x refused low latency; try `sudo setserial {pty.path} low_latency`"
         in result.out
     )
-    assert "20 ms of host slack are reckoned with" in result.out
-    assert "an unknown latency, taken as 16.00 ms, and 4.00 ms to wake this program" in result.out
+    assert "20 ms of host slack are assumed" in result.out
+    assert "an unknown latency, assumed to be 16.00 ms, and 4.00 ms to wake this program" in result.out
 
 
 def test_low_latency_without_a_number(
@@ -92,7 +94,7 @@ def test_low_latency_without_a_number(
     assert found["low_latency"] == "yes"
     (advice,) = found["advice"]
     assert advice["kind"] == "note"
-    assert advice["text"].startswith("its latency is unknown (the driver serial8250 does not tell)")
+    assert advice["text"].startswith("its latency is unknown (the driver serial8250 does not report it)")
 
 
 def test_a_name_that_stays(
@@ -101,7 +103,7 @@ def test_a_name_that_stays(
     link = tmp_path / "usb-FTDI_FT232R-if00"
     link.symlink_to(pty.path)
     monkeypatch.setattr(diagnosis, "BY_ID", tmp_path)
-    note = f"note: {link} is a name that stays with this adapter"
+    note = f"note: {link} is a stable name of this adapter"
     assert note in qlinkgen("doctor", pty.path).lines
     assert "stays with" not in qlinkgen("doctor", link).out
 
@@ -109,7 +111,7 @@ def test_a_name_that_stays(
 def test_probe_without_echo(qlinkgen: Run, pty: PtyPort) -> None:
     result = qlinkgen("doctor", pty.path, "--probe")
     assert result.code == 0
-    assert "local echo   no     the port does not hear what it sends" in result.lines
+    assert "local echo   no     the port does not receive its own bytes" in result.lines
     assert pty.read(0) == b"\0"
 
 
@@ -118,11 +120,11 @@ def test_probe_with_echo(qlinkgen: Run) -> None:
     assert result.code == 0
     (row,) = [line for line in result.lines if line.startswith("local echo")]
     assert "yes" in row
-    assert "note: the port hears what it sends" in result.out
+    assert "note: the port receives its own bytes" in result.out
 
 
 def test_probe_of_a_line_that_is_not_quiet(qlinkgen: Run, pty: PtyPort) -> None:
-    # A thread, because a port forgets what came before it was opened.
+    # A thread, because opening a port discards earlier bytes.
     stop = threading.Event()
 
     def chatter() -> None:
@@ -163,19 +165,19 @@ def test_text_of_an_unclear_probe(qlinkgen: Run, pty: PtyPort, monkeypatch: pyte
     monkeypatch.setattr("qlinkgen.cli.doctor.probe", lambda port: diagnosis.Echo(None, None, "a5a5"))
     result = qlinkgen("doctor", pty.path, "--probe")
     assert result.code == 1
-    assert "local echo   unknown  others were sending: a5a5" in result.lines
-    assert "fix: others are sending on this line (a5a5); end other masters" in result.out
+    assert "local echo   unknown  unexpected bytes: a5a5" in result.lines
+    assert "fix: unexpected bytes on this line (a5a5); stop other masters" in result.out
 
 
 def test_colours_on_a_terminal(qlinkgen: Run, pty: PtyPort, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("qlinkgen.cli.doctor.on_terminal", lambda: True)
-    assert "no real line" in qlinkgen("doctor", pty.path).out
+    assert "ignore the baud rate" in qlinkgen("doctor", pty.path).out
 
 
 def test_missing(qlinkgen: Run) -> None:
     result = qlinkgen("doctor", "/dev/ttyNONE0")
     assert (result.code, result.out) == (1, "")
-    assert result.err.startswith("qlinkgen: error: there is no port '/dev/ttyNONE0'; ")
+    assert result.err.startswith("qlinkgen: error: port '/dev/ttyNONE0' does not exist; ")
 
 
 def test_busy(qlinkgen: Run, pty: PtyPort) -> None:

@@ -1,4 +1,4 @@
-"""The blocking driver and the one for asyncio: one engine, the same outcomes."""
+"""The blocking driver and the asyncio driver: one engine, the same outcomes."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def line(pair: Pair, *nodes: int) -> Iterator[tuple[Port, list[Node]]]:
 
 
 class Client:
-    """A driver, called from a test that is not asynchronous."""
+    """A driver, called from a synchronous test."""
 
     def __init__(self, kind: str, port: Port, engine: MasterEngine, on_event: Any = None) -> None:
         self.asynchronous = kind == "asyncio"
@@ -117,7 +117,7 @@ class Client:
         return self.call(lambda master: master.run(procedure, *rest))
 
     def reports(self, procedure: Procedure[Any], count: int | None = None) -> list[Any]:
-        """What a procedure tells; closed after so many reports."""
+        """The reports of a procedure, closed after a number of them."""
         if self.asynchronous:
             return self.call(lambda master: _reports_async(master, procedure, count))  # type: ignore[no-any-return]
         reports = []
@@ -292,7 +292,7 @@ class TestOneTransactionAtATime:
 
 
 class Interrupted(BaseException):
-    """Ctrl-C, or what a signal handler raises."""
+    """Ctrl-C, or an exception of a signal handler."""
 
 
 class TestGivingUp:
@@ -319,7 +319,7 @@ class TestGivingUp:
         assert (old.requests, old.answers) == (1, 0)
         reply = master.transact(qlink.LoopBackRequest(node=3, data=b"x"))
         assert reply.response.data == b"x"
-        assert old.late == 1  # the answer to what was given up
+        assert old.late == 1  # the answer to the aborted transaction
         assert len(nodes[0].heard) == 2
 
     @over_both
@@ -452,7 +452,7 @@ class TestPortLost:
 
 
 class Cleaner:
-    """Procedures that note how they ended."""
+    """Procedures that record how they ended."""
 
     def __init__(self) -> None:
         self.closed = 0
@@ -674,4 +674,4 @@ def test_behind_a_pty_another_program_has_to_be_woken_too() -> None:
     _, port, _ = bus()
     port.capabilities = Capabilities(latency=0.0, paced=Ability.NO)
     assert host_slack(port) == pytest.approx(WAKE_UP + OTHER_PROGRAM)
-    assert not timing_of(qlink, port).paced  # nobody knows, so nothing is taken for granted
+    assert not timing_of(qlink, port).paced  # unknown, so assumed not to be paced

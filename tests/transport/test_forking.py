@@ -1,4 +1,4 @@
-"""A child that is forked while other threads use ports and drivers: it never waits for them."""
+"""A child forked while other threads use ports and drivers never waits for them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ASK = qlink.MotorPositionRequest(node=3)
 
 
 def in_child(check: Callable[[], object]) -> None:
-    """Fork, check something in the child within its time, and fail with it."""
+    """Fork, check something in the child within a time limit, and fail if the child fails."""
     reader, writer = os.pipe()
     child = os.fork()
     if not child:
@@ -39,7 +39,7 @@ def in_child(check: Callable[[], object]) -> None:
         signal.setitimer(signal.ITIMER_REAL, PATIENCE)  # SIGALRM ends a child that waits
         try:
             check()
-        except BaseException:  # noqa: BLE001  # no test may go on in the child
+        except BaseException:  # noqa: BLE001  # the test must not continue in the child
             os.write(writer, traceback.format_exc().encode())
         os._exit(0)
     os.close(writer)
@@ -50,7 +50,7 @@ def in_child(check: Callable[[], object]) -> None:
 
 
 class Slow(Port):
-    """A port on which every call takes long, and tells that it has begun."""
+    """A port whose calls take long, and signal their start."""
 
     name, baud, capabilities = "slow", 115200, Capabilities()
 
@@ -114,7 +114,7 @@ def test_a_bus_during_a_transaction(threads: Start, use: str) -> None:
 
 
 def test_a_bus_in_the_child_asks(threads: Start) -> None:
-    """What was under way in the parent is given up, and the bus works."""
+    """The pending transaction of the parent is aborted, and the bus works."""
     with open_pty() as far, SerialPort(far.path) as port:
         bus = Bus(port, slack=0.0, attempts=1, echo="none")
         asked = threading.Event()
@@ -138,7 +138,7 @@ def test_a_bus_in_the_child_asks(threads: Start) -> None:
 
 
 def test_ports(threads: Start) -> None:
-    """Every kind of port is closed in the child at once, and works on in the parent."""
+    """Every kind of port can be closed in the child at once, and still works in the parent."""
     with ExitStack() as rest:
         pty = rest.enter_context(open_pty())
         serial = SerialPort(pty.path)
@@ -169,7 +169,7 @@ def test_ports(threads: Start) -> None:
 
 
 def test_locks_that_are_held() -> None:
-    """Locks are held by another thread at the very moment of the fork."""
+    """Locks are held by another thread during the fork."""
     memory, _ = memory_pair()
     again = ReopeningPort(lambda: memory_pair()[0])
     waker = Waker()
@@ -211,7 +211,7 @@ def test_a_ring_node_has_no_thread_in_the_child() -> None:
     node = NodeThread(near, RingNode(trio))
 
     def check() -> None:
-        with pytest.raises(PortLost, match="forked from it; open the port here, after the fork"):
+        with pytest.raises(PortLost, match="parent process; open the port after the fork"):
             node.until(lambda now: None, None)
         node.close()
 

@@ -1,4 +1,4 @@
-"""The master end of a pty, with programs that come and go at the other."""
+"""The master end of a pty, with programs that open and close the other end."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_usable_without_a_client_and_across_clients(pty: PtyPort) -> None:
     for number in range(3):
         pty.write(b"nobody hears this")
         with SerialPort(pty.path) as client:
-            assert client.read(0) == b""  # what came before it was opened is not for it
+            assert client.read(0) == b""  # bytes from before the open are discarded
             client.write(bytes([number]))
             assert pty.read(PATIENCE) == bytes([number])
         assert pty.read(0) == b""
@@ -58,7 +58,7 @@ def test_a_line_does_not_wait_for_listeners(pty: PtyPort) -> None:
 
 
 def test_full_and_switched_to_lines(pty: PtyPort) -> None:
-    # The kernel itself throws away what makes a line too long; nothing hangs.
+    # The kernel discards bytes beyond the length of a line; no call hangs.
     descriptor = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
     try:
         state = termios.tcgetattr(descriptor)
@@ -155,7 +155,9 @@ def test_the_link_of_a_running_program_is_left_alone(tmp_path: Path, clients: in
         for _ in range(clients):
             SerialPort(str(link)).close()
         before = descriptors()
-        with pytest.raises(PortBusy, match=f"{link} leads to {first.path} and belongs to a program that"):
+        with pytest.raises(
+            PortBusy, match=f"{link} is a link to {first.path} and belongs to a running program"
+        ):
             open_pty(link)
         assert descriptors() == before
         other = subprocess.run(
@@ -165,7 +167,7 @@ def test_the_link_of_a_running_program_is_left_alone(tmp_path: Path, clients: in
             text=True,
             timeout=PATIENCE,
         )
-        assert "belongs to a program that is running; end that program" in other.stdout
+        assert "belongs to a running program; stop that program" in other.stdout
         assert link.readlink() == Path(first.path)
         with SerialPort(str(link)) as client:
             client.write(b"hi")
@@ -173,7 +175,7 @@ def test_the_link_of_a_running_program_is_left_alone(tmp_path: Path, clients: in
 
 
 def test_the_link_of_a_killed_program_is_replaced(tmp_path: Path) -> None:
-    """Also where a terminal, or the pty of another link, has got the number of its pty by then."""
+    """Also if a terminal, or the pty of another link, has reused the number of its pty."""
     link = tmp_path / "bus"
     with open_pty(tmp_path / "other") as other:
         link.symlink_to(other.path)
@@ -206,7 +208,7 @@ def test_what_is_no_link_to_a_pty_is_left_alone(tmp_path: Path, kind: str) -> No
         (tmp_path / "other").write_text("precious")
         path.symlink_to(tmp_path / "other")
     before = descriptors()
-    with pytest.raises(PortError, match="left alone; remove it, or choose another path"):
+    with pytest.raises(PortError, match="not replaced; remove it, or choose another path"):
         open_pty(path)
     assert path.is_dir() if kind == "folder" else path.read_text() == "precious"
     assert descriptors() == before
@@ -222,5 +224,5 @@ def test_no_pty_left(monkeypatch: pytest.MonkeyPatch) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "openpty", refuse)
-    with pytest.raises(PortError, match="gives no pty: No space left on device"):
+    with pytest.raises(PortError, match="cannot open a pty: No space left on device"):
         open_pty()

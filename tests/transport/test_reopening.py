@@ -1,4 +1,4 @@
-"""A port that comes back, told of once, and only where it was asked for."""
+"""Reopening of a lost port: reported once, and only if requested."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_unplugged_and_plugged_in_again(tmp_path: Path) -> None:
         port.read(PATIENCE)
     assert port.fileno() is None
     for use in (lambda: port.read(PATIENCE), lambda: port.write(b"x")):
-        with pytest.raises(PortLost, match="is still away: there is no port") as caught:
+        with pytest.raises(PortLost, match="is still missing: port") as caught:
             use()
         assert isinstance(caught.value.__cause__, PortMissing)
         assert caught.value.port == name
@@ -83,7 +83,7 @@ def test_closed_while_away() -> None:
     made[0][1].close()
     with pytest.raises(PortLost):
         port.read(PATIENCE)
-    # The kernel gives a replugged adapter its old number only when nobody holds it any more.
+    # The kernel gives a reconnected adapter its old number only if it is closed everywhere.
     with pytest.raises(PortLost, match="near 0 was closed here"):
         made[0][0].write(b"x")
     port.close()

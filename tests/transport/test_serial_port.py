@@ -1,4 +1,4 @@
-"""Ports of this machine: real ptys, and a driver that answers what a pty cannot."""
+"""Local ports: real ptys, and a simulated driver for abilities that ptys lack."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_raw_settings(pty: PtyPort) -> None:
 def test_parity_and_stop_bits(
     pty: PtyPort, monkeypatch: pytest.MonkeyPatch, parity: str, stop_bits: int, flags: int
 ) -> None:
-    # What is asked for: a pty itself keeps no parity.
+    # The requested settings: a pty does not keep the parity.
     asked: list[int] = []
     to_kernel = termios.tcsetattr
 
@@ -115,7 +115,7 @@ def test_wrong_arguments(pty: PtyPort, arguments: dict[str, Any], complaint: str
 
 def test_missing() -> None:
     with pytest.raises(
-        PortMissing, match=r"there is no port '/dev/ttyNONE0'; (ports here|no serial port)"
+        PortMissing, match=r"port '/dev/ttyNONE0' does not exist; (available ports|no serial port)"
     ) as e:
         open_port("/dev/ttyNONE0")
     assert e.value.port == "/dev/ttyNONE0"
@@ -129,23 +129,25 @@ def test_the_ports_that_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
     adapter = ListPortInfo("/dev/ttyUSB0")
     adapter.description = "FT232R USB UART"
     monkeypatch.setattr(list_ports, "comports", lambda: [adapter, ListPortInfo("/dev/ttyS0")])
-    with pytest.raises(PortMissing, match=r"; ports here: /dev/ttyS0, /dev/ttyUSB0 \(FT232R USB UART\)$"):
+    with pytest.raises(
+        PortMissing, match=r"; available ports: /dev/ttyS0, /dev/ttyUSB0 \(FT232R USB UART\)$"
+    ):
         open_port("/dev/ttyUSB1")
     monkeypatch.setattr(list_ports, "comports", list)
-    with pytest.raises(PortMissing, match="no serial port is here: is the adapter plugged in"):
+    with pytest.raises(PortMissing, match="no serial ports found: connect the adapter"):
         open_port("/dev/ttyUSB1")
 
 
 def test_a_link_that_leads_nowhere(tmp_path: Path) -> None:
     link = tmp_path / "by-id"
     link.symlink_to("ttyUSB9")
-    with pytest.raises(PortMissing, match=r"by-id leads to ttyUSB9, which is not there"):
+    with pytest.raises(PortMissing, match=r"by-id is a link to ttyUSB9, which does not exist"):
         open_port(str(link))
 
 
 @pytest.mark.parametrize("name", ["/dev/null", "/tmp", __file__])
 def test_no_serial_port(name: str) -> None:
-    with pytest.raises(PortError, match="is no serial port") as caught:
+    with pytest.raises(PortError, match="is not a serial port") as caught:
         open_port(name)
     assert type(caught.value) is PortError
 
@@ -157,7 +159,7 @@ def test_a_device_file_without_hardware(pty: PtyPort, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(termios, "tcgetattr", fail)
     before = descriptors()
-    with pytest.raises(PortMissing, match=f"there is no hardware behind {pty.path}"):
+    with pytest.raises(PortMissing, match=f"{pty.path} has no hardware"):
         open_port(pty.path)
     assert descriptors() == before
 
@@ -179,7 +181,7 @@ def test_busy_for_the_driver(pty: PtyPort, monkeypatch: pytest.MonkeyPatch) -> N
         raise OSError(16, "Device or resource busy", path)
 
     monkeypatch.setattr(os, "open", refuse)
-    # Nobody holds a lock; the process that has it open is found by its descriptor: the pty's own end, here.
+    # Without a lock, the process is found by its descriptor: here the one of our own end of the pty.
     with pytest.raises(PortBusy, match=rf"\(process {os.getpid()}\)"):
         open_port(pty.path)
 
@@ -195,7 +197,7 @@ sys.stdin.read()
 
 
 def test_locked_by_another_program(pty: PtyPort) -> None:
-    # We have the pty open ourselves, at its other end, but it is the lock that counts.
+    # This process has the pty open too, at its other end, but the lock decides.
     command = [sys.executable, "-c", HOLDER, pty.path]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout is not None
@@ -225,14 +227,14 @@ def test_busy_by_someone_who_cannot_be_seen(
     monkeypatch.setattr(failures, "PROC", tmp_path)
     with (
         SerialPort(pty.path),
-        pytest.raises(PortBusy, match=f"another program; `sudo fuser -v {pty.path}` says by which"),
+        pytest.raises(PortBusy, match=f"another program; find it with `sudo fuser -v {pty.path}`"),
     ):
         open_port(pty.path)
 
 
 @pytest.fixture
 def as_nobody() -> Iterator[None]:
-    """Without the powers of root."""
+    """Without root privileges."""
     if os.geteuid() != 0:
         yield
         return
@@ -251,7 +253,7 @@ def test_forbidden(pty: PtyPort, mode: int, fix: str, request: pytest.FixtureReq
         os.chown(pty.path, 0, 20)
     os.chmod(pty.path, mode)  # noqa: PTH101
     request.getfixturevalue("as_nobody")
-    with pytest.raises(PortBusy, match=rf"this user may not open {pty.path} \(c.*, group \w+\); .*{fix}"):
+    with pytest.raises(PortBusy, match=rf"no permission to open {pty.path} \(c.*, group \w+\); .*{fix}"):
         open_port(pty.path)
 
 
@@ -342,7 +344,7 @@ def test_a_port_that_takes_nothing(pty: PtyPort) -> None:
         number = port.fileno()
         assert number is not None
         channel = DescriptorChannel(number, stall=0.01)
-        with pytest.raises(OSError, match=r"took no byte for 0\.0 s, and \d+ are still to be sent"):
+        with pytest.raises(OSError, match=r"no byte accepted for 0\.0 s, \d+ bytes unsent"):
             channel.write(bytes(100_000))
         channel.close()
 
@@ -402,7 +404,7 @@ def test_low_latency_refused(pty: PtyPort, disguise: Disguise) -> None:
         found = port.capabilities
     assert found.low_latency is Ability.UNKNOWN
     assert found.latency is None
-    assert found.latency_source == "the driver cp210x does not tell"
+    assert found.latency_source == "the driver cp210x does not report it"
 
 
 def test_a_timer_that_was_low_before(pty: PtyPort, disguise: Disguise) -> None:
@@ -435,7 +437,9 @@ def test_a_real_port_shuts_others_out(pty: PtyPort, driver: Driver, disguise: Di
 def test_the_driver_sets_another_baud_rate(pty: PtyPort, driver: Driver) -> None:
     driver.register(GET_TERMIOS2, None, [0] * 9 + [9600, 9600])
     before = descriptors()
-    with pytest.raises(CapabilityMissing, match=r"cannot do 250000 baud: its driver has set 9600 instead"):
+    with pytest.raises(
+        CapabilityMissing, match=r"does not support 250000 baud: its driver has set 9600 instead"
+    ):
         open_port(pty.path, baud=250_000)
     assert descriptors() == before
     driver.register(GET_TERMIOS2, None, [0] * 9 + [117_647, 117_647])  # 2.1 % off still works
@@ -459,7 +463,7 @@ def test_rs485_of_the_driver(pty: PtyPort, driver: Driver) -> None:
 def test_rs485_missing(pty: PtyPort) -> None:
     before = descriptors()
     with pytest.raises(
-        CapabilityMissing, match=r"cannot switch an RS485 transceiver; .* direction= a function"
+        CapabilityMissing, match=r"cannot switch an RS485 transceiver; .* a function as direction="
     ):
         open_port(pty.path, rs485=True)
     assert descriptors() == before

@@ -1,4 +1,4 @@
-"""Slaves on a port, blocking and in an event loop, asked by a master over the other end."""
+"""Slaves on a port, blocking and in an event loop, with a master on the other end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ports behind a network, with servers on this machine at any free port."""
+"""Network ports, with servers on this machine."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_unknown_urls() -> None:
 def test_direction_is_for_ports_of_this_machine(listener: socket.socket) -> None:
     for options in ({"rs485": True}, {"direction": lambda sending: None}):
         arguments: dict[str, Any] = options
-        with pytest.raises(CapabilityMissing, match="a port of this machine only"):
+        with pytest.raises(CapabilityMissing, match="only a local port can switch"):
             open_port(url(listener), **arguments)
 
 
@@ -105,7 +105,7 @@ def test_through_pyserial() -> None:
 
 
 class Server:
-    """A serial device server whose line is bridged: it sends back what it is sent."""
+    """A serial device server whose line is looped back."""
 
     def __init__(self, listener: socket.socket) -> None:
         self.listener = listener
@@ -136,7 +136,7 @@ def read_to_the_end(port: Port) -> None:
 
 
 class Failing:
-    """As pyserial's object when a connection ends behind some bytes."""
+    """Like pyserial's object when a connection ends after some bytes."""
 
     def __init__(self, *results: bytes) -> None:
         self.results = list(results)
@@ -176,7 +176,7 @@ def test_rfc2217(listener: socket.socket) -> None:
         assert got == b"\xff\xa5\xa5"
         assert port.capabilities.paced is Ability.UNKNOWN
         port.write(b"hang up")
-        # pyserial may forget the last bytes when the connection ends behind them.
+        # pyserial may lose the last bytes when the connection ends after them.
         with pytest.raises(PortLost, match=r"was lost .connection failed"):
             read_to_the_end(port)
     server.thread.join(PATIENCE)

@@ -67,7 +67,7 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
 
         Raises:
             PortMissing: there is no such port.
-            PortBusy: another program has it, or this user may not open it.
+            PortBusy: another program uses it, or this user lacks the permission.
         """
         return cls(
             open_port(name, baud=baud),

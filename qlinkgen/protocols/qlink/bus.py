@@ -94,7 +94,7 @@ class Bus(BlockingMaster, MasterCalls):
 
         Raises:
             PortMissing: there is no such port.
-            PortBusy: another program has it, or this user may not open it.
+            PortBusy: another program uses it, or this user lacks the permission.
         """
         port = open_port(name, baud=baud or BAUD)
         return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
