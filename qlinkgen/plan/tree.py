@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import get_args
 
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
@@ -100,7 +101,13 @@ class Plan:
 
     def known(self, direction: Direction) -> Mapping[int, MessagePlan]:
         """Messages that a decoder for a direction accepts, by number."""
-        return {message.id: message for message in self.received(direction)}
+        return self._known[direction]
+
+    @cached_property
+    def _known(self) -> Mapping[Direction, Mapping[int, MessagePlan]]:
+        # Decoders look each frame up in it.
+        directions: tuple[Direction, ...] = get_args(Direction)
+        return {each: {message.id: message for message in self.received(each)} for each in directions}
 
     def hears(self, message: MessagePlan) -> Direction:
         """The direction that a decoder of the message has to be set to."""
