@@ -9,7 +9,6 @@ from qlinkgen.backends.c.sizes import size_terms
 from qlinkgen.model.message import Message
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import ByMark, FramePlan
-from qlinkgen.plan.payload import payload_plan
 from qlinkgen.plan.tree import MessagePlan
 
 
@@ -101,7 +100,7 @@ def to_frame(frame: FramePlan, names: Names, address: Address, message: MessageP
     """The function that encodes the whole frame of a message."""
     stated = message.message
     struct = struct_parameter(names, stated, const=True)
-    lines, size = _payload_lines(names, stated, bool(struct)) if stated.fields else ([], "0")
+    lines, size = _payload_lines(names, message, bool(struct)) if stated.fields else ([], "0")
     group = address_group(message, address)
     wrap = f"{names.prefix}_wrap_{group.name}_" if group else f"{names.prefix}_wrap_"
     arguments = f"{names.constant(stated)}_ID, {address.argument}wire, capacity, {size}"
@@ -116,25 +115,26 @@ def _checked(frame: FramePlan, message: MessagePlan) -> str:
     return ", true" if message.checked else ", false"
 
 
-def _payload_lines(names: Names, message: Message, has_struct: bool) -> tuple[list[str], str]:
+def _payload_lines(names: Names, plan: MessagePlan, has_struct: bool) -> tuple[list[str], str]:
     """Statements that encode the payload if it fits; otherwise wrapping fails."""
-    p, call, constant = names.prefix, "message, " if has_struct else "", names.constant(message)
+    p, call, message = names.prefix, "message, " if has_struct else "", plan.message
+    constant = names.constant(message)
     size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
     lines = []
     if message.variable:
         lines.append(f"const size_t payload_size = {size_terms(message, 'message->')};")
         size, fits = "payload_size", f"{p}_fits_(capacity, payload_size)"
     start = f"(int){size}"
-    if message.variable and is_wide(message):
+    if message.variable and is_wide(plan):
         start = f"(payload_size > {constant}_MAX_SIZE) ? (int){names.upper}_ERROR_LENGTH : {start}"
     encode = f"{names.function(message)}_encode({call}{p}_place_(wire, capacity, {size}), {size})"
     lines += [f"int size = {start};", "", f"if ({fits}) {{", f"    size = {encode};", "}"]
     return lines, "size"
 
 
-def is_wide(message: Message) -> bool:
+def is_wide(message: MessagePlan) -> bool:
     """Whether a wrong count can result in a size that exceeds an int."""
-    return any(run.length.maximum > 0xFF for run in payload_plan(message).runs)
+    return any(run.length.maximum > 0xFF for run in message.payload.runs)
 
 
 def expected(names: Names, address: Address, message: MessagePlan) -> Expected:

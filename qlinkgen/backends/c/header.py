@@ -71,6 +71,7 @@ class Header:
         self._kept = tuple(each.message for each in plan.messages)
         self._section = frame_section(plan, self._layouts)
         self._address = framing.address_of(plan.frame, self._section.view.address)
+        self._wide = any(map(framing.is_wide, plan.messages))
 
     def text(self) -> str:
         """The whole header."""
@@ -100,7 +101,7 @@ class Header:
             f=section.view,
             crc=section.check,
             unused=self._unheard(),
-            wide=any(map(framing.is_wide, self._kept)),
+            wide=self._wide,
             address_groups=self._address_groups(),
             shapes=section.shapes(self._names),
             sizes=section.sizes(self._names),

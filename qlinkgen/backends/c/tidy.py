@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 
 _WIDTH = 120
 #: Code is folded after these operators.
 _SEPARATORS = (", ", " || ", " && ", " | ", " + ", " - ", " ? ", " : ", " = ")
+#: A separator or a bracket; two separators may share a space.
+_PLACES = re.compile(rf"(?=([(\[{{)\]}}]|{'|'.join(map(re.escape, _SEPARATORS))}))")
 
 
 def tidy(text: str) -> str:
@@ -90,10 +93,12 @@ def _pieces(line: str, indent: str, width: int) -> list[str]:
 def _best_cut(line: str, least: int, width: int) -> int:
     """Position after the least nested separator, the last of several; 0 if there is none."""
     best, depth, nested = 0, len(line), 0
-    for place, character in enumerate(line[: width + 1]):
-        nested += (character in "([{") - (character in ")]}")
-        found = next((each for each in _SEPARATORS if line.startswith(each, place)), "")
-        end = place + len(found)
-        if found and least < end <= width + 1 and (nested <= depth or best < width // 3):
+    for match in _PLACES.finditer(line, 0, width + 1):
+        found = match[1]
+        if len(found) == 1:
+            nested += 1 if found in "([{" else -1
+            continue
+        end = match.start() + len(found)
+        if least < end and (nested <= depth or best < width // 3):
             best, depth = end, nested
     return best
