@@ -34,6 +34,7 @@ from tests.names.documents import PLAIN_PARTS, Document, Json, frame, packet
 from tests.proof.outputs import plain_numbers
 from tests.python.test_bus import loaded
 from tests.support.cdriver import WARNINGS
+from tests.support.sharing import made_once
 
 #: Types of the schema language, which no name can hide.
 BUILT_IN = ("bool", "bytes", "text")
@@ -183,17 +184,22 @@ def test_there_are_many_words() -> None:
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-def test_headers_are_clean(compiler: str, tmp_path: Path, require_tool: Callable[..., str]) -> None:
+def test_headers_are_clean(
+    compiler: str, tmp_path: Path, shared: Path, require_tool: Callable[..., str]
+) -> None:
     """As many as there are, in one file: names of one protocol do not touch those of another either."""
     program = require_tool(compiler, package=compiler)
-    documents = [many(name, c_words()) for name in MANY]
+    folder = shared / "headers of words"
+    with made_once(folder) as first:
+        if first:
+            for name in MANY:
+                written(many(name, c_words()), "c", folder)
+    paths = sorted(folder.glob("*.h"))
     if compiler == "gcc":
-        documents += [
-            *alone(c_words(), 3),
-            *(Document(word, commands=LEAST) for word in words.names(words.USUAL)),
-        ]
-    names = [name for each in documents for name in written(each, "c", tmp_path)]
-    (tmp_path / "all.c").write_text("".join(f'#include "{name}"\n' for name in names), "utf-8")
+        usual = [Document(word, commands=LEAST) for word in words.names(words.USUAL)]
+        names = [name for each in [*alone(c_words(), 3), *usual] for name in written(each, "c", tmp_path)]
+        paths += [tmp_path / name for name in names]
+    (tmp_path / "all.c").write_text("".join(f'#include "{path}"\n' for path in paths), "utf-8")
     language = "c++" if compiler == "g++" else "c"
     command = [program, "-x", language, *COMPILERS[compiler], *STRICT, "all.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
@@ -210,11 +216,13 @@ def test_kits_compile(name: str, tmp_path: Path, require_tool: Callable[..., str
     assert done.returncode == 0, done.stderr[:4000]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MANY)
 def test_python_and_construct_say_what_the_plan_says(name: str) -> None:
     agree(many(name, python_words()).protocol())
 
 
+@pytest.mark.slow
 def test_python_and_construct_take_every_name_of_a_part() -> None:
     for each in alone(python_words(), 1):
         agree(each.protocol())
