@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pytest
 from qlinkgen.cli import cli, wire_options
 from qlinkgen.cli.boundary import run
 from qlinkgen.sim import VirtualPort, Wire
+from tests.support.remembering import remembering
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,13 @@ commands:
         type: u8
         bits: {heating: {at: 0, type: bool}, level: 4..6}
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _remembering() -> Iterator[None]:
+    """Make calls in this process cheap: there are some 1600 of them, of a few schemas."""
+    with remembering():
+        yield
 
 
 @pytest.fixture
