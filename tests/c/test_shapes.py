@@ -21,6 +21,7 @@ from qlinkgen.backends.base import Options
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema import loads
 from tests.support.cdriver import WARNINGS
+from tests.support.sharing import made_once
 
 STRICT = (*WARNINGS, "-Wshadow")
 START = {
@@ -251,9 +252,16 @@ def others() -> Iterator[tuple[Shape, Protocol]]:
 
 
 @pytest.fixture(scope="module")
-def headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def headers(shared: Path) -> Path:
     """Give a folder with the header of each shape, and a file that includes them all."""
-    folder = tmp_path_factory.mktemp("shapes")
+    folder = shared / "headers of shapes"
+    with made_once(folder) as first:
+        if first:
+            _write(folder)
+    return folder
+
+
+def _write(folder: Path) -> None:
     lines = []
     for shape, protocol in itertools.chain(pairs(), others()):
         role = next(role for role in ROLES if role == shape["role"])
@@ -263,7 +271,6 @@ def headers(tmp_path_factory: pytest.TempPathFactory) -> Path:
         lines += [f"#define {upper}_ENABLE_{what} 1" for what in ("FLOAT", "NAMES")]
         lines.append(f'#include "{protocol.name}.h"')
     (folder / "use.c").write_text("\n".join([*lines, "int used(void);", "int used(void) { return 0; }", ""]))
-    return folder
 
 
 @pytest.mark.parametrize("language", ["c99", "c++17"])
@@ -275,6 +282,7 @@ def test_clean(compiler: str, language: str, headers: Path, require_tool: Callab
     assert done.returncode == 0, done.stderr[:4000]
 
 
+@pytest.mark.slow
 def test_every_option_is_there(headers: Path) -> None:
     """Every option of every axis occurs in a valid schema."""
     text = "".join(path.read_text("utf-8").splitlines()[0] for path in headers.glob("*.h"))

@@ -79,6 +79,7 @@ def test_the_code_is_that_of_harmless_texts_and_docstrings_say_the_text(
         assert structure(tree) == structures(name, harmless(texts))[target], target
 
 
+@pytest.mark.slow
 def test_the_code_is_that_of_harmless_texts_in_each_kind_of_slot_alone() -> None:
     text = f'\'"""\\ {{{{ x }}}} */ ??/ {HOSTILE[0]} {HOSTILE[3]}'
     first = {slot.kind: (name, slot) for name in reversed(SCHEMAS) for slot in slots(name)}

@@ -35,6 +35,9 @@ from tests.proof import cases
 from tests.proof.outputs import plain_numbers
 from tests.support.whole import schemas
 
+#: Making all of these protocols takes some seconds of each worker.
+pytestmark = pytest.mark.slow
+
 Row = Mapping[str, Any]
 #: Random whole schemas, in addition to the shapes of the tests of C headers.
 SEEDS = range(16)
@@ -59,6 +62,18 @@ def written() -> tuple[tuple[Plan, Mapping[str, list[Row]]], ...]:
     return tuple(found)
 
 
+@functools.cache
+def module_of(plan: Plan) -> Any:
+    """The generated Python module."""
+    return python.load(plan.protocol)
+
+
+@functools.cache
+def live_of(plan: Plan) -> construct.Live:
+    """Live construct structures."""
+    return construct.live(plan.protocol)
+
+
 def rows(kind: str) -> Iterator[tuple[Plan, MessagePlan, Row]]:
     for plan, document in written():
         yield from ((plan, plan.message(row["message"]), row) for row in document[kind])
@@ -76,7 +91,7 @@ def test_many_shapes() -> None:
 
 def test_every_right_vector_decodes_in_python_and_construct() -> None:
     for plan, document in written():
-        module, live = python.load(plan.protocol), construct.live(plan.protocol)
+        module, live = module_of(plan), live_of(plan)
         for row in document["vectors"]:
             message = plan.message(row["message"])
             fields = {v.name: from_json(v, row["fields"][v.name]) for v in message.message.values}
@@ -101,7 +116,7 @@ def decoded(module: Any, plan: Plan, message: MessagePlan, row: Row) -> Any:
 
 def test_every_fault_has_its_kind_in_python_and_is_none_of_constructs_frames() -> None:
     for plan, document in written():
-        module, live = python.load(plan.protocol), construct.live(plan.protocol)
+        module, live = module_of(plan), live_of(plan)
         for row in document["faults"]:
             message = plan.message(row["message"])
             with pytest.raises(module.DecodeError) as caught:
@@ -173,7 +188,7 @@ def checked(plan: Plan, message: MessagePlan, cells: Mapping[str, bytes], row: R
 def test_a_frame_is_cut_everywhere() -> None:
     """The first message of each direction is cut after every number of bytes that is not a frame."""
     for plan, document in written():
-        module = python.load(plan.protocol)
+        module = module_of(plan)
         begun: set[str] = set()
         for message in plan.messages:
             if message.direction in begun:

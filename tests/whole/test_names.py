@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from qlinkgen.backends import c
 from qlinkgen.backends.base import Options
 from qlinkgen.model import naming
@@ -16,6 +18,7 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _WORD = re.compile(r"(?<![\w>.])[a-z_]\w*")
 
 
+@pytest.mark.slow
 def test_no_address_is_called_like_another_word_of_its_functions_in_c() -> None:
     found: set[str] = set()
     for seed in range(150):
