@@ -35,6 +35,14 @@ class FrameError(ConstructError):
         self.kind = kind
 
 
+class NeedsRequest(FrameError):
+    """A response without the request that it answers."""
+
+    def __init__(self) -> None:
+        text = "a response needs its request: pass request=packet to build and parse"
+        super().__init__("unknown", text)
+
+
 class CRC(NamedTuple):
     """A CRC with the parameters of the catalogue, computed bit by bit according to their definition."""
 
@@ -162,10 +170,7 @@ class Check(NamedTuple):
         if not self.word:
             return self.packed(self.algorithm.compute(b"".join(runs)))
         if not request:
-            raise FrameError(
-                "unknown",
-                "a response needs its request: pass request=packet to build and parse",
-            )
+            raise NeedsRequest
         words = [
             run[at : at + self.word]
             for run in (request[1:], *runs)
@@ -550,10 +555,7 @@ class Packet(Frame):
     def _frame(self, wire: bytes, request: bytes) -> Container:
         has_id = isinstance(self.parts[0], Id)
         if not has_id and not request:
-            raise FrameError(
-                "unknown",
-                "a response needs its request: pass request=packet to build and parse",
-            )
+            raise NeedsRequest
         first = (wire if has_id else request)[0]
         message = self._known(first)
         beside = self.overhead(message)
