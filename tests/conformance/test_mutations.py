@@ -53,7 +53,7 @@ MISTAKES = {
         {"set_outputs.request"},
         {"ask"},
     ),
-    "nobody is told": Mistake(
+    "a function not called": Mistake(
         "qlink", "master->motion != NULL", "master->motion == NULL", {"motion.response"}, {"tell"}
     ),
     "the end of another": Mistake(

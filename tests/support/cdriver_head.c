@@ -1,4 +1,4 @@
-/* Front of every driver program; the writer puts the protocol's prefix in place of the marks. */
+/* First part of every driver program; the writer replaces the marks with the protocol's prefix. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,7 @@ static char line[LINE_SIZE];
 static uint8_t bytes_a[LINE_SIZE / 2];
 static uint8_t bytes_b[LINE_SIZE / 2];
 
-/* AddressSanitizer is told that what follows the bytes of a frame is not theirs, so that it sees a read past them. */
+/* The memory after the bytes of a frame is marked for AddressSanitizer, so that it reports a read past them. */
 #ifdef __has_feature
 #if __has_feature(address_sanitizer)
 #define SANITIZED 1
@@ -41,7 +41,7 @@ static size_t from_hex(const char *text, uint8_t *out)
     return size;
 }
 
-/* Bytes at the end of a piece of memory, so that a sanitizer sees what is read or written behind them. */
+/* Bytes at the end of an allocation, so that a sanitizer reports a read or write past them. */
 static uint8_t *copy_of(const uint8_t *bytes, size_t size)
 {
     uint8_t *const memory = (uint8_t *)malloc(size + 16u);

@@ -1,7 +1,7 @@
 
 /* ---- Target decoders: @p@ ---- */
 
-/* By message; by size (too short, the longest, too long) and address, or for an answer with its sum; by status. */
+/* By message; by size (too short, the longest, too long) and address, or for a response with its checksum; by status. */
 OUTCOMES static uint8_t @p@_outcomes_[@messages@u + 1u][7][10];
 
 /* Any bytes as the payload of any message. */

@@ -1,4 +1,4 @@
-/* What every fuzz target begins with: an input that is taken byte by byte, and memory of exactly the size asked for. */
+/* First part of every fuzz target: an input read byte by byte, and allocations of exactly the requested size. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,14 +17,14 @@ typedef struct {
     size_t left;
 } input_t;
 
-/* Outcomes that a compiler may choose without a branch: libFuzzer keeps an input for each of these as well. */
+/* Outcomes that a compiler may compute without a branch: libFuzzer keeps an input for each of these as well. */
 #ifdef REPLAY
 #define OUTCOMES
 #else
 #define OUTCOMES __attribute__((section("__libfuzzer_extra_counters")))
 #endif
 
-/* Behind the end of the input there are zeros. */
+/* Zeros after the end of the input. */
 static inline uint8_t take(input_t *input)
 {
     if (input->left == 0u) { return 0u; }
@@ -39,7 +39,7 @@ static inline uint64_t take_number(input_t *input, size_t bytes)
     return number;
 }
 
-/* A number of steps: any double, or some quarters more than a whole number, than the least or than the most. */
+/* A number of steps: any double, or a few quarters above a whole number, the minimum or the maximum. */
 static inline double take_steps(input_t *input, double least, double most)
 {
     const uint8_t kind = take(input);
@@ -55,15 +55,15 @@ static inline double take_steps(input_t *input, double least, double most)
     }
 }
 
-/* Often all of it, else any room at all. */
+/* Often the largest capacity, otherwise a random one. */
 static inline size_t take_capacity(input_t *input, size_t most)
 {
     const uint8_t chosen = take(input);
     return (chosen % 2u == 0u) ? most : (size_t)take_number(input, 2u) % (most + 1u);
 }
 
-/* Memory of its own, so that a byte before or behind it is noticed; of no bytes, the end of some that nobody asks for,
- * as the heap's least piece is one byte. */
+/* An allocation of its own, so that an access before or after it is reported. For zero bytes it is the end of an
+ * unused allocation, because the smallest one on the heap has one byte. */
 static uint8_t none[8];
 
 static inline uint8_t *room(size_t size)

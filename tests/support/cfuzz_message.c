@@ -1,7 +1,7 @@
 
 /* ---- @name@ ---- */
 @fill@
-/* Decodes any bytes; what could be decoded is encoded to the same bytes, and decoded once more. */
+/* Decodes random bytes; a decoded message is encoded to the same bytes, and decoded once more. */
 static inline bool @f@_again_(const uint8_t *bytes, size_t size)
 {
     @type@ first@zero@;
@@ -20,7 +20,7 @@ static inline bool @f@_again_(const uint8_t *bytes, size_t size)
     return true;
 }
 
-/* Makes a frame of any values. */
+/* Builds a frame of random values. */
 static inline int @f@_made_(input_t *input, uint64_t whom, uint8_t *wire, size_t capacity)
 {
     @type@ message@zero@;
@@ -31,7 +31,7 @@ static inline int @f@_made_(input_t *input, uint64_t whom, uint8_t *wire, size_t
     return @to_frame@;
 }
 
-/* Encodes any values, for any address, into any room; what could be encoded can be decoded. */
+/* Encodes random values for a random address and capacity; an encoded message can be decoded. */
 static inline void @f@_any_(input_t *input)
 {
     @type@ message@zero@;

@@ -17,7 +17,7 @@ static void @p@_event_(bool answer, const @p@_receiver_t *receiver, @p@_event_t 
     if (event == @P@_EVENT_FRAME) { @p@_delivered_(answer, receiver); }
 }
 
-/* Tells whether a frame of this id came. */
+/* Whether a frame with this id was received. */
 static bool @p@_fed_(bool answer, @p@_receiver_t *receiver, uint8_t byte, uint8_t id)
 {
     @p@_event_t event = @p@_receive(receiver, byte);
@@ -42,7 +42,7 @@ static void @p@_receiver_(input_t *input)
     @p@_receiver_init(receiver@init@);
     while (input->left != 0u) { (void)@p@_fed_(answer, receiver, take(input), id); }
 @finish@
-    /* Whatever came before, an intact frame is delivered. */
+    /* An intact frame is delivered after any input. */
     size = @p@_made_(last, &content, @lawful@u, wire, sizeof wire);
     for (int index = 0; index < size; ++index) {
         came = @p@_fed_(answer, receiver, wire[index], id) || came;

@@ -1,7 +1,7 @@
 typedef struct {
     input_t input;
     unsigned called;
-    bool answers; /* the function said so, and its answer can be sent */
+    bool answers; /* the function accepted the request, and its response can be sent */
 } @p@_context_t;
 @handlers@
 static void @p@_ask_(input_t *input)

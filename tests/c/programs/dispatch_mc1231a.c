@@ -33,7 +33,7 @@ int main(void)
     got = asked(wire, size);
     assert(mc1231a_set_1_response_from_frame(&status, mc1231a_request_sum(wire, (size_t)size), answer, got) == MC1231A_OK);
     assert(status.status == 0x0105u);
-    /* without a function the command is refused as the chip refuses it */
+    /* a command without a function is refused in the same way as by the chip */
     slave.set_1 = NULL;
     got = asked(wire, size);
     assert(mc1231a_set_1_response_from_frame(&status, mc1231a_request_sum(wire, (size_t)size), answer, got) == MC1231A_ERROR_ILLEGAL);

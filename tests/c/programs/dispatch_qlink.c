@@ -34,7 +34,7 @@ int main(void)
     size_t size;
     const uint8_t bad[4] = { 17u, 0u, 0u, 0u };
     slave.node = 3u;
-    /* nobody home */
+    /* no function for the command */
     assert(asked(qlink_motion_request_to_frame(&motion, 3u, wire, sizeof wire), wire) == 0u);
     slave.motion = on_motion; slave.node_setup = on_setup; slave.node_start = on_start; slave.node_sync = on_sync;
     /* answered, and understood by the master */
@@ -44,7 +44,7 @@ int main(void)
     assert(qlink_frame_decode(&reply, body, answer, size) == QLINK_OK && reply.node == 3u);
     master.motion = on_response;
     assert(qlink_master_dispatch(&master, &reply) == QLINK_OK && responses == 302);
-    /* an answer cannot come from everybody, nor from a node that cannot be; what is wrong in it is told first */
+    /* a response comes neither from the broadcast address nor from an invalid node; its own errors come first */
     responses = 0;
     for (unsigned node = 0u; node <= 255u; ++node) {
         reply.node = (uint8_t)node;
@@ -54,19 +54,19 @@ int main(void)
     assert(responses == 1602);
     --reply.size;
     assert(qlink_master_dispatch(&master, &reply) == QLINK_ERROR_LENGTH && responses == 1602);
-    /* another node; a function that says no */
+    /* another node; a function that refuses */
     assert(asked(qlink_motion_request_to_frame(&motion, 4u, wire, sizeof wire), wire) == 0u && motions == 1);
     motion.outputs = 0xFFu;
     assert(asked(qlink_motion_request_to_frame(&motion, 3u, wire, sizeof wire), wire) == 0u && motions == 2);
-    /* one or all; all alone */
+    /* one node or all nodes; only all nodes */
     assert(asked(qlink_node_start_request_to_frame(3u, wire, sizeof wire), wire) == 0u && started == 1);
     assert(asked(qlink_node_start_request_to_frame(0u, wire, sizeof wire), wire) == 0u && started == 101);
     assert(asked(qlink_node_sync_request_to_frame(&sync, 0u, wire, sizeof wire), wire) == 0u && synced == 9);
     assert(qlink_node_sync_request_to_frame(&sync, 3u, wire, sizeof wire) == QLINK_ERROR_RANGE);
     assert(qlink_motion_request_to_frame(&motion, 0u, wire, sizeof wire) == QLINK_ERROR_RANGE);
-    /* a broadcast that must not be one is not handled */
+    /* a broadcast of a command that may not be broadcast is not handled */
     assert(asked(qlink_frame_encode(QLINK_MOTION_REQUEST_ID, 0u, bad, 2u, wire, sizeof wire), wire) == 0u && motions == 2);
-    /* wrong values, wrong sizes, unknown commands reach nobody */
+    /* invalid values, invalid sizes and unknown commands reach no function */
     assert(asked(qlink_frame_encode(QLINK_NODE_SETUP_REQUEST_ID, 3u, bad, 4u, wire, sizeof wire), wire) == 0u && slave.node == 3u);
     assert(asked(qlink_frame_encode(QLINK_MOTION_REQUEST_ID, 3u, bad, 1u, wire, sizeof wire), wire) == 0u && motions == 2);
     assert(asked(qlink_frame_encode(0x77u, 3u, bad, 4u, wire, sizeof wire), wire) == 0u);
@@ -75,7 +75,7 @@ int main(void)
     setup.node_number = 5u;
     size = asked(qlink_node_setup_request_to_frame(&setup, 0u, wire, sizeof wire), wire);
     assert(size > 0u && qlink_frame_decode(&reply, body, answer, size) == QLINK_OK && reply.node == 5u);
-    /* every capacity that is too small says so, and one that is enough is enough */
+    /* each capacity that is too small is reported, and one that suffices is accepted */
     motion.counter = 0xA5u; motion.segments[0] = 0xA5A5u; motion.segments[1] = 0xA5A5u;
     {
         const int whole = qlink_motion_request_to_frame(&motion, 3u, wire, sizeof wire);
@@ -86,7 +86,7 @@ int main(void)
             assert(got == (room < (size_t)whole ? (int)QLINK_ERROR_CAPACITY : whole));
         }
     }
-    /* an empty request is taken as its defaults */
+    /* an empty request is decoded as its defaults */
     {
         qlink_node_program_load_request_t load = { 9u, 1u, { 0u } };
         assert(qlink_node_program_load_request_decode(&load, bad, 0u) == QLINK_OK && load.counter == 0u && load.program_data_size == 0u);

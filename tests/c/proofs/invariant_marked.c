@@ -1,4 +1,4 @@
-/* The invariant of a receiver of marked frames (receiver_marked). There are never more bytes than the buffer takes. */
+/* The invariant of a receiver of marked frames (receiver_marked): the bytes received fit the buffer. */
 static bool inside(const @p@_receiver_t *receiver)
 {
     return receiver->state == @P@_INSIDE_;

@@ -1,5 +1,5 @@
-/* The invariant of a receiver of bare packets (receiver_packet). Inside a packet, at least one byte is missing of a
- * number that the buffer takes. */
+/* The invariant of a receiver of bare packets (receiver_packet). Inside a packet, at least one byte is missing, and the
+ * expected number of bytes fits the buffer. */
 static bool holds(const @p@_receiver_t *receiver)
 {
     return !receiver->inside ||

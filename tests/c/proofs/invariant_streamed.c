@@ -1,6 +1,6 @@
-/* The invariant of a receiver with a unique preamble (receiver_streamed). In the body, also behind a byte that is
- * stuffed: the first byte is a length that frames may have, at least one byte is there and at least one is missing.
- * Elsewhere the position and the bytes may be anything: the next preamble begins them anew. */
+/* The invariant of a receiver with a unique preamble (receiver_streamed). In the body, also after a stuffed byte: the
+ * first byte is a length that frames may have, at least one byte is received and at least one is missing. In the
+ * other states position and bytes may have any value: the next preamble restarts them. */
 static bool inside(const @p@_receiver_t *receiver)
 {
     return receiver->state == @P@_BODY_ || receiver->state == @P@_ESCAPE_;

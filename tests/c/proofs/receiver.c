@@ -1,6 +1,6 @@
-/* What is proven of a receiver. @p@ and @P@ stand for the protocol's name; the invariant, `holds`, stands in the file
- * for its kind of receiver. One step from any state that satisfies it is memory-safe and leads to such a state, and
- * so does the start: together that is memory safety for streams of any length. */
+/* The proof of a receiver. @p@ and @P@ are replaced by the protocol's name; the invariant, `holds`, is defined in the
+ * file for its kind of receiver. One step from any state that satisfies it is memory-safe and leads to such a state,
+ * and the initial state satisfies it: together that is memory safety for streams of any length. */
 #include "@p@.h"
 
 #define LENGTH 16u
@@ -17,7 +17,7 @@ size_t nondet_size(void);
 
 @invariant@
 
-/* A frame is no longer than frames may be and lies inside the receiver's buffer, each byte of it. */
+/* A frame has at most the size that frames may have, and every byte of it is in the receiver's buffer. */
 static void delivered(const @p@_receiver_t *receiver)
 {
     const @p@_frame_t frame = @p@_receiver_frame(receiver);

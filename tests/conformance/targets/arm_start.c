@@ -1,5 +1,5 @@
-/* The kit on a Cortex-M3 (board lm3s6965evb) without any library: vectors, memory, the first UART, and the end, which is
- * told to the emulator by semihosting. */
+/* The kit on a Cortex-M3 (board lm3s6965evb) without any library: vectors, memory, the first UART, and the exit, which
+ * the emulator learns by semihosting. */
 #include <stdint.h>
 
 void conformance_put(char character);
@@ -32,7 +32,7 @@ void conformance_put(char character)
     UART0_DATA = (uint8_t)character;
 }
 
-/* What the compiler itself calls. */
+/* Functions that the compiler calls by itself. */
 void *memcpy(void *to, const void *from, uintptr_t size)
 {
     volatile uint8_t *target = to;

@@ -1,4 +1,4 @@
-/* The kit on an ATmega328P: its UART is where the lines go, and GPIOR0 tells how it ended. */
+/* The kit on an ATmega328P: the lines are written to its UART, the result to GPIOR0. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include <avr/sleep.h>

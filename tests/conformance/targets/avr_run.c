@@ -1,5 +1,5 @@
-/* Runs a firmware on a simulated ATmega328P until it sleeps for ever: copies what its UART sends to the standard
- * output, and exits with what stands in the low bits of GPIOR0. */
+/* Runs a firmware on a simulated ATmega328P until it sleeps with interrupts off: copies the output of its UART to the
+ * standard output, and exits with the low bits of GPIOR0. */
 #include <sim_avr.h>
 #include <avr_uart.h>
 #include <sim_elf.h>
@@ -19,11 +19,11 @@ static void sent(struct avr_irq_t *irq, uint32_t byte, void *context)
 int main(int argc, char **argv)
 {
     elf_firmware_t firmware = {{0}};
-    uint32_t flags = 0; /* no echo of lines by simavr itself, and no sleeping while the firmware polls */
+    uint32_t flags = 0; /* simavr neither echoes lines itself nor sleeps while the firmware polls */
     FILE *const out = fdopen(dup(STDOUT_FILENO), "w");
     int state;
     avr_t *avr;
-    (void)dup2(STDERR_FILENO, STDOUT_FILENO); /* simavr has something to say too */
+    (void)dup2(STDERR_FILENO, STDOUT_FILENO); /* simavr prints to it as well */
     avr = avr_make_mcu_by_name("atmega328p");
     if (argc != 2 || out == NULL || avr == NULL || elf_read_firmware(argv[1], &firmware) != 0) {
         (void)fprintf(stderr, "usage: avr_run FIRMWARE.elf, with a simavr that knows the atmega328p\n");
@@ -39,7 +39,7 @@ int main(int argc, char **argv)
     } while (state != cpu_Done && state != cpu_Crashed);
     (void)fclose(out);
     if (state == cpu_Crashed || (avr->data[GPIOR0] & 0xF0) != ENDED) {
-        (void)fprintf(stderr, "avr_run: the firmware did not come to its end\n");
+        (void)fprintf(stderr, "avr_run: the firmware crashed, or slept without a result\n");
         return 3;
     }
     return avr->data[GPIOR0] & 0x0F;
