@@ -1,1 +1,1 @@
-"""Behaviour of the protocols beyond their bytes, for both sides of the wire."""
+"""Protocol behaviour beyond encoding, for both sides of the wire."""

@@ -1,4 +1,4 @@
-"""Clients that are imported when they are asked for."""
+"""Lazy import of asyncio clients."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 
 
 def asyncio_clients(package: str, names: Collection[str]) -> Callable[[str], object]:
-    """Return a package's `__getattr__` for names of its module `aio`: asyncio costs other programs 50 ms."""
+    """Return a package's `__getattr__` for names of its module `aio`: importing asyncio takes 50 ms."""
 
     def find(name: str) -> object:
         if name in names:

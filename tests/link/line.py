@@ -72,7 +72,7 @@ def drive(
 ) -> Run:
     """Perform one transaction while bytes arrive at given times; the engine is called at each of its timers.
 
-    As drivers do, what came before is read when the transaction begins.
+    Earlier bytes are read when the transaction begins, as drivers do.
     """
     queue = sorted(arrivals, key=lambda item: item[0])
     run = Run()

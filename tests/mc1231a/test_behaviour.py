@@ -1,4 +1,4 @@
-"""What a user sees of a chip set: the same on every client and over every transport."""
+"""Behaviour of a chip set for a user: the same with every client and transport."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_after_a_reset_the_axis_is_unknown_to_the_host(rig: Rig) -> None:
 
 def test_there_are_two_axes(rig: Rig) -> None:
     for call in (lambda: rig.host.axis(3), lambda: rig.host.get_status(0), lambda: rig.host.update(3)):
-        with pytest.raises(ValueError, match="axes 1 and 2"):
+        with pytest.raises(ValueError, match="axis must be 1 or 2"):
             call()
     assert rig.packets == []
 

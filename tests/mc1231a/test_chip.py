@@ -354,7 +354,7 @@ def test_what_is_wired_stays_after_a_reset(bench: Bench) -> None:
 def test_arguments_of_what_is_wired(bench: Bench) -> None:
     with pytest.raises(ValueError, match="ext"):
         bench.chip.pulse(1, "zero")
-    with pytest.raises(ValueError, match="axes 1 and 2"):
+    with pytest.raises(ValueError, match="axis must be 1 or 2"):
         bench.chip.pulse(3, "index")
 
 

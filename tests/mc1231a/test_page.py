@@ -93,7 +93,7 @@ def test_a_legal_packet_may_sum_to_zero() -> None:
 
 
 def test_a_chip_set_is_made_of_commands_that_there_are() -> None:
-    with pytest.raises(ValueError, match="no command 'set_kpp'"):
+    with pytest.raises(ValueError, match="unknown command 'set_kpp'"):
         ChipSet(illegal=["set_kpp"])
     with pytest.raises(ValueError, match="sample"):
         ChipSet(sample_time=0)

@@ -1,4 +1,4 @@
-"""What makes an AsyncBus look like a Bus."""
+"""A blocking wrapper of an AsyncBus."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ PATIENCE = 100
 
 @dataclass(frozen=True)
 class Setting:
-    """Where a behaviour is tried; `firmware` names the port that the first node is."""
+    """A setting of the behaviours; `firmware` names the target of the first node."""
 
     name: str
     client: Literal["blocking", "asyncio"] = "blocking"
@@ -60,7 +60,7 @@ class Setting:
 
     @property
     def faulty(self) -> bool:
-        """A call may fail."""
+        """Whether calls may fail."""
         return bool(self.rates or self.partial or self.changed)
 
 
@@ -97,7 +97,7 @@ FIRMWARE_FAULTS = [
 
 
 class Slave:
-    """A node as a test wants it; the settings are those of `VirtualNode`."""
+    """A node to make; the settings are those of `VirtualNode`."""
 
     def __init__(self, number: int = 1, **settings: Any) -> None:
         self.number = number
@@ -105,7 +105,7 @@ class Slave:
 
 
 class Probe(VirtualNode):
-    """A virtual node that keeps what it heard, and can lose answers.
+    """A virtual node that records requests, and can lose answers.
 
     Attributes:
         heard: requests, in their order.
@@ -136,13 +136,13 @@ class Probe(VirtualNode):
 
     @property
     def words(self) -> list[int]:
-        """Words that it has queued."""
+        """All words ever queued."""
         assert self.record is not None
         return self.record.words.tolist()
 
     @property
     def loaded(self) -> bytes | None:
-        """Text of the loaded program, from its end record on."""
+        """Text of the loaded program, once its end record was received."""
         return self.program.text if self.program is not None else None
 
     @property
@@ -157,7 +157,7 @@ class Probe(VirtualNode):
 
     @property
     def capacity(self) -> int:
-        """Words that its FIFO holds."""
+        """Capacity of its FIFO in words."""
         return self.path.capacity
 
     @property
@@ -180,13 +180,13 @@ class Probe(VirtualNode):
         self.path.position = value
 
     def switch_input_1(self, level: int) -> float:
-        """Put a level on input 1 and none on the others. Returns when."""
+        """Set the level of input 1 and clear the others. Return the time."""
         now = self.clock()
         self.set_inputs(level, now)
         return now
 
     def clock(self) -> float:
-        """Seconds of the node's own time, that of what it heard last."""
+        """Time of the last request, in seconds of the node's clock."""
         assert self.now is not None, "it has heard nothing yet"
         return self.now
 
@@ -224,14 +224,14 @@ class Rig:
         self.bus.port.sleep(seconds)
 
     def sure(self, call: Callable[[], T]) -> T:
-        """Do what a user does: on a bad line, try again. On a good one nothing may fail."""
+        """Call with retries on a bad line. On a good line no call may fail."""
         for _ in range(PATIENCE if self.faulty else 0):
             with contextlib.suppress(LinkError):
                 return call()
         return call()
 
     def move(self, number: int, words: list[int], outputs: int = 0) -> qlink.MotionResponse:
-        """Hand over words that no earlier motion has; settle them where no answer comes."""
+        """Send unique words; settle them if there is no answer."""
         for _ in range(PATIENCE if self.faulty else 1):
             try:
                 return self.bus.motion(number, outputs=outputs, segments=words)
@@ -244,7 +244,7 @@ class Rig:
         raise AssertionError("the words were never sent")
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Keep asking, so that time passes for the nodes as well, until something is so."""
+        """Keep sending requests, so that time advances for the nodes too, until a condition holds."""
         for _ in range(5000):
             self.sure(lambda: self.bus.read(self.node.number, size=1))
             if condition():
@@ -278,7 +278,7 @@ def make_rig(setting: Setting, *nodes: Node, turnaround: float = 0.0, **options:
             client = AsyncBus(port, **given)
             stack.callback(client.close)
             bus = cast(Bus, AsBlocking(client, loop))
-        # A firmware tells under the same names what the behaviours ask of a node.
+        # A firmware node has the same attributes.
         yield Rig(setting, cast(tuple[Probe, ...], nodes), bus, wire)
 
 
@@ -296,7 +296,7 @@ def _port(setting: Setting, wire: Wire) -> Iterator[Port]:
 
 
 def _stray(chance: random.Random) -> bytes:
-    """A valid answer of a node that there is not: a node's own could be the answer to what is asked."""
+    """A valid answer of a missing node; that of an existing one could answer the pending request."""
     node = chance.randrange(12, 17)
     answers: list[qlink.Message] = [
         qlink.MotionResponse(node=node, counter=chance.randrange(256), fifo_space=255),

@@ -47,7 +47,7 @@ def make_clean(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
 
 @pytest.fixture(params=CLEAN, ids=lambda setting: setting.name)
 def make_simulated(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
-    """Return the same for what no firmware shows; a test that uses this says why."""
+    """Return the same without firmware, for state that firmware does not show; tests state the reason."""
     yield from _maker(request)
 
 
@@ -66,7 +66,7 @@ def _maker(request: pytest.FixtureRequest) -> Iterator[MakeRig]:
 def _nodes(
     setting: Setting, slaves: tuple[Slave, ...], request: pytest.FixtureRequest, stack: contextlib.ExitStack
 ) -> list[Node]:
-    """Return simulated nodes, the first one a firmware where that is the setting."""
+    """Return simulated nodes, the first one a firmware in those settings."""
     nodes: list[Node] = [Probe(each.number, **each.settings) for each in slaves[bool(setting.firmware) :]]
     if setting.firmware:
         line_to: FirmwareLines = request.getfixturevalue("firmware_line")

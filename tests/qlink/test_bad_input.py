@@ -1,4 +1,4 @@
-"""Wrong arguments, ports that go away, Ctrl-C: a clear error, nothing sent, and a bus that works again."""
+"""Wrong arguments, lost ports, Ctrl-C: a clear error, nothing sent, and a usable bus."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from qlinkgen.transport import memory_pair
 from tests.qlink.behaviour_rig import CLEAN, Probe, Rig, Setting, make_rig
 from tests.qlink.test_behaviour_node import hex_text
 
-#: Each with a word that the error has to say.
+#: Each with a word that the error must contain.
 WRONG: list[tuple[str, Callable[[Bus], object], str]] = [
     ("node 17", lambda bus: bus.motor_position(17), "node"),
     ("node -1", lambda bus: bus.node_stop(-1), "node"),
@@ -192,7 +192,7 @@ class TestPortsThatGoAway:
 
 
 def fail_at(port: Any, monkeypatch: pytest.MonkeyPatch, at: int, error: BaseException) -> None:
-    """Let the read at which a call waits for the answer to the `at`th request fail, once."""
+    """Make the read that waits for the answer to the `at`th request fail, once."""
     write, read = port.write, port.read
     sent = 0
 

@@ -16,7 +16,7 @@ from tests.qlink.conftest import MakeRig
 
 
 def counters(node: Probe) -> list[int]:
-    """Counters of the motions heard, repeats left out."""
+    """Counters of the received motions, without repeats."""
     heard = [each.counter for each in node.heard if isinstance(each, qlink.MotionRequest)]
     return heard[:1] + [after for before, after in pairwise(heard) if after != before]
 
@@ -120,7 +120,7 @@ def test_a_clear_that_is_not_answered_does_not_bring_back_what_was_pending(
 def test_a_new_master_is_not_mistaken_for_a_repeat(make_clean: MakeRig) -> None:
     rig = make_clean(Slave())
     for outputs in (1, 2, 3):
-        rig.bus.state.motions.clear()  # as if the program had been started again
+        rig.bus.state.motions.clear()  # as after a restart of the program
         rig.bus.motion(1, outputs=outputs)
         assert rig.node.outputs == outputs
     rig.bus.state.motions.clear()
@@ -140,7 +140,7 @@ def test_a_node_that_takes_over_a_number_is_not_mistaken_for_the_other(make_clea
 
 
 def stream(rig: Rig, words: dict[int, list[int]]) -> dict[int, int]:
-    """Stream, and hold each answer against the FIFO of its node."""
+    """Stream, and compare each answer with the FIFO of its node."""
     nodes = {node.number: node for node in rig.nodes}
     queued = dict.fromkeys(words, 0)
     for progress in rig.bus.stream_motion(words, patience=60.0):
@@ -180,11 +180,11 @@ def test_a_stream_takes_no_word_before_it_fits(make: MakeRig) -> None:
     rig.move(1, [])
 
 
-def test_nobody_moves_a_node_that_is_streamed_to(make_clean: MakeRig) -> None:
+def test_a_node_used_by_a_stream_is_not_moved(make_clean: MakeRig) -> None:
     rig = make_clean(Slave())
     steps = rig.bus.stream_motion({1: range(100)})
     next(steps)
-    with pytest.raises(RuntimeError, match="streamed"):
+    with pytest.raises(RuntimeError, match="used by a stream"):
         rig.bus.motion(1, segments=[1])
     steps.close()
     rig.bus.motion(1)
@@ -197,7 +197,7 @@ def test_a_preset_is_refused_while_the_motor_runs(make: MakeRig) -> None:
     answer = rig.move(1, [1])
     assert answer.motor_status & MotorStatus.RUNNING
     with pytest.raises(
-        CommandError, match=r"while the motor runs .* nothing was sent. Stop the node, or ask"
+        CommandError, match=r"while the motor runs .* nothing was sent. Stop the node, or refresh"
     ) as told:
         rig.bus.preset_motor_position(1, position=5)
     assert (told.value.node, told.value.attempts) == (1, 0)

@@ -1,4 +1,4 @@
-"""Everything but motion: sections 7.1 to 7.9 and 7.14 to 7.19, settled questions 5, 6 and 11 to 14."""
+"""Everything except motion: sections 7.1 to 7.9 and 7.14 to 7.19, settled questions 5, 6 and 11 to 14."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class TestSync:
 
 class TestMotor:
     def test_a_request_is_polled_until_it_is_completed(self, make: MakeRig) -> None:
-        # Long enough for the first poll of a machine under load to come too early.
+        # Long enough for the first poll to be too early on a busy machine.
         rig = make(Slave(motor=backwards, motor_seconds=0.5))
         answer = rig.sure(lambda: rig.bus.complete_motor_request(1, b"\xa5\xa5\x00ask"))
         assert (answer.last_completion, bytes(answer.motor_data)) == (0x16, b"ksa\x00\xa5\xa5")
@@ -156,7 +156,7 @@ class TestInputsAndOutputs:
             edge = rig.node.switch_input_1(level)
             assert rig.node.outputs == 1 - level
             rig.until(lambda level=level: rig.node.outputs == level)  # type: ignore[misc]
-            assert rig.node.clock() - edge >= delay - 1e-6  # what a float cannot hold
+            assert rig.node.clock() - edge >= delay - 1e-6  # rounding of floats
             if rig.exact and not rig.faulty:
                 assert rig.node.clock() - edge < delay + 0.05
 
@@ -250,7 +250,7 @@ class TestUnsupported:
 
     def test_nobody_answers_for_a_node_that_there_is_not(self, make: MakeRig) -> None:
         rig = make()
-        # The answers of the last three are the requests to the last bit: an echo must not be taken for one.
+        # The answers of the last three are equal to the requests: an echo must not be taken for one.
         calls = (
             lambda: rig.bus.motor_position(9),
             lambda: rig.bus.clear_fifo(9),
@@ -263,7 +263,7 @@ class TestUnsupported:
 
 
 def set_up_as_9(rig: Rig) -> int:
-    """Give node 3 another number and other settings. Returns under which number it has answered that."""
+    """Set another number and other settings of node 3. Return the number in its answer."""
     answer = rig.bus.node_setup(3, node_number=9, t1_delay=0.26, t2_delay=25.54, position_type=2)
     info = rig.bus.node(9).node_info()
     assert (info.t1_delay, info.t2_delay, info.position_type) == (0.3, 25.5, PositionType.METRONIX)
@@ -277,7 +277,7 @@ class TestSetup:
         assert set_up_as_9(make_clean(Slave(3))) == 9
 
     def test_a_new_number_is_answered_under_the_old_one(self, make_simulated: MakeRig) -> None:
-        # The firmware goes the other way of the two.
+        # The firmware answers with the other number.
         assert set_up_as_9(make_simulated(Slave(3, old_number=True))) == 3
 
     def test_settings_arrive_on_a_bad_line(self, make: MakeRig) -> None:
@@ -300,7 +300,7 @@ class TestSetup:
             with pytest.raises(LinkError):
                 rig.bus.node_info(0)
             assert rig.wire.collisions == 3
-        else:  # where bytes take no time nothing collides: one of both is the answer, the other a stray
+        else:  # without line time there is no collision: one of both is the answer, the other a stray
             info = rig.bus.node_info(0)
             assert info.node == info.serial_number
             other = rig.bus.motor_position(2 if info.node == 5 else 5)

@@ -1,4 +1,4 @@
-"""Intel HEX files for the master: what is read, and what is found before a byte is sent."""
+"""Intel HEX files for the master: reading, and errors found before anything is sent."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_all_records_get_one_line_end(path: Path, end: str) -> None:
 
 @pytest.mark.parametrize("wrong", [b"", b"\n\n", b"\n\r", "\n"])
 def test_a_line_end_is_one_of_three(path: Path, wrong: bytes) -> None:
-    with pytest.raises(ValueError, match=r"line_end=.*: give one of") as caught:
+    with pytest.raises(ValueError, match=r"line_end=.* must be one of") as caught:
         read_hex(put(path, DATA, END), line_end=wrong)
     assert not isinstance(caught.value, HexFileError)
 
@@ -86,22 +86,22 @@ FAULTS = {
     "space before": ([" " + DATA, END], 1, "a record begins with ':'"),
     "odd": ([DATA[:-1], END], 1, "41 digits; a record has an even number of at least 10: was the line cut?"),
     "short": ([":000000", END], 1, "6 digits; a record has an even number"),
-    "too few": ([DATA[:-2], END], 1, "count 10 asks for 21 bytes, the record has 20; was the line cut?"),
-    "too many": ([":0F" + DATA[3:], END], 1, "count 0F asks for 20 bytes, the record has 21"),
+    "too few": ([DATA[:-2], END], 1, "count 10 requires 21 bytes, the record has 20; was the line cut?"),
+    "too many": ([":0F" + DATA[3:], END], 1, "count 0F requires 20 bytes, the record has 21"),
     "type": ([record(6, 0, b"a"), END], 1, "type 06; Intel HEX has 00 to 05: is this another format?"),
     "overlap": (
         [DATA, "", record(0, 0x10F, b"a"), END],
         3,
-        "data for 0x10f again; each address is given once",
+        "overlapping data at 0x10f; each address occurs once",
     ),
     "no end": (
         [DATA, record(0, 0, b"a")],
         2,
         "no end record; a program ends in :00000001FF: was the file cut?",
     ),
-    "behind": ([DATA, END, "", DATA], 4, "':10010000000' behind the end record; nothing may follow it"),
-    "behind, no record": ([DATA, END, "hello"], 3, "'hello' behind the end record"),
-    "two ends": ([DATA, END, END], 3, "':00000001FF' behind the end record"),
+    "behind": ([DATA, END, "", DATA], 4, "':10010000000' after the end record; nothing may follow it"),
+    "behind, no record": ([DATA, END, "hello"], 3, "'hello' after the end record"),
+    "two ends": ([DATA, END, END], 3, "':00000001FF' after the end record"),
     "end with data": (
         [DATA, record(1, 0, b"a")],
         2,
@@ -112,21 +112,21 @@ FAULTS = {
     "type 03 short": ([record(3, 0, b"a"), END], 1, "type 03 with 1 data bytes and address 0000; it has 4"),
     "type 05 empty": ([record(5, 0), END], 1, "type 05 with 0 data bytes and address 0000; it has 4"),
     "two starts": ([record(5, 0, b"abcd")] * 2 + [DATA, END], 2, "a second start address; a program has one"),
-    "wrap": ([record(0, 0xFFF8, bytes(9)), END], 1, "9 bytes at 0xfff8 run over the end of their segment"),
+    "wrap": ([record(0, 0xFFF8, bytes(9)), END], 1, "9 bytes at 0xfff8 exceed the end of their segment"),
     "wrap 02": (
         [record(2, 0, b"\x10\0"), record(0, 0xFFFF, b"ab"), END],
         2,
-        "2 bytes at 0x1ffff run over the end of their segment, where loaders differ; end the record there",
+        "2 bytes at 0x1ffff exceed the end of their segment, where loaders differ; end the record there",
     ),
     "4 GiB": (
         [record(4, 0, b"\xff\xff"), record(0, 0xFFFF, b"ab"), END],
         2,
-        "2 bytes at 0xffffffff run over",
+        "2 bytes at 0xffffffff exceed the end",
     ),
     "no ASCII": ([DATA, "\xe4", END], 2, "byte 0xE4; Intel HEX is ASCII text: is this a binary file?"),
     "empty": ([], 0, "empty; an Intel HEX file has at least an end record"),
     "blank": (["", "  "], 0, "empty; "),
-    "no data": ([record(4, 0, b"\0\1"), END], 0, "no data record; there is nothing to load"),
+    "no data": ([record(4, 0, b"\0\1"), END], 0, "no data record, so nothing to load"),
     "other format": (
         ["S1130000285F245F2212226A000424290008237C2A"],
         1,
@@ -167,12 +167,12 @@ def test_data_may_reach_the_end_of_their_segment(path: Path, lines: list[str]) -
 
 
 def test_what_is_no_file_is_told(tmp_path: Path) -> None:
-    with pytest.raises(HexFileError, match="No such file or directory; give a file that can be read"):
+    with pytest.raises(HexFileError, match="No such file or directory; pass a readable file"):
         read_hex(tmp_path / "missing.hex")
-    with pytest.raises(HexFileError, match="this is no file"):
+    with pytest.raises(HexFileError, match="not a file"):
         read_hex(tmp_path)
     os.mkfifo(tmp_path / "fifo")
-    with pytest.raises(HexFileError, match="this is no file"):
+    with pytest.raises(HexFileError, match="not a file"):
         read_hex(tmp_path / "fifo")
 
 
@@ -204,7 +204,7 @@ def test_pieces_are_the_text(text: bytes, size: int) -> None:
 def test_a_piece_fills_a_request() -> None:
     assert [len(piece) for piece in pieces(bytes(60))] == [25, 25, 10]
     for wrong in (0, 26, 2.0):
-        with pytest.raises(ValueError, match=f"size={wrong}: give a whole number from 1 to 25"):
+        with pytest.raises(ValueError, match=f"size={wrong} must be an integer from 1 to 25"):
             pieces(b"", wrong)  # type: ignore[arg-type]
 
 

@@ -1,4 +1,4 @@
-"""What a program does not use, it does not import."""
+"""Unused parts of the package are not imported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Answers that are late by any time: a position may be an old one then, but no word or piece is lost."""
+"""Answers of any delay: a position may be outdated, but no word or piece is lost."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.qlink.behaviour_rig import Probe
 from tests.qlink.test_behaviour_node import hex_text
 
 SLACK = 0.002
-#: Seconds: from an answer in time to one that meets the third question after its own.
+#: Seconds: from a punctual answer to one that arrives during the third request after its own.
 LATE = (0.0, 0.08)
 
 
@@ -71,7 +71,7 @@ def test_a_program_is_whole_or_the_load_fails(seed: int) -> None:
 
 
 def test_only_motion_and_load_carry_a_number_back() -> None:
-    """What no master can tell apart: two answers of any other command are the same to the last bit."""
+    """A case that cannot be detected: answers to different requests are the same bytes."""
     assert qlink.COMMANDS["motor_position"].echoes == ()
     assert "counter" not in qlink.MotorPositionResponse.FIELDS
     assert qlink.COMMANDS["motion"].echoes == qlink.COMMANDS["node_program_load"].echoes == ("counter",)

@@ -1,4 +1,4 @@
-"""A motion without an answer says what becomes of its words."""
+"""The error of an unanswered motion states what happens to its words."""
 
 from __future__ import annotations
 

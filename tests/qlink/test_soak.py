@@ -1,4 +1,4 @@
-"""The soak, shorter than `make soak` runs it, and each kind of fault alone, where the sums are exact."""
+"""A short soak, and each kind of fault alone, where the sums are exact."""
 
 from __future__ import annotations
 
@@ -68,14 +68,14 @@ def test_the_page_is_made_of_the_figures() -> None:
 
 
 def alone(rates: dict[str, RateLike]) -> Result:
-    """Soak with one kind of fault, and cables that are never cut: then every timeout has one cause."""
+    """Soak with one kind of fault, and without cut cables, so that every timeout has one cause."""
     soak = Soak(rates, baud=115200, seed=4, steady=True)
     return soak.run("alone", VirtualPort(soak.wire), bus_run.SLACK, 4000)
 
 
 @pytest.mark.slow
 class TestEachFaultAlone:
-    """Every node is there, so the sums are exact: what was injected is what was counted."""
+    """All nodes are present, so injected and counted faults are equal."""
 
     def test_none(self) -> None:
         result = alone({})

@@ -157,7 +157,7 @@ class TestMotorProtocol:
 
     def test_a_motor_that_says_too_much_is_told_so(self) -> None:
         node = VirtualNode(motor=lambda _: bytes(26))
-        with pytest.raises(ValueError, match="gave 26 bytes: return at most 25"):
+        with pytest.raises(ValueError, match="returned 26 bytes; at most 25"):
             ask(node, qlink.MotorRequestRequest(node=1, motor_data=b"x"))
 
 
@@ -250,7 +250,7 @@ class TestTheWhole:
             ("capacity", 256, "0 to 255"),
             ("capacity", -1, "0 to 255"),
             ("capacity", 4.0, "0 to 255"),
-            ("rate", -1.0, "0 or more words a second"),
+            ("rate", -1.0, "0 or more words per second"),
             ("rate", float("nan"), "0 or more"),
             ("rate", float("inf"), "0 or more"),
             ("rate", "fast", "0 or more"),
@@ -262,8 +262,8 @@ class TestTheWhole:
             ("product_id", 0x10000, "0 to 65535"),
             ("serial_number", -1, "0 to 4294967295"),
             ("motor_seconds", float("inf"), "0 or more seconds"),
-            ("unsupported", {"motoin"}, "'motoin' not known; there are clear_fifo"),
-            ("unsupported", "motion.request", "'motion.request' not known"),
+            ("unsupported", {"motoin"}, "unknown 'motoin'; known are clear_fifo"),
+            ("unsupported", "motion.request", "unknown 'motion.request'"),
         ],
     )
     def test_wrong_arguments_are_named(self, argument: str, value: object, rule: str) -> None:
@@ -294,10 +294,10 @@ class TestTheWhole:
         node.advance(100.4)
         assert (node.now, node.path.waiting) == (100.5, 7)
         node.set_inputs(1, 99.5)
-        with pytest.raises(ValueError, match=r"now=99\.4 after 100\.5: time goes forward; take all times"):
+        with pytest.raises(ValueError, match=r"now=99\.4 is before 100\.5; take all times"):
             node.advance(99.4)
         for wrong in (float("nan"), float("inf")):
-            with pytest.raises(ValueError, match="give seconds, a finite number"):
+            with pytest.raises(ValueError, match="must be a finite number of seconds"):
                 node.advance(wrong)
         assert (node.now, node.path.waiting) == (100.5, 7)
 

@@ -80,9 +80,9 @@ class TestInputsAndOutputs:
     @pytest.mark.parametrize("value", [-1, 1 << 24, 1.0, True, "1", None])
     def test_levels_out_of_range_are_refused(self, value: int) -> None:
         node = VirtualNode()
-        with pytest.raises(ValueError, match=r"inputs=.*give a whole number from 0 to 16777215"):
+        with pytest.raises(ValueError, match=r"inputs=.* must be an integer from 0 to 16777215"):
             node.set_inputs(value, 0.0)
-        with pytest.raises(ValueError, match=r"outputs=.*give a whole number from 0 to 16777215"):
+        with pytest.raises(ValueError, match=r"outputs=.* must be an integer from 0 to 16777215"):
             node.outputs = value
         with pytest.raises(ValueError, match="inputs="):
             VirtualNode().inputs = value

@@ -104,7 +104,7 @@ class TestDraining:
         assert node.position == 3
         node.advance(1e9 + 1.75)
         assert node.position == 4
-        with pytest.raises(ValueError, match="rate=-1: give 0 or more words a second"):
+        with pytest.raises(ValueError, match="rate=-1 must be 0 or more words per second"):
             node.path.set_rate(-1, 1e9 + 2)
 
     def test_any_rate_is_taken(self) -> None:
@@ -275,7 +275,7 @@ class TestConservation:
                 queued += value if len(value) <= space else []
             elif step == "clear":
                 dropped += fifo.waiting
-                # What was dropped went nowhere: take it out of the sum that is compared below.
+                # Dropped words do not move the motor: remove them from the sum compared below.
                 del queued[len(queued) - fifo.waiting :]
                 fifo.clear()
             elif step == "start":

@@ -27,7 +27,7 @@ IMAGE = HexImage(PROGRAM, ((0x10100, b"abcdefgh"),), 0x10104)
 
 
 def send(node: VirtualNode, counter: int, data: bytes = b"") -> int | None:
-    """Return the counter that is acknowledged, None where it is not."""
+    """Return the acknowledged counter, None without an acknowledgement."""
     request = qlink.NodeProgramLoadRequest(node=1, counter=counter, program_data=data)
     response = node.handle(qlink.decode_request(request.to_frame()), 0.0)
     if response is None:
@@ -173,9 +173,9 @@ def test_a_reset_keeps_the_program() -> None:
 
 
 BROKEN = [
-    (record(0x41, 0, b"A"), "record 1: type 41; there are 00 to 05"),
+    (record(0x41, 0, b"A"), "record 1: type 41; types are 00 to 05"),
     (record(0, 0, b"a")[:-3] + b"0", "record 1: checksum 90, must be 9E"),
-    (b":0G0000", "record 1: b'0G' has a character that is no hexadecimal digit"),
+    (b":0G0000", "record 1: b'0G' has a character that is not a hexadecimal digit"),
     (b":01000000 1000", "record 1: b'01000000 100' has a character"),
     (b":0100000\r\n610", "record 1: b'0100000\\r\\n610' has a character"),
     (b"S1130000", "record 1: b'S1130000' seen; a record begins with ':'"),
@@ -186,12 +186,12 @@ BROKEN = [
     (record(4, 0, b"abc"), "record 1: 3 data bytes; type 04 has 2"),
     (record(3, 0, b"abc"), "record 1: 3 data bytes; type 03 has 4"),
     (record(5, 0, b""), "record 1: 0 data bytes; type 05 has 4"),
-    (record(0, 0xFFFF, b"ab"), "record 1: 2 bytes at 0xffff run over the end of their segment"),
-    (record(2, 0, b"\x10\0") + record(0, 0xFFFF, b"ab"), "record 2: 2 bytes at 0x1ffff run over"),
-    (record(4, 0, b"\xff\xff") + record(0, 0xFFFF, b"ab"), "record 2: 2 bytes at 0xffffffff run over"),
+    (record(0, 0xFFFF, b"ab"), "record 1: 2 bytes at 0xffff exceed the end of their segment"),
+    (record(2, 0, b"\x10\0") + record(0, 0xFFFF, b"ab"), "record 2: 2 bytes at 0x1ffff exceed the end"),
+    (record(4, 0, b"\xff\xff") + record(0, 0xFFFF, b"ab"), "record 2: 2 bytes at 0xffffffff exceed the end"),
     (
         record(0, 0, b"abc") + record(0, 9, b"x") + record(0, 2, b"c") + END,
-        "record 4: there is data for 0x2 twice",
+        "record 4: overlapping data at 0x2",
     ),
 ]
 
@@ -253,7 +253,7 @@ def test_addresses_of_both_kinds() -> None:
     reader = HexReader()
     reader.feed(record(4, 0, b"\0\2") + record(0, 1, b"a") + record(2, 0, b"\x10\0") + record(0, 1, b"b"))
     reader.feed(record(4, 0, b"\0\1") + record(0, 0xFFFF, b"cd"))
-    with pytest.raises(BrokenRecord, match="twice"):
+    with pytest.raises(BrokenRecord, match="overlapping data"):
         reader.feed(
             record(2, 0, b"\0\0") + record(0, 2, b"e") + record(2, 0, b"\x10\0") + record(0, 1, b"x") + END
         )

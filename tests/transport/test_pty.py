@@ -35,7 +35,7 @@ def test_raw_for_a_program_that_sets_nothing(pty: PtyPort) -> None:
 def test_usable_without_a_client_and_across_clients(pty: PtyPort) -> None:
     assert pty.read(0) == b""
     for number in range(3):
-        pty.write(b"nobody hears this")
+        pty.write(b"no reader")
         with SerialPort(pty.path) as client:
             assert client.read(0) == b""  # bytes from before the open are discarded
             client.write(bytes([number]))

@@ -1,4 +1,4 @@
-"""A ring to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over ptys.
+"""A ring for the behaviours: blocking or asyncio, on a virtual clock, in memory or over ptys.
 
 A behaviour is written once, as a program that uses the clients of several nodes in turn.
 """
@@ -23,7 +23,7 @@ from qlinkgen.sim.virtual_ring import VirtualRing
 from qlinkgen.transport import Port, memory_ring, open_port
 from tests.support.needs import decided_by_parameter
 
-#: Seconds that a wait may take where it must not fail; a busy machine needs some.
+#: Time limit in seconds of waits that must not fail, also on a busy machine.
 PATIENCE = 20.0
 CLIENTS: dict[str, dict[str, Any]] = {
     "blocking": {"coordinator": MotionCoordinator, "keypad": MembraneKeypad},
@@ -33,7 +33,7 @@ CLIENTS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Setting:
-    """Where a behaviour is tried."""
+    """A setting of the behaviours."""
 
     client: Literal["blocking", "asyncio"]
     transport: Literal["virtual", "memory", "pty"]
@@ -94,7 +94,7 @@ class Rig:
         return cast(MembraneKeypad, self.clients[place])
 
     def until(self, condition: Callable[[], object]) -> None:
-        """Let time pass until something is so on whatever node."""
+        """Let time pass until a condition holds on any node."""
         for _ in range(int(PATIENCE / 0.002)):
             if condition():
                 return
@@ -102,7 +102,7 @@ class Rig:
         raise AssertionError("it never got so")
 
     def rest(self) -> None:
-        """Let everything arrive that is under way, when nothing can be waited for."""
+        """Let all messages in transit arrive, without a condition to wait for."""
         self.clients[0].sleep(0.05)
 
 

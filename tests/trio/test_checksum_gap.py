@@ -1,4 +1,4 @@
-"""What the 14 bits that are sent of a 16-bit checksum let through: counted, not estimated."""
+"""Errors not detected by the 14 transmitted bits of the 16-bit checksum: counted exhaustively."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PLACES = [(byte, bit) for byte in range(14) for bit in range(7)]
 
 
 def syndromes() -> list[int]:
-    """What flipping each bit changes in the comparison; a CRC is linear, so any payload will do."""
+    """The change of the comparison by flipping each bit; a CRC is linear, so any payload will do."""
     right = int.from_bytes(sent_crc(PAYLOAD), "big")
     found = []
     for byte, bit in PLACES:
@@ -43,7 +43,7 @@ def test_no_error_of_one_or_two_bits_is_missed_and_15_of_152096_of_three() -> No
 
 
 def accepted(frame: bytes) -> Iterator[trio.Message]:
-    """What a receiver makes of each error of two bits in the whole frame, where it accepts it."""
+    """The accepted messages among all two-bit errors of the whole frame."""
     for one, two in combinations(range(8 * len(frame)), 2):
         changed = bytearray(frame)
         for bit in (one, two):

@@ -1,4 +1,4 @@
-"""What keeps a node at work: a thread, an event loop, or the program; and what they do when a port fails."""
+"""Drivers of a node: thread, event loop, or program; and their behaviour when a port fails."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ def test_a_paced_port_gets_one_own_message_at_a_time() -> None:
 def test_no_room_is_told_and_sets_the_status() -> None:
     far, near = memory_pair()
     with MotionCoordinator(near, tx_timeout=0.05, patience=PATIENCE) as mc:
-        far.write(text(5)[:1])  # a message that does not end holds up all others
+        far.write(text(5)[:1])  # an incomplete message delays all others
         assert read_all(far, 1)
         for _ in range(4):
             mc.print_(10, "x" * 250, end="")

@@ -1,4 +1,4 @@
-"""The document's two programs run, and end as they should; the benchmarks do, too."""
+"""The document's two programs run to their expected end; so do the benchmarks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The behaviours without input or output: what they keep, drop, count and tell."""
+"""The behaviours without input or output: stored and dropped messages, counters, events."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from qlinkgen.transport import open_pty
 
 
 def hear(node: CoordinatorNode | KeypadNode, *messages: trio.Message, now: float = 0.0) -> list[str]:
-    """Let messages come; return what the node says of those that it dropped."""
+    """Pass messages to a node; return its texts about dropped ones."""
     for message in messages:
         node.link.receive(message.to_frame(), now)
     return [event.text for event in engine_of(node).events if isinstance(event, Dropped)]
@@ -35,7 +35,7 @@ def test_what_a_full_buffer_drops_is_told() -> None:
 def test_what_a_missing_variable_drops_is_told() -> None:
     node = CoordinatorNode()
     message = trio.DirectVariableTransfer(address=1, number=300, value=Decimal(1))
-    assert hear(node, message) == ["there is no VR(300), the last one is VR(250)"]
+    assert hear(node, message) == ["VR(300) does not exist; the last one is VR(250)"]
 
 
 def test_a_wrong_checksum_leaves_the_variable_as_it_was() -> None:
@@ -67,7 +67,7 @@ def test_a_keypad_without_an_offset_takes_nothing_but_that() -> None:
     early = trio.CharacterTransfer(address=1, characters="x")
     assert (
         hear(node, early, trio.KeypadMode(address=1, mode=127))
-        == ["the keypad has no offset yet: send it one before anything else (SEND, type 2)"] * 2
+        == ["the keypad has no offset yet: send it first (SEND, type 2)"] * 2
     )
     assert (node.mode, node.display.lines[0]) == (0, "")
     assert hear(node, trio.KeypadOffset(address=1, offset=15), early)[2:] == []

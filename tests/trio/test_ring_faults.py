@@ -20,7 +20,7 @@ def ring_of(size: int, **options: object) -> tuple[VirtualRing, list[MotionCoord
 
 
 def send_all_round(ring: VirtualRing, clients: list[MotionCoordinator], count: int) -> None:
-    """From the first node to the last, over every hop but one, one at a time."""
+    """From the first node to the last, over every hop except one, one message at a time."""
     for number in range(count):
         clients[0].send(10 + len(clients) - 2, 1, number % 251, number + 1)
         ring.settle()
@@ -57,12 +57,12 @@ def test_a_truncated_message_is_seen_by_each_node_behind(baud: int | None) -> No
     send_all_round(ring, clients, 50)
     assert clients[3].counters.taken == 0
     assert clients[1].netstat == clients[2].netstat == clients[3].netstat == NetStat.RX_FRAME
-    # A missing head is noticed where it is missing. A missing tail is, and then the head has gone on.
+    # A missing head is detected at once. A missing tail is detected after the head was forwarded.
     cut = clients[1].counters.cut_short
     assert 30 <= cut <= 45
     assert clients[2].counters.total_faults == clients[3].counters.total_faults == cut
     told = [event for event in engine_of(ring.nodes[2]).events if isinstance(event, Broken)]
-    # The end of a broken message comes when this node would have given it up by itself; either may be first.
+    # The end of a broken message may arrive before or after this node gives it up itself.
     assert {event.kind for event in told} <= {"frame", "truncated"}
     assert len(told) == cut
 
@@ -75,7 +75,7 @@ def test_store_and_forward_keeps_a_broken_message_from_the_nodes_behind() -> Non
 
 
 def test_noise_does_no_more_than_break_what_it_meets() -> None:
-    # Noise is rare: what it makes nodes send on gets its own share of it, so much of it would never end.
+    # Noise must be rare: bytes forwarded because of it are disturbed in turn, so much of it would never end.
     plan = FaultPlan(noise=0.05, seed=3)
     ring, clients = ring_of(4, baud=38400, faults={0: plan})
     send_all_round(ring, clients, 250)
@@ -96,7 +96,7 @@ def test_the_other_kinds_of_faults(kind: str) -> None:
         "delay": 40,
         "late": 40,
         "silent": 40 - plan.counts.silenced,
-        "duplicate": 40 + plan.counts["duplicate"],  # nothing in a message tells that it is one
+        "duplicate": 40 + plan.counts["duplicate"],  # duplicates cannot be detected
         "stray": 40 + plan.counts["stray"],
     }
     assert taken == expected[kind]
@@ -148,7 +148,7 @@ def test_a_node_switched_off_in_the_middle_of_a_message_breaks_it() -> None:
     clients[0].send(12, 1, 1, 1)
     ring.sleep(0.08)
     ring.switch_off(1)
-    clients[2].send(10, 1, 2, 2)  # waits behind the broken message until that is given up
+    clients[2].send(10, 1, 2, 2)  # waits until the broken message is given up
     ring.settle()
     assert clients[3].vr[1] == 0
     assert clients[3].vr[2] == 2
@@ -210,7 +210,7 @@ def test_the_same_seed_gives_the_same_account() -> None:
 
 
 def test_the_account_finds_a_receiver_that_does_not_check(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trio, "_check", lambda *_: b"\0\0")  # says nothing of the payload
+    monkeypatch.setattr(trio, "_check", lambda *_: b"\0\0")  # independent of the payload
     account = Soak(1).run(1500)
     assert account.wrong > 0
     assert not account.clean

@@ -11,12 +11,12 @@ from qlinkgen.codecs import trio
 from qlinkgen.link.ring import PATIENCE, RingNode
 from qlinkgen.link.ring_events import Blocked, Broken, NetStat, Passed, Queued, StatusRaised, Taken
 
-#: Ends a message that was found broken after its head had gone: an end byte with the address 0.
+#: Terminates a message found broken after its head was forwarded: an end byte with the address 0.
 CUT = b"\x80"
 
 
 class Line:
-    """A node, what it takes, and what it sends."""
+    """A node with its received messages and sent bytes."""
 
     def __init__(self, **options: Any) -> None:
         self.taken: list[trio.Message] = []
@@ -24,7 +24,7 @@ class Line:
         self.now = 0.0
 
     def hear(self, data: bytes, after: float = 0.0) -> bytes:
-        """Let bytes come; return what is sent then."""
+        """Pass bytes to the node; return the bytes that it sends then."""
         self.now += after
         self.node.receive(data, self.now)
         return self.sent()

@@ -36,7 +36,7 @@ def fields(message: Message) -> tuple[object, ...]:
 
 
 def keypad(baud: int | None = None) -> KeypadNode:
-    """A keypad that has its offset."""
+    """A keypad with its offset."""
     node = KeypadNode(baud=baud)
     node.offset, node.link.passes = 1, True
     return node
@@ -55,7 +55,7 @@ def verbose(nodes: list[Node]) -> list[RingNode]:
 
 
 def taken(links: list[RingNode]) -> list[tuple[int, tuple[object, ...]]]:
-    """Who has taken what; it is told only once."""
+    """Which node has taken which message; cleared on reading."""
     found = []
     for place, link in enumerate(links):
         found += [(place, fields(event.message)) for event in link.events if isinstance(event, Taken)]
@@ -175,6 +175,6 @@ def test_a_node_that_sends_delays_what_it_sends_on_by_the_rest_of_its_message_at
     ring.sleep(10.5 * byte)
     source.send(11, 1, 7, 1)
     target.wait_until(lambda: target.vr[7] == 1)
-    # The first byte is there after 11.5 byte times, the transmitter is free after 100: then it goes first.
+    # The first byte arrives after 11.5 byte times, the transmitter is free after 100: then it goes first.
     assert ring.now / byte == pytest.approx(100 + 16, abs=0.1)
     assert target.counters.taken == 2

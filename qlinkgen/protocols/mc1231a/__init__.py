@@ -1,6 +1,6 @@
-"""The MC1231A chip set: its host, blocking and for asyncio, and the chip set itself, simulated.
+"""The MC1231A chip set: hosts, blocking and for asyncio, and a simulated chip set.
 
-`Host` and `AsyncHost` ask, `ChipSet` behind a `ChipEngine` answers. Messages and their errors are in
+`Host` and `AsyncHost` send packets, a `ChipSet` with a `ChipEngine` answers. Messages and their errors are in
 `qlinkgen.codecs.mc1231a`.
 """
 

@@ -1,4 +1,4 @@
-"""The asyncio client of a host: the same methods, awaited."""
+"""The asyncio host of a chip set: the same methods as coroutines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ R = TypeVar("R", bound=mc1231a.Message)
 
 
 class AsyncHost(AsyncMaster, AsyncHostCalls):
-    """The host of a chip set, used from any number of tasks of one event loop. The rest is as in `Host`.
+    """The host of a chip set, for any number of tasks of one event loop. Otherwise like `Host`.
 
     Example:
         >>> async with AsyncHost.open("/dev/ttyUSB0", baud=57600) as host:  # doctest: +SKIP
@@ -28,7 +28,7 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
         ...     await host.axis(2).update(check=True)
 
     Attributes:
-        command_errors: update and multi_update look for the command error unless they are told otherwise.
+        command_errors: update and multi_update check for the command error by default.
     """
 
     engine: HostEngine
@@ -44,7 +44,7 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
         slack: float | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
-        """Take over a port; the arguments are those of `Host`."""
+        """Take ownership of a port; arguments as for `Host`."""
         engine = make_engine(port, checksum=checksum, attempts=attempts, slack=slack, forgets=forgets)
         super().__init__(engine, port, on_event=on_event)
         self.command_errors = command_errors
@@ -63,10 +63,10 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
         slack: float | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> AsyncHost:
-        """Open a device name or a URL of pyserial; no source names a speed. The rest as for the class.
+        """Open a device name or a URL of pyserial; the sources state no speed. The rest as for the class.
 
         Raises:
-            PortMissing: there is no such port.
+            PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
         return cls(
@@ -111,7 +111,7 @@ class AsyncHost(AsyncMaster, AsyncHostCalls):
 
 
 class AsyncAxis(AsyncAxisCalls):
-    """One axis: every command that acts on the current axis, without the argument for it.
+    """One axis: every command that acts on the current axis, without the axis argument.
 
     Attributes:
         host: the host.

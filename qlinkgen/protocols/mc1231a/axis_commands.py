@@ -1,4 +1,4 @@
-"""What each command does to the axis on which it acts, as a table: name to a function of the axis."""
+"""The effect of each command on its axis, as a table: name to a function of the axis."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The chip set, simulated: two axes, one of them current, and what both share.
+"""The simulated chip set: two axes, one of them current, and their common parts.
 
-Like an engine it has no clock and does no input or output: `now` comes in as an argument, in seconds. Between
-two calls everything happens that time has brought, sample by sample.
+Like an engine it has no clock and does no input or output: `now` is an argument, in seconds. Each call first
+advances the simulation to that time, sample by sample.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from qlinkgen.protocols.mc1231a.facts import AXES, check_axis
 
 #: Seconds of one sample of the trajectories; set_smpl_time has no unit, so it is only kept.
 SAMPLE_TIME: Final = 0.0005
-#: The number that get_vrsn gives; its layout was not found.
+#: Answer to get_vrsn; its layout was not found.
 VERSION: Final = 0x1231
 _Handler = Callable[[mc1231a.Request], float | None]
 
@@ -27,23 +27,23 @@ class ChipSet:
     Attributes:
         axes: each axis by its number.
         current: number of the current axis.
-        illegal: names of commands that this chip set does not know.
+        illegal: names of commands unknown to this chip set.
         time: cycles since the reset.
         values: registers of the whole chip set.
         home: level of the home inputs, by axis.
     """
 
     def __init__(self, *, illegal: Iterable[str] = (), sample_time: float = SAMPLE_TIME) -> None:
-        """`sample_time` is in seconds; `illegal` commands are answered by a checksum of 0.
+        """Make a chip set; `illegal` commands are answered by a checksum of 0.
 
         Raises:
-            ValueError: there is no such command, or a sample takes no time.
+            ValueError: a command is unknown, or `sample_time`, in seconds, is not positive.
         """
         self.illegal = frozenset(illegal)
         if unknown := self.illegal - set(mc1231a.COMMANDS):
-            raise ValueError(f"illegal: there is no command {min(unknown)!r}; see `qlinkgen show mc1231a`")
+            raise ValueError(f"illegal: unknown command {min(unknown)!r}; see `qlinkgen show mc1231a`")
         if not sample_time > 0:
-            raise ValueError(f"sample_time: {sample_time} s was given; a sample takes more than 0")
+            raise ValueError(f"sample_time must be more than 0 s, not {sample_time}")
         self.home = dict.fromkeys(AXES, False)
         self._sample_time = sample_time
         self._started: float | None = None
@@ -56,7 +56,7 @@ class ChipSet:
         self._reset()
 
     def _reset(self) -> None:
-        """As after the power was switched on; what is wired to the inputs stays as it is."""
+        """Reset, as after power-on; the levels of the inputs do not change."""
         self.axes = {axis: ChipAxis(self.axes[axis].limits) for axis in AXES}
         self.current = 1
         self.time = 0
@@ -73,7 +73,7 @@ class ChipSet:
         return self._handlers[request][0] not in self.illegal
 
     def handle(self, request: mc1231a.Request, now: float) -> mc1231a.Response:
-        """Do what a packet says; return its response."""
+        """Execute a packet; return its response."""
         self.advance(now)
         _, handler, respond = self._handlers[type(request)]
         result = handler(request)
@@ -81,7 +81,7 @@ class ChipSet:
         return respond(result)
 
     def _handler(self, name: str) -> _Handler:
-        """What a command does, given its request: a method of the chip set, or an action of the axis."""
+        """Return the function of a command: a method of the chip set, or an action of the axis."""
         fields = mc1231a.COMMANDS[name].request.FIELDS
         own = getattr(self, f"_do_{name}", None)
         if own is not None:
@@ -132,7 +132,7 @@ class ChipSet:
         return self._output
 
     def _do_set_lmt_sense(self, value: int) -> None:
-        """A bit of 1 makes an input active low: it counts as met while nothing is wired to it."""
+        """Set the sense of the limits; a bit of 1 makes an input active low, so active if not connected."""
         changed = value ^ self.values["lmt_sense"]
         self.values["lmt_sense"] = value
         for number, axis in self.axes.items():
@@ -164,11 +164,11 @@ class ChipSet:
 
     @property
     def interrupting(self) -> int | None:
-        """Number of the axis that raises the host interrupt, None while none does."""
+        """Number of the axis that raises the host interrupt, None without one."""
         return self._interrupting
 
     def _look_at_interrupts(self) -> None:
-        """The axis that was first keeps the interrupt; of two at once it is axis 1."""
+        """Determine the interrupting axis: the first one keeps the interrupt; if simultaneous, axis 1."""
         asking = [n for n, axis in self.axes.items() if axis.events & int(axis.values["intrpt_mask"])]
         if self._interrupting not in asking:
             self._interrupting = asking[0] if asking else None
@@ -176,7 +176,7 @@ class ChipSet:
     # Time, and what is wired to the chip set ----------------------------------------------------------------
 
     def advance(self, now: float) -> None:
-        """Let everything happen that is due by `now`."""
+        """Advance the simulation to `now`."""
         if self._started is None:
             self._started = now
         samples = int((now - self._started) / self._sample_time) - self._samples
@@ -195,7 +195,7 @@ class ChipSet:
         self.time += samples
 
     def set_limit(self, axis: int, *, positive: bool | None = None, negative: bool | None = None) -> None:
-        """Let an axis meet a limit switch, or leave it."""
+        """Activate or release a limit switch of an axis."""
         limits = self.axes[check_axis(axis)].limits
         for place, met in enumerate((positive, negative)):
             if met is not None:
@@ -206,12 +206,12 @@ class ChipSet:
     def pulse(self, axis: int, source: str) -> None:
         """Give an axis an "index" pulse, a "home" signal, or the signal of an external breakpoint, "ext"."""
         if source not in {"index", "home", "ext"}:
-            raise ValueError(f'source: {source!r} was given; there are "index", "home" and "ext"')
+            raise ValueError(f"source must be 'index', 'home' or 'ext', not {source!r}")
         self.axes[check_axis(axis)].pulse(source)
         self._look_at_interrupts()
 
     def hold(self, axis: int, *, held: bool = True) -> None:
-        """Hold a motor, so that it does not follow its target; let go, it catches up at once."""
+        """Hold a motor, so that it does not follow its target; on release it catches up immediately."""
         state = self.axes[check_axis(axis)]
         state.held = held
         if not held and state.motor_on:
@@ -223,13 +223,13 @@ class ChipSet:
         self._look_at_interrupts()
 
     def raise_event(self, axis: int, event: int) -> None:
-        """Set an event that nothing here brings about by itself, such as a commutation error."""
+        """Set an event that is not simulated, such as a commutation error."""
         self.axes[check_axis(axis)].raise_event(event)
         self._look_at_interrupts()
 
 
 def _respond(response: type[mc1231a.Response] | None) -> Callable[[float | None], mc1231a.Response]:
-    """How a result becomes a response: one field, or none."""
+    """Return the function that converts a result to a response of one field or none."""
     assert response is not None  # every packet is answered
     make: Callable[..., mc1231a.Response] = response
     if not response.FIELDS:

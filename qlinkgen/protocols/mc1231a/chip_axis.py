@@ -1,6 +1,6 @@
 """One axis of the simulated chip set: its registers, its motion, its events.
 
-What no source says is settled here, and listed in docs/mc1231a.md.
+docs/mc1231a.md lists the assumptions where the sources are silent.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from qlinkgen.protocols.mc1231a.trajectory import COUNTS, GEAR, S_CURVE, TRAPEZO
 
 #: Positions wrap at the range of set_actl_pos.
 HALF_TURN: Final = 1 << 30
-#: Breakpoints that compare something in every sample.
+#: Breakpoints that are compared in every sample.
 COMPARING: Final = ("time", "pos", "neg", "actl_pos", "actl_neg")
 _BREAKS: Final = ("off", "time", "pos", "neg", "actl_pos", "actl_neg", "mtn_cmplt", "ext")
-#: What an update must not change while a trajectory is in motion.
+#: Registers that an update must not change during a motion.
 _FIXED: Final = {TRAPEZOIDAL: ("acc",), S_CURVE: ("vel", "max_acc", "jerk")}
 
 
@@ -25,13 +25,13 @@ class ChipAxis:
     """An axis.
 
     Attributes:
-        values: registers as they are read back: what waits for an update, and what acts at once.
-        active: what the last update has taken of those that wait.
-        pending: what was written since the last update, actions included.
-        trajectory: where the axis is to be.
-        events: the bits of the status word that stay set.
-        lost: how far the motor is behind, in counts: what `hold` has done.
-        limits: inputs of the limit switches, positive and negative; True is a switch that is met.
+        values: registers as read back, both buffered and immediate ones.
+        active: active values of the buffered registers, as of the last update.
+        pending: registers written since the last update, actions included.
+        trajectory: target position over time.
+        events: the latched bits of the status word.
+        lost: position error in counts, caused by `hold`.
+        limits: inputs of the limit switches, positive and negative; True if active.
     """
 
     def __init__(self, limits: list[bool] | None = None) -> None:
@@ -51,7 +51,7 @@ class ChipAxis:
         self.lost = 0
         self._open_loop_command = 0
 
-    # What is read -------------------------------------------------------------------------------------------
+    # Reading ------------------------------------------------------------------------------------------------
 
     @property
     def status(self) -> int:
@@ -65,7 +65,7 @@ class ChipAxis:
 
     @property
     def in_motion(self) -> bool:
-        """The trajectory has not come to its end."""
+        """Whether the trajectory has not ended."""
         return self.trajectory.moving
 
     @property
@@ -75,58 +75,58 @@ class ChipAxis:
 
     @property
     def actual(self) -> int:
-        """Actual position in counts: the motor follows at once, unless it is held or off."""
+        """Actual position in counts: the motor follows without lag, unless it is held or off."""
         return self.target - self.lost
 
     @property
     def resting(self) -> bool:
-        """Nothing happens here as time passes."""
+        """Whether the axis does not change over time."""
         return not self.in_motion and self.armed not in COMPARING
 
     @property
     def mode(self) -> int:
-        """Mode bits, in a layout of our own: profile 0-1, automatic stop 2, automatic update 3, break 4-6."""
+        """Mode bits, in our own layout: profile 0-1, automatic stop 2, automatic update 3, breakpoint 4-6."""
         kind = _BREAKS.index(self.armed)
         return self.trajectory.mode | self.auto_stop << 2 | self.auto_update << 3 | kind << 4
 
     @property
     def velocity(self) -> float:
-        """What the target moved in the last sample, in counts."""
+        """Movement of the target in the last sample, in counts."""
         return (self.trajectory.velocity >> 16) / 65536
 
     @property
     def position_error(self) -> int:
-        """How far the motor is behind, as far as a word can say."""
+        """Position error, limited to a word."""
         return max(min(self.lost, 32767), -32768)
 
     @property
     def motor_command(self) -> int:
-        """What is put out: by hand with an open loop, else the bias, since nothing needs force here."""
+        """Motor output: the manual command with an open loop, else the bias, as no force is simulated."""
         if not self.motor_on:
             return self._open_loop_command
         most = int(self.values["mtr_lmt"])
         return max(min(int(self.values["mtr_bias"]), most), -most)
 
     def take_capture(self) -> int:
-        """Return the captured position, and wait for the next one."""
+        """Return the captured position, and rearm the capture."""
         self.capture_armed = True
         return self.captured
 
-    # What is switched ---------------------------------------------------------------------------------------
+    # Switching ----------------------------------------------------------------------------------------------
 
     def set_mode(self, mode: int) -> None:
-        """Select a profile. It begins at rest: how one takes over a motion of another was not found."""
+        """Select a profile. It begins at rest: the transition of a motion was not found in the sources."""
         if mode != self.trajectory.mode:
             self.trajectory.halt()
             self.trajectory.mode = mode
 
     def switch_limits(self, *, on: bool) -> None:
-        """Look at the limit switches from now on, or not."""
+        """Enable or disable the limit switches."""
         self.limits_on = on
         self.meet_limits()
 
     def switch_motor(self, *, on: bool) -> None:
-        """Close the loop, and the target is where the motor is; or open it, and the motion ends."""
+        """Close the loop, with the target at the motor; or open it, which ends the motion."""
         if on and not self.motor_on:
             self.synchronise()
         elif not on:
@@ -134,18 +134,18 @@ class ChipAxis:
         self.motor_on = on
 
     def switch_axis(self, *, on: bool) -> None:
-        """Service the axis, or not; then its motion ends."""
+        """Enable the axis, or disable it, which ends its motion."""
         self.axis_on = on
         if not on:
             self.trajectory.halt()
 
     def set_motor_command(self, value: int) -> None:
-        """Put out a motor command, which works with an open loop only."""
+        """Output a motor command, effective only with an open loop."""
         if not self.motor_on:
             self._open_loop_command = value
 
     def set_actual(self, value: int) -> None:
-        """Call the place where the motor is `value`; the target is shifted, so the error stays."""
+        """Set the actual position to `value`; the target is shifted, so the error does not change."""
         self.trajectory.shift((value - self.actual) << COUNTS)
 
     # Events -------------------------------------------------------------------------------------------------
@@ -161,7 +161,7 @@ class ChipAxis:
     # Breakpoints and captures -------------------------------------------------------------------------------
 
     def pulse(self, source: str) -> None:
-        """An index pulse, a home signal, or the external signal of a breakpoint ("index", "home", "ext")."""
+        """Handle an index pulse, a home signal, or the external signal of a breakpoint."""
         if source == "ext":
             if self.armed == "ext":
                 self.break_now()
@@ -171,7 +171,7 @@ class ChipAxis:
             self.raise_event(AxisStatus.CAPTURE_RECEIVED)
 
     def look_at_breakpoint(self, time: int) -> None:
-        """Compare; `time` is in cycles since the reset."""
+        """Compare the breakpoint; `time` is in cycles since the reset."""
         value = int(self.values["brk_pnt"])
         here = {"time": time, "pos": self.target, "neg": -self.target, "actl_pos": self.actual}
         reached = here.get(self.armed, -self.actual)
@@ -180,7 +180,7 @@ class ChipAxis:
             self.break_now()
 
     def break_now(self) -> None:
-        """The breakpoint is reached; it is disarmed, and updates if it may."""
+        """Handle a reached breakpoint: disarm it, and update if enabled."""
         self.armed = "off"
         self.raise_event(AxisStatus.BREAKPOINT_REACHED)
         if self.auto_update:
@@ -195,7 +195,7 @@ class ChipAxis:
             self.pending.add(name)
 
     def update(self) -> None:
-        """Make everything that waits active, but for what is not valid now."""
+        """Activate all buffered values, except those that are invalid now."""
         pending, self.pending = self.pending, set()
         refused = self._refused(pending)
         if refused:
@@ -211,7 +211,7 @@ class ChipAxis:
         self._act(pending)
 
     def _refused(self, pending: set[str]) -> set[str]:
-        """What of all that was written is not valid at this moment."""
+        """Return the written registers that are invalid now."""
         mode = self.trajectory.mode
         refused = pending & set(_FIXED.get(mode, ())) if self.in_motion else set()
         if mode == TRAPEZOIDAL and "acc" in pending and self.values["acc"] < 0:
@@ -241,7 +241,7 @@ class ChipAxis:
         return -(-self._acceleration() // jerk) if jerk else 1
 
     def _acceleration(self) -> int:
-        """What is the acceleration of the profile, in 1/2^32 counts; 0 also for an S-curve without jerk."""
+        """Return the acceleration of the profile, in 1/2^32 counts; 0 also for an S-curve without jerk."""
         smooth = self.trajectory.mode == S_CURVE
         if smooth and not self.active["jerk"]:
             return 0
@@ -257,7 +257,7 @@ class ChipAxis:
     # Motion -------------------------------------------------------------------------------------------------
 
     def sample(self) -> None:
-        """Let one sample time pass."""
+        """Advance by one sample."""
         trajectory = self.trajectory
         if not trajectory.moving:
             return
@@ -269,7 +269,7 @@ class ChipAxis:
             self._end(complete=True)
 
     def follow(self, counts: int) -> None:
-        """The master encoder of an electronic gear has moved."""
+        """Follow a movement of the master encoder of the electronic gear."""
         if self.trajectory.mode == GEAR and self.motor_on and self.axis_on:
             before = self.target
             self.trajectory.position += counts * (round(self.active["ratio"] * 65536) << 16)
@@ -297,7 +297,7 @@ class ChipAxis:
         return self.limits_on and ((positive and direction > 0) or (negative and direction < 0))
 
     def meet_limits(self) -> None:
-        """Look at the limit switches, after one of them has changed."""
+        """Check the limit switches after a change."""
         if self.limits_on:
             for met, event in zip(
                 self.limits, (AxisStatus.POSITIVE_LIMIT, AxisStatus.NEGATIVE_LIMIT), strict=True
@@ -308,7 +308,7 @@ class ChipAxis:
                 self._end(complete=False)
 
     def _end(self, *, complete: bool) -> None:
-        """The trajectory has come to an end, by itself or by force."""
+        """Handle the end of the trajectory, by arrival or by a stop."""
         self.trajectory.halt()
         if complete:
             self.raise_event(AxisStatus.MOTION_COMPLETE)

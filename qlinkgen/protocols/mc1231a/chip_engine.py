@@ -1,7 +1,7 @@
-"""The chip's end of the serial link: packets out of bytes, checksums behind answers.
+"""The chip's end of the serial link: decodes packets, and sends answers with checksums.
 
-The link carries the bytes of the parallel port in the same order. The words to be read and the checksum are
-sent as soon as a packet is complete, whether or not the host wants them.
+The link carries the bytes of the parallel port in the same order. The words to read and the checksum are sent
+as soon as a packet is complete, whether or not the host reads them.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ _REFUSAL = b"\0\0"
 
 
 class ChipCounters:
-    """What the chip's end of the link has seen.
+    """Counts of packets.
 
     Attributes:
-        packets: packets that were carried out.
-        illegal: command bytes that are no commands, and commands that the chip set does not know.
-        out_of_range: packets with a value that the command does not allow; they change nothing.
-        forgotten: packets that were begun and then forgotten.
+        packets: executed packets.
+        illegal: invalid command bytes, and commands unknown to the chip set.
+        out_of_range: packets with an invalid value, which have no effect.
+        forgotten: incomplete packets discarded after a silence.
     """
 
     __slots__ = ("forgotten", "illegal", "out_of_range", "packets")
@@ -35,12 +35,12 @@ class ChipCounters:
 
 
 class ChipEngine:
-    """Carries out the packets that come, and answers; driven like `qlinkgen.link.SlaveEngine`.
+    """Executes received packets, and answers; used like `qlinkgen.link.SlaveEngine`.
 
     Attributes:
         chip: the chip set.
-        counters: what was seen.
-        record: packets that were carried out, if they are kept.
+        counters: counts of packets.
+        record: executed packets, if recorded.
     """
 
     def __init__(
@@ -50,14 +50,14 @@ class ChipEngine:
 
         Args:
             chip: the chip set.
-            forgets: seconds of silence within a packet after which it is forgotten; 0: never. The sources
-                know no such rule, so there is none unless asked for.
+            forgets: seconds of silence within a packet after which it is discarded; 0, the default: never,
+                since the sources mention no such timeout.
             turnaround: seconds from the end of a packet to its answer.
-            record: keep every packet that was carried out.
+            record: keep every executed packet.
         """
         for name, seconds in (("forgets", forgets), ("turnaround", turnaround)):
             if not 0 <= seconds < float("inf"):
-                raise ValueError(f"{name}: {seconds} s was given; a time is not negative, and ends")
+                raise ValueError(f"{name} must be 0 s or more and finite, not {seconds}")
         self.chip = chip
         self.counters = ChipCounters()
         self.record: list[bytes] | None = [] if record else None
@@ -72,7 +72,7 @@ class ChipEngine:
         self._due = 0.0
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes that the host has sent."""
+        """Process bytes of the host."""
         if self._buffer and self._forgets and now - self._last > self._forgets:
             self.counters.forgotten += 1
             self._buffer = b""
@@ -99,7 +99,7 @@ class ChipEngine:
             message = request.from_bytes(packet[1:])
         except mc1231a.DecodeError:
             self.counters.out_of_range += 1
-            self._answer += _checked(packet, b"")  # what a host reads is in no packet with a value
+            self._answer += _checked(packet, b"")  # packets with a value have no words to read
             return
         self.counters.packets += 1
         if self.record is not None:
@@ -115,12 +115,12 @@ class ChipEngine:
         return answer
 
     def next_timer(self) -> float | None:
-        """Return when an answer is due, None where none waits."""
+        """Return when an answer is due, None without one."""
         return self._due if self._answer else None
 
 
 def _checked(packet: bytes, payload: bytes) -> bytes:
-    """A payload and the checksum over the whole packet."""
+    """Return a payload with the checksum over the whole packet."""
     words = packet[1:] + payload
     total = packet[0] + sum(words[0::2]) * 256 + sum(words[1::2])
     return payload + (total & 0xFFFF).to_bytes(2, "big")

@@ -1,4 +1,4 @@
-"""What the host and the simulated chip set have to know of the protocol beside its schema."""
+"""Facts of the protocol beyond its schema, for the host and the simulated chip set."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from qlinkgen.codecs.mc1231a import AxisStatus
 from qlinkgen.link.host_rules import HostRules
 
 AXES: Final = (1, 2)
-#: Packet that makes an axis current.
+#: Packet that selects an axis.
 SELECT: Final[dict[int, mc1231a.Request]] = {1: mc1231a.Set1Request(), 2: mc1231a.Set2Request()}
 
-#: Bits of the status word that stay set until they are cleared.
+#: Latched bits of the status word.
 EVENTS: Final = (
     AxisStatus.MOTION_COMPLETE
     | AxisStatus.POSITION_WRAPPED
@@ -25,8 +25,8 @@ EVENTS: Final = (
     | AxisStatus.COMMUTATION_ERROR
 )
 
-#: 0x00 and 0xFF are no commands. As data a zero updates no axis and moves little; but in the masks that say
-#: which events to keep it would clear them, and there ones do nothing.
+#: Fill bytes: 0x00 and 0xFF are not commands. As data, zeros update no axis and move little; but in the masks
+#: of events to keep they would clear events, where ones have no effect.
 RULES: Final = HostRules(
     proof=mc1231a.GetStatusRequest(),
     context=SELECT[1],
@@ -42,7 +42,7 @@ RULES: Final = HostRules(
 
 
 def check_axis(axis: int) -> int:
-    """Return the number of an axis, if it is one."""
+    """Return the number of an axis after checking it."""
     if axis not in AXES:
-        raise ValueError(f"axis: {axis} was given; the chip set has axes 1 and 2")
+        raise ValueError(f"axis must be 1 or 2, not {axis}")
     return axis

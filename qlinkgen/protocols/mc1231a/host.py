@@ -1,4 +1,4 @@
-"""The blocking client of a host."""
+"""The blocking host of a chip set."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ R = TypeVar("R", bound=mc1231a.Message)
 
 
 class Host(BlockingMaster, HostCalls):
-    """The host of a chip set, used from any number of threads.
+    """The host of a chip set, for any number of threads.
 
-    Every command of the table is a method here; those that act on the current axis take the axis as their
-    first argument, and stand on `axis(n)` without it. The current axis is kept: set_1 or set_2 is sent only
-    where it must be. They return the response and raise LinkError (NoReply, BadReply, IllegalCommand),
-    PortLost, or the EncodeError of `qlinkgen.codecs.mc1231a` before a byte is sent.
+    Every command of the table is a method; those that act on the current axis take the axis as their first
+    argument, and are methods of `axis(n)` without it. The host tracks the current axis: set_1 or set_2 is
+    sent only if needed. Methods return the response and raise LinkError (NoReply, BadReply, IllegalCommand),
+    PortLost, or, before anything is sent, the EncodeError of `qlinkgen.codecs.mc1231a`.
 
     Example:
         >>> with Host.open("/dev/ttyUSB0", baud=57600) as host:  # doctest: +SKIP
@@ -33,7 +33,7 @@ class Host(BlockingMaster, HostCalls):
         ...     host.axis(2).update(check=True)
 
     Attributes:
-        command_errors: update and multi_update look for the command error unless they are told otherwise.
+        command_errors: update and multi_update check for the command error by default.
     """
 
     engine: HostEngine
@@ -49,20 +49,21 @@ class Host(BlockingMaster, HostCalls):
         slack: float | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
-        """Take over a port; closing the host closes it.
+        """Take ownership of a port; closing the host closes it.
 
         Args:
-            port: where the chip set is.
-            checksum: whose checksum is read: "always", "never", or the names of some commands. What is not
-                read may have been lost or changed on the line, and nobody is told.
-            attempts: how often a packet is sent before it has failed, all tries counted; those that must not
-                be repeated are sent once.
-            command_errors: have update and multi_update read the status word too, and raise CommandError.
-            forgets: seconds of silence after which the chip's side of the link forgets a packet of which not
-                everything has come; 0 for one that never does.
-            slack: seconds that driver, adapter and operating system may add to a transaction, in place of
-                what the port says of itself.
-            on_event: called with each event, in the thread that asks.
+            port: the port of the chip set.
+            checksum: commands whose checksum is read: "always", "never", or names. Without it, the loss or
+                corruption of a packet is not detected.
+            attempts: most transmissions of a packet, the first included; packets that are unsafe to repeat
+                are
+                sent once.
+            command_errors: update and multi_update also read the status word, and raise CommandError.
+            forgets: seconds of silence after which the chip's side of the link discards an incomplete packet;
+                0 if it never does.
+            slack: largest delay in seconds that driver, adapter and operating system add to a transaction; by
+                default derived from the port.
+            on_event: called with each event, in the calling thread.
         """
         engine = make_engine(port, checksum=checksum, attempts=attempts, slack=slack, forgets=forgets)
         super().__init__(engine, port, on_event=on_event)
@@ -82,10 +83,10 @@ class Host(BlockingMaster, HostCalls):
         slack: float | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> Host:
-        """Open a device name or a URL of pyserial; no source names a speed. The rest as for the class.
+        """Open a device name or a URL of pyserial; the sources state no speed. The rest as for the class.
 
         Raises:
-            PortMissing: there is no such port.
+            PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
         return cls(
@@ -123,17 +124,17 @@ class Host(BlockingMaster, HostCalls):
         return self.run(updating.raise_command_error(axis))
 
     def update(self, axis: int, *, check: bool | None = None) -> mc1231a.UpdateResponse:
-        """Make all buffered values of an axis active now.
+        """Activate all buffered values of an axis.
 
         Args:
             axis: 1 or 2.
-            check: read the status word then, and raise CommandError if it says so, be it of this update or
-                of one before; None: as the host was told.
+            check: then read the status word, and raise CommandError on a command error, of this update or an
+                earlier one; None: the default of the host.
         """
         return self.run(updating.update(axis, check=self.command_errors if check is None else check))
 
     def multi_update(self, *, axes: int = 0, check: bool | None = None) -> mc1231a.MultiUpdateResponse:
-        """Update several axes at the same instant; unlike one update, the mask is inferred, not confirmed.
+        """Update several axes simultaneously; the mask is inferred from the sources, not confirmed.
 
         Args:
             axes: masks of Axes; bit 0 is axis 1.
@@ -143,7 +144,7 @@ class Host(BlockingMaster, HostCalls):
 
 
 class Axis(AxisCalls):
-    """One axis: every command that acts on the current axis, without the argument for it.
+    """One axis: every command that acts on the current axis, without the axis argument.
 
     Attributes:
         host: the host.

@@ -1,7 +1,6 @@
-"""Profiles of a simulated axis, sample by sample: good enough to move, to be changed on the way, to arrive.
+"""Profiles of a simulated axis, sample by sample, with changes during the motion and exact arrival.
 
-Positions, velocities and accelerations are whole numbers of 1/2^32 counts, so nothing is ever rounded away:
-an axis arrives at its destination exactly.
+Positions, velocities and accelerations are integers in 1/2^32 counts, so nothing is rounded.
 """
 
 from __future__ import annotations
@@ -10,18 +9,18 @@ from collections import deque
 from math import isqrt
 from typing import Final
 
-#: Whole counts begin at this bit.
+#: Bit position of whole counts.
 COUNTS: Final = 32
 TRAPEZOIDAL: Final = 0
 VELOCITY: Final = 1
 S_CURVE: Final = 2
 GEAR: Final = 3
-#: Samples over which an acceleration is built up at most; a jerk near 0 would take hours.
+#: Largest number of samples of a ramp of the acceleration; a jerk near 0 would take hours.
 LONGEST_RAMP: Final = 1 << 14
 
 
 def way_to_stop(velocity: int, acceleration: int) -> int:
-    """Return how far an axis still goes that loses `acceleration` in each sample; both 0 or more."""
+    """Return the stopping distance of an axis that loses `acceleration` in each sample; both 0 or more."""
     if not acceleration:
         return 0
     samples = velocity // acceleration
@@ -29,26 +28,25 @@ def way_to_stop(velocity: int, acceleration: int) -> int:
 
 
 def point_to_point(distance: int, velocity: int, limit: int, acceleration: int) -> tuple[int, int]:
-    """One sample on the way to a destination.
+    """Compute one sample of a motion to a destination.
 
     Args:
-        distance: from here to the destination, with its sign.
-        velocity: in the sample before, with its sign.
-        limit: velocity that is not exceeded, 0 or more.
-        acceleration: most change of velocity in a sample, 0 or more.
+        distance: signed distance to the destination.
+        velocity: signed velocity of the previous sample.
+        limit: largest velocity, 0 or more.
+        acceleration: largest change of velocity in a sample, 0 or more.
 
     Returns:
-        How far it moves in this sample, and the velocity then. It moves the whole distance, with a velocity
-        of 0 then, when it arrives.
+        The movement in this sample, and the new velocity. On arrival these are the whole distance and 0.
     """
     if velocity < 0 or (velocity == 0 and distance < 0):
         step, new = point_to_point(-distance, -velocity, limit, acceleration)
         return -step, -new
     slowest = max(velocity - acceleration, 0)
-    if distance < 0:  # on the way from it: stop first
+    if distance < 0:  # moving away: stop first
         return slowest, slowest
     fastest = max(min(velocity + acceleration, limit), min(slowest, velocity))
-    # Velocities m * a, ..., 2a, a cover a * m * (m + 1) / 2; from more than that it could not stop in time.
+    # Velocities m * a, ..., 2a, a cover a * m * (m + 1) / 2; with more it could not stop in time.
     still_stops = (isqrt(acceleration * (acceleration + 8 * distance)) - acceleration) // 2
     new = max(min(fastest, max(still_stops, 1)), slowest)
     if new >= distance and slowest <= acceleration:
@@ -57,10 +55,10 @@ def point_to_point(distance: int, velocity: int, limit: int, acceleration: int) 
 
 
 class Smoothing:
-    """Turns a trapezoidal profile into an S-curve: each position is the mean of the last few.
+    """Converts a trapezoidal profile to an S-curve: each position is the mean of the last ones.
 
-    The mean over as many samples as the acceleration takes to build up has just that jerk, and arrives where
-    the trapezoidal profile does.
+    The mean over as many samples as the ramp of the acceleration has exactly that jerk, and ends at the
+    position of the trapezoidal profile.
     """
 
     def __init__(self, position: int, samples: int) -> None:
@@ -75,13 +73,13 @@ class Smoothing:
 
 
 class Trajectory:
-    """The target position of an axis, in time.
+    """The target position of an axis over time.
 
     Attributes:
         mode: TRAPEZOIDAL, VELOCITY, S_CURVE or GEAR.
         position: target position.
-        velocity: what it moved in the last sample.
-        moving: it has not come to its end.
+        velocity: movement in the last sample.
+        moving: the motion has not ended.
     """
 
     def __init__(self) -> None:
@@ -96,7 +94,7 @@ class Trajectory:
         self._stopping = False
 
     def move_to(self, destination: int, ramp: int) -> None:
-        """Begin to move; `ramp` are the samples in which an S-curve builds up its acceleration."""
+        """Start a motion; `ramp` is the number of samples of an S-curve's acceleration ramp."""
         self._destination = destination
         self._stopping = False
         if self.mode == S_CURVE and not (self.moving and self._smoothing):
@@ -107,19 +105,19 @@ class Trajectory:
         self.moving = True
 
     def run_free(self) -> None:
-        """Begin to follow the acceleration alone, as in velocity mode."""
+        """Start following only the acceleration, as in velocity mode."""
         self._smoothing = None
         self._stopping = False
         self.moving = True
 
     def halt(self) -> None:
-        """Stop here and now."""
+        """Stop immediately."""
         self.velocity = self._speed = 0
         self.moving = self._stopping = False
         self._smoothing = None
 
     def slow_down(self, acceleration: int) -> None:
-        """Begin to stop."""
+        """Start decelerating to a stop."""
         if not self.moving or self.mode == GEAR:
             return
         here, speed = (self._ahead, self._speed) if self._smoothing else (self.position, self.velocity)
@@ -128,14 +126,14 @@ class Trajectory:
         self._stopping = True
 
     def shift(self, counts: int) -> None:
-        """Call the place where it is another one, for an axis that is at rest or runs free."""
+        """Redefine the current position, for an axis at rest or in velocity mode."""
         self.position += counts
         self._ahead += counts
         if self._smoothing:
             self._smoothing = Smoothing(self.position, 1)
 
     def sample(self, limit: int, acceleration: int) -> None:
-        """Move on by one sample; a negative acceleration leads backwards in velocity mode."""
+        """Advance by one sample; a negative acceleration moves backwards in velocity mode."""
         before = self.position
         if self.mode == VELOCITY:
             self._sample_free(limit, acceleration)

@@ -1,4 +1,4 @@
-"""Updates whose command error is looked for: procedures, so that both clients run the same."""
+"""Procedures of updates with a check for the command error, for both clients."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def raise_command_error(axis: int) -> Procedure[int]:
     status: int = reply.response.status
     if status & AxisStatus.COMMAND_ERROR:
         raise CommandError(
-            f"axis {axis}: command error, status 0x{status:04X}: a change was not valid then and was "
-            "dropped, the rest of its update took effect; the bit stays set until clr_status or rst_status",
+            f"axis {axis}: command error, status 0x{status:04X}: an invalid change was dropped, the rest of "
+            "its update took effect; the bit stays set until clr_status or rst_status",
             status=status,
             node=axis,
             attempts=reply.attempts,
@@ -32,7 +32,7 @@ def raise_command_error(axis: int) -> Procedure[int]:
 
 
 def update(axis: int, *, check: bool) -> Procedure[mc1231a.UpdateResponse]:
-    """Update one axis; where `check` is set, look for the command error then."""
+    """Update one axis; with `check`, then check for the command error."""
     reply: Reply = yield Ask(Packet(mc1231a.UpdateRequest(), SELECT[check_axis(axis)]))
     if check:
         yield from raise_command_error(axis)
@@ -41,7 +41,7 @@ def update(axis: int, *, check: bool) -> Procedure[mc1231a.UpdateResponse]:
 
 
 def multi_update(axes: int, *, check: bool) -> Procedure[mc1231a.MultiUpdateResponse]:
-    """Update several axes; where `check` is set, look for the command error of each then."""
+    """Update several axes; with `check`, then check each for the command error."""
     reply: Reply = yield Ask(Packet(mc1231a.MultiUpdateRequest(axes=axes)))
     for axis in AXES if check else ():
         if axes >> (axis - 1) & 1:

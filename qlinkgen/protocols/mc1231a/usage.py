@@ -1,4 +1,4 @@
-"""How a host is used: which checksums it reads, and which weak commands somebody has sent."""
+"""Usage of a host: selection of checksums, and warnings of unconfirmed commands."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ from qlinkgen.protocols.mc1231a.facts import RULES
 from qlinkgen.transport.conversation import host_slack
 from qlinkgen.transport.port import Ability, Port
 
-#: Whose checksum is read: that of every command, of none, or of those that are named.
+#: Commands whose checksum is read: all, none, or those listed.
 Checksum = Literal["always", "never"] | Collection[str]
 
 
 class UnconfirmedCommand(UserWarning):
-    """A command is used of which no source was seen: check at the chip before trusting it."""
+    """Use of a command that no source confirms: verify it on the chip."""
 
 
 class Usage:
-    """Remembers which commands of weak sources were used, so that each is warned of once."""
+    """Remembers the unconfirmed commands used, so that each is warned of once."""
 
     def __init__(self) -> None:
         self._weak = {each.request: each for each in mc1231a.COMMANDS.values() if not each.confirmed}
 
     def note(self, request: mc1231a.Message) -> None:
-        """Warn if this is the first use of such a command; the caller of our caller's caller is shown."""
+        """Warn at the first use of such a command, with the location of the user's call."""
         if self._weak:
             command = self._weak.pop(type(request), None)
             if command is not None:
                 warnings.warn(
                     f"{command.name} (code 0x{command.id:02X}) is unconfirmed: its code, words or direction "
-                    "were not seen in a source; check at the chip before trusting it",
+                    "are not confirmed by a source; verify it on the chip",
                     UnconfirmedCommand,
                     stacklevel=4,
                 )
 
 
 def packet(request: mc1231a.Message, context: mc1231a.Request | None) -> Packet:
-    """Return a request as an engine takes it. Raises TypeError for a response."""
+    """Return the packet of a request. Raises TypeError for a response."""
     if not isinstance(request, mc1231a.Request):
-        raise TypeError(f"{type(request).__name__} was given; a request of this protocol is needed")
+        raise TypeError(f"{type(request).__name__} is not a request of this protocol")
     return Packet(request, context)
 
 
@@ -68,11 +68,11 @@ def _checked(checksum: Checksum) -> Collection[str]:
     """Return the names of the commands whose checksum is read."""
     if isinstance(checksum, str):
         if checksum not in {"always", "never"}:
-            raise ValueError(f'checksum: {checksum!r} was given; give "always", "never" or names of commands')
+            raise ValueError(f"checksum must be 'always', 'never' or names of commands, not {checksum!r}")
         return mc1231a.COMMANDS if checksum == "always" else ()
     for name in checksum:
         if name not in mc1231a.COMMANDS:
             close = difflib.get_close_matches(name, mc1231a.COMMANDS, 1)
             hint = f"did you mean {close[0]}?" if close else "see `qlinkgen show mc1231a`"
-            raise ValueError(f"checksum: there is no command {name!r}; {hint}")
+            raise ValueError(f"checksum: unknown command {name!r}; {hint}")
     return frozenset(checksum)

@@ -1,6 +1,7 @@
-"""Q.link on the wire: the master's side, blocking and for asyncio, and the slave's.
+"""Q.link on the wire: masters, blocking and for asyncio, and a simulated slave.
 
-`Bus` and `AsyncBus` ask, `VirtualNode` answers. Messages and their errors are in `qlinkgen.codecs.qlink`.
+`Bus` and `AsyncBus` are masters, `VirtualNode` is a slave. Messages and their errors are in
+`qlinkgen.codecs.qlink`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The asyncio client of a Q.link bus: the same methods, awaited."""
+"""The asyncio client of a Q.link bus: the same methods as coroutines."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ R = TypeVar("R", bound=qlink.Message)
 
 
 class AsyncBus(AsyncMaster, AsyncMasterCalls):
-    """A Q.link bus, asked from any number of tasks of one event loop. Everything else is as in `Bus`.
+    """A Q.link bus, for any number of tasks of one event loop. Otherwise like `Bus`.
 
     Example:
         >>> async with AsyncBus.open("/dev/ttyUSB0") as bus:  # doctest: +SKIP
@@ -49,7 +49,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
-        """Take over a port, with the arguments of `Bus`."""
+        """Take ownership of a port; arguments as for `Bus`."""
         engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
         self.state = BusState()
@@ -68,7 +68,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> AsyncBus:
-        """Open a device name or a URL of pyserial, as `Bus.open`. Opening takes no time worth awaiting."""
+        """Open a device name or a URL of pyserial, like `Bus.open`. Opening is fast, so it is synchronous."""
         port = open_port(name, baud=baud or BAUD)
         return cls(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc, on_event=on_event)
 
@@ -93,7 +93,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
         return answer
 
     async def tell(self, request: qlink.Message) -> None:
-        """Send a request that nobody answers."""
+        """Send a request without a response."""
         await self.transact(request)
 
     async def motion(
@@ -111,7 +111,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
     async def clear_fifo(self, node: int) -> qlink.ClearFifoResponse:
         """As `Bus.clear_fifo`."""
         async with self._moving[node]:
-            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also without an answer: the node may have executed it
             response = await super().clear_fifo(node)
             self.state.motions[node].forget()
             return response
@@ -119,7 +119,7 @@ class AsyncBus(AsyncMaster, AsyncMasterCalls):
     async def node_reset(self, node: int) -> qlink.NodeResetResponse:
         """As `Bus.node_reset`."""
         async with self._moving[node]:
-            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also without an answer: the node may have executed it
             response = await super().node_reset(node)
             self.state.motions[node].forget()
             return response
@@ -189,7 +189,7 @@ class AsyncNode(AsyncNodeCalls):
 
     def __init__(self, bus: AsyncBus, number: int) -> None:
         if number not in NODES:
-            raise ValueError(f"node: {number} was given; nodes have the numbers 1..16")
+            raise ValueError(f"node must be 1..16, not {number}")
         self.bus = bus
         self.number = number
 
@@ -198,7 +198,7 @@ class AsyncNode(AsyncNodeCalls):
         return await self.bus.ask(request, response)
 
     async def tell(self, request: qlink.Message) -> None:
-        """Send a request that nobody answers."""
+        """Send a request without a response."""
         await self.bus.tell(request)
 
     async def motion(

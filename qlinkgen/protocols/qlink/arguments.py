@@ -1,4 +1,4 @@
-"""Checks of what a user hands in: the error says what was seen, the rule, and the name of the argument."""
+"""Checks of user arguments: errors state the argument, its value and the rule."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from math import inf
 
 
 def whole(name: str, value: object, low: int, high: int) -> int:
-    """Return a whole number of a range.
+    """Return an integer of a range.
 
     Raises:
-        ValueError: it is no whole number, or out of the range.
+        ValueError: the value is not an integer, or out of range.
     """
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ValueError(f"{name}={value!r}: give a whole number from {low} to {high}")
+        raise ValueError(f"{name}={value!r} must be an integer from {low} to {high}")
     return value
 
 
 def positive(name: str, value: object, unit: str, most: float | None = None) -> float:
-    """Return a finite number that is not negative, and at most `most`.
+    """Return a finite number from 0 to `most`.
 
     Raises:
-        ValueError: it is not.
+        ValueError: the value is not such a number.
     """
     if (
         not isinstance(value, int | float)
@@ -29,20 +29,20 @@ def positive(name: str, value: object, unit: str, most: float | None = None) -> 
         or value == inf
     ):
         limit = "0 or more" if most is None else f"0 to {most}"
-        raise ValueError(f"{name}={value!r}: give {limit} {unit}")
+        raise ValueError(f"{name}={value!r} must be {limit} {unit}")
     return value
 
 
 def known(name: str, values: Iterable[str], legal: Iterable[str]) -> frozenset[str]:
-    """Return names that are all legal.
+    """Return names after checking that all are legal.
 
-    A single text is taken as one name: its letters are none.
+    A string is a single name.
 
     Raises:
-        ValueError: one of them is not.
+        ValueError: a name is unknown.
     """
     names = frozenset({values} if isinstance(values, str) else values)
     if strange := names - set(legal):
         seen = ", ".join(sorted(map(repr, strange)))
-        raise ValueError(f"{name}: {seen} not known; there are {', '.join(sorted(legal))}")
+        raise ValueError(f"{name}: unknown {seen}; known are {', '.join(sorted(legal))}")
     return names

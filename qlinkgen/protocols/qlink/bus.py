@@ -30,11 +30,11 @@ R = TypeVar("R", bound=qlink.Message)
 
 
 class Bus(BlockingMaster, MasterCalls):
-    """A Q.link bus, asked from any number of threads.
+    """A Q.link bus, for any number of threads.
 
-    Every command of the document is a method here with the node as its first argument, and on `node(n)`
-    without it. They return the response, and raise LinkError (NoReply, BadReply, Collision), PortLost, or the
-    EncodeError of `qlinkgen.codecs.qlink` before a byte is sent.
+    Every command of the document is a method with the node as its first argument, and a method of `node(n)`
+    without it. They return the response, and raise LinkError (NoReply, BadReply, Collision), PortLost, or,
+    before anything is sent, the EncodeError of `qlinkgen.codecs.qlink`.
 
     Example:
         >>> with Bus.open("/dev/ttyUSB0") as bus:  # doctest: +SKIP
@@ -54,18 +54,18 @@ class Bus(BlockingMaster, MasterCalls):
         crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> None:
-        """Take over a port; closing the bus closes it.
+        """Take ownership of a port; closing the bus closes it.
 
         Args:
-            port: where the bus is.
-            attempts: how often a request is sent before it has failed, all tries counted.
-            echo: whether the adapter hands back what is sent: `expect`, `none`, or `auto` to find out with
-                two bytes of zero before the first request.
-            health: when a node that does not answer is left alone; None: never.
-            slack: seconds that driver, adapter and operating system may add to a transaction, in place of
-                what the port says of itself.
+            port: the port of the bus.
+            attempts: most transmissions of a request, the first included.
+            echo: whether the adapter echoes sent bytes: `expect`, `none`, or `auto` to probe with two zero
+                bytes before the first request.
+            health: when a silent node is offline; None: never.
+            slack: largest delay in seconds that driver, adapter and operating system add to a transaction; by
+                default derived from the port.
             crc: 16-bit CRC of the catalogue in place of the schema's.
-            on_event: called with each event, in the thread that asks.
+            on_event: called with each event, in the calling thread.
         """
         engine = make_engine(port, attempts=attempts, echo=echo, health=health, slack=slack, crc=crc)
         super().__init__(engine, port, on_event=on_event)
@@ -90,10 +90,10 @@ class Bus(BlockingMaster, MasterCalls):
         crc: str | None = None,
         on_event: Callable[[Event], None] | None = None,
     ) -> Bus:
-        """Open a device name or a URL of pyserial, at 115200 baud unless given; the rest as for the class.
+        """Open a device name or a URL of pyserial, by default at 115200 baud; the rest as for the class.
 
         Raises:
-            PortMissing: there is no such port.
+            PortMissing: the port does not exist.
             PortBusy: another program uses it, or this user lacks the permission.
         """
         port = open_port(name, baud=baud or BAUD)
@@ -103,7 +103,8 @@ class Bus(BlockingMaster, MasterCalls):
         """As `BlockingMaster.transact`.
 
         Raises:
-            CommandError: the position of a motor is to be preset that runs, as its node has told last.
+            CommandError: a preset of the position, while the last status of the node says that its motor
+                runs.
         """
         self.state.check(request)
         response = None
@@ -124,23 +125,23 @@ class Bus(BlockingMaster, MasterCalls):
         return answer
 
     def tell(self, request: qlink.Message) -> None:
-        """Send a request that nobody answers."""
+        """Send a request without a response."""
         self.transact(request)
 
     def motion(
         self, node: int, *, counter: int | None = None, outputs: int = 0, segments: list[int] | None = None
     ) -> qlink.MotionResponse:
-        """Hand words and outputs to a node, which takes them exactly once and in order (section 7.10).
+        """Send words and outputs to a node, which takes them exactly once and in order (section 7.10).
 
-        When no answer comes, NoReply is raised and the motion stays pending: it is sent again under its
-        number before the next one, unless clear_fifo or node_reset drops it.
+        Without an answer, NoReply is raised and the motion stays pending: it is sent again under its number
+        before the next one, unless clear_fifo or node_reset drops it.
 
         Args:
             node: address of the node, 1..16.
-            counter: number of the motion, 0..255. Left out, the bus counts, and repeats are safe.
+            counter: number of the motion, 0..255. By default the bus counts, and repeats are safe.
             outputs: bit 0 is output 1; 0..255.
             segments: words of path data; 0..12 items, each 0..65535. Not more than `fifo_space` of the last
-                answer: `stream_motion` sees to that.
+                answer, which `stream_motion` observes.
         """
         if counter is not None:
             return super().motion(node, counter=counter, outputs=outputs, segments=segments)
@@ -152,7 +153,7 @@ class Bus(BlockingMaster, MasterCalls):
             return answer
 
     def _quick(self, state: MotionState, request: qlink.MotionRequest) -> Reply:
-        """What `move` does where nothing has to be settled before, at three quarters of its cost."""
+        """Fast path of `move` without a pending motion, at three quarters of its cost."""
         request.counter = state.counter
         fresh = state.begin(request)
         try:
@@ -164,23 +165,23 @@ class Bus(BlockingMaster, MasterCalls):
         return reply
 
     def clear_fifo(self, node: int) -> qlink.ClearFifoResponse:
-        """Drop all words that wait in a node, and the motion that is pending here (section 7.12)."""
+        """Drop all words queued in a node, and its pending motion (section 7.12)."""
         with self._moving[node]:
-            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also without an answer: the node may have executed it
             response = super().clear_fifo(node)
             self.state.motions[node].forget()
             return response
 
     def node_reset(self, node: int) -> qlink.NodeResetResponse:
-        """Reset a node; it answers first (section 7.7). A motion that is pending here is dropped."""
+        """Reset a node; it answers first (section 7.7). Its pending motion is dropped."""
         with self._moving[node]:
-            self.state.motions[node].drop()  # also where no answer comes: the node may have done it
+            self.state.motions[node].drop()  # also without an answer: the node may have executed it
             response = super().node_reset(node)
             self.state.motions[node].forget()
             return response
 
     def node_sync(self, *, counter: int | None = None) -> None:
-        """Synchronise all nodes (section 7.5); left out, the counter is one up from the last sync."""
+        """Synchronise all nodes (section 7.5); by default the counter is one more than in the last sync."""
         self.tell(qlink.NodeSyncRequest(node=BROADCAST, counter=self.state.next_sync(counter)))
 
     def stream_motion(
@@ -191,30 +192,31 @@ class Bus(BlockingMaster, MasterCalls):
         patience: float = 2.0,
         full_pause: float = 0.002,
     ) -> Generator[MotionProgress, None, dict[int, int]]:
-        """Stream path words to one node or several; iterate to go on.
+        """Stream path words to one or several nodes; iterate to continue.
 
-        Each FIFO is kept as full as it gets, and never gets more than it has room for. The words are taken
-        from their iterables as they are needed, so these may be endless, or wait for a computation.
+        Each FIFO is kept as full as possible, without overflow. The words are taken from their iterables as
+        needed, so these may be endless or lazy.
 
         Args:
             words: words for each node, 0..65535.
             outputs: outputs 1-8, for all or by node.
-            patience: seconds that a node may be silent while the others go on.
-            full_pause: seconds to leave the line alone when every FIFO is full.
+            patience: seconds that a node may be silent while the others continue.
+            full_pause: seconds without requests when every FIFO is full.
 
         Raises:
-            LinkError: a node was silent for longer. What it had taken is queued, the rest is pending.
+            LinkError: a node was silent for longer. Its acknowledged words are queued, the last motion is
+                pending.
         """
         return self.iterate(self.state.stream(words, outputs, patience, full_pause))
 
     def complete_motor_request(
         self, node: int, motor_data: bytes, *, poll_interval: float = 0.01, timeout: float = 5.0
     ) -> qlink.MotorResponsePollResponse:
-        """Send a motor request and ask for its result until it is there (sections 7.8, 7.9).
+        """Send a motor request and poll for its result (sections 7.8, 7.9).
 
         Raises:
             NoReply: not completed within `timeout` seconds, or the node does not answer. The request itself
-                is sent once: repeated, it could be done twice.
+                is sent once: a repeat could be executed twice.
         """
         return self.run(self.state.complete(node, motor_data, poll_interval, timeout))
 
@@ -226,7 +228,7 @@ class Bus(BlockingMaster, MasterCalls):
         stop: Callable[[], bool] | None = None,
         on_tick: Callable[[SyncTick], None] | None = None,
     ) -> SyncReport:
-        """Send node_sync every `interval` seconds, `count` times or until `stop()`; says how steadily."""
+        """Send node_sync every `interval` seconds, `count` times or until `stop()`; return the jitter."""
         return self.run(self.state.sync(interval, count, stop), on_tick)
 
     def load(
@@ -238,17 +240,17 @@ class Bus(BlockingMaster, MasterCalls):
         patience: float = 5.0,
         progress: Callable[[LoadProgress], None] | None = None,
     ) -> LoadReport:
-        """Load an Intel HEX file into a node (section 7.6); it is checked before a byte is sent.
+        """Load an Intel HEX file into a node (section 7.6); it is checked before anything is sent.
 
         Args:
             node: address of the node, 1..16.
-            program: path of the file, or a text that has been checked.
+            program: path of the file, or a checked text.
             piece: bytes in one request, 1..25.
-            patience: seconds for which one piece is tried; no piece is stored twice.
+            patience: time limit for one piece in seconds; no piece is stored twice.
             progress: called after each acknowledged piece.
 
         Raises:
-            HexFileError: the file is not what it should be.
+            HexFileError: the file is invalid.
             LoadError: a piece was not acknowledged.
         """
         return self.run(self.state.load(node, program, piece, patience), progress)
@@ -274,7 +276,7 @@ class Node(NodeCalls):
 
     def __init__(self, bus: Bus, number: int) -> None:
         if number not in NODES:
-            raise ValueError(f"node: {number} was given; nodes have the numbers 1..16")
+            raise ValueError(f"node must be 1..16, not {number}")
         self.bus = bus
         self.number = number
 
@@ -283,7 +285,7 @@ class Node(NodeCalls):
         return self.bus.ask(request, response)
 
     def tell(self, request: qlink.Message) -> None:
-        """Send a request that nobody answers."""
+        """Send a request without a response."""
         self.bus.tell(request)
 
     def motion(

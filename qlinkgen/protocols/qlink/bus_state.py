@@ -1,6 +1,6 @@
-"""What a master remembers of its bus from call to call, and the procedures that use it.
+"""State of a master between calls, and the procedures that use it.
 
-Both clients of the bus, blocking and asyncio, stand on this one.
+Common part of the blocking and the asyncio client.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class BusState:
     Attributes:
         motions: state of the motions, by node.
         syncs: number of the next sync.
-        statuses: motor status that each node told last, without those that a request has outdated.
+        statuses: last motor status of each node, unless outdated by a later request.
     """
 
     def __init__(self) -> None:
@@ -61,13 +61,13 @@ class BusState:
         self.syncs = pacing.SyncState()
 
     def next_sync(self, counter: int | None) -> int:
-        """Return the number for a sync that is sent now."""
+        """Return the number of the sync to send."""
         number = self.syncs.counter if counter is None else whole("counter", counter, 0, 255)
         self.syncs.counter = (number + 1) & 0xFF
         return number
 
     def check(self, request: Question) -> None:
-        """Refuse a request that the node is going to refuse, as far as its last status says.
+        """Refuse a request that the node would refuse according to its last status.
 
         Raises:
             CommandError: the motor runs, and the position cannot be preset.
@@ -78,15 +78,15 @@ class BusState:
         status = self.statuses.get(node, 0)
         if status & qlink.MotorStatus.RUNNING:
             raise CommandError(
-                f"node {node}: the position cannot be preset while the motor runs (section 7.13), and the "
-                "last status of the node says that it does; nothing was sent. Stop the node, or ask with "
-                f"motion({node}) whether it still runs",
+                f"node {node}: the position cannot be preset while the motor runs (section 7.13), as in the "
+                "last status of the node; nothing was sent. Stop the node, or refresh the status with "
+                f"motion({node})",
                 node=node,
                 status=status,
             )
 
     def note(self, request: Question, response: Message | None) -> None:
-        """Learn from a request that was sent, perhaps, and from its response where one came."""
+        """Update the state after a request that may have been sent, and its response if any."""
         if isinstance(request, qlink.MotionRequest):
             if isinstance(response, qlink.MotionResponse):
                 self.statuses[response.node] = response.motor_status
@@ -99,7 +99,7 @@ class BusState:
             self._set_up(request)
 
     def _set_up(self, request: qlink.NodeSetupRequest) -> None:
-        """Forget what is known of the number that a node was perhaps given, and of the one before."""
+        """Discard the state of the old and the new number of a node that may have been renumbered."""
         if request.node == BROADCAST:
             self.statuses.clear()
         for number in {request.node, request.node_number}:
@@ -125,7 +125,7 @@ class BusState:
     ) -> Procedure[pacing.SyncReport]:
         """Send syncs at an interval."""
         if not positive("interval", interval, "seconds"):
-            raise ValueError(f"interval={interval!r}: give more than 0 seconds")
+            raise ValueError(f"interval={interval!r} must be more than 0 seconds")
         if count is not None:
             whole("count", count, 0, MOST_SYNCS)
         return pacing.sync(self.syncs, interval, count=count, stop=stop or (lambda: False))
@@ -144,7 +144,7 @@ class BusState:
     def load(
         node: int, program: str | PathLike[str] | bytes, piece: int, patience: float
     ) -> Procedure[loading.LoadReport]:
-        """Load a file, or a text that has been checked already."""
+        """Load a file, or a checked text."""
         positive("patience", patience, "seconds")
         text = program if isinstance(program, bytes) else read_hex(program).text
         return loading.load(node, text, piece=piece, patience=patience)

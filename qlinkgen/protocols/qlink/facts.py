@@ -1,4 +1,4 @@
-"""Numbers of the protocol that the procedures need, all read from the generated module."""
+"""Constants of the protocol for the procedures, all read from the generated module."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from qlinkgen.codecs._support import ArrayRule, BytesRule
 def _bus(name: str) -> int:
     number = getattr(qlink.BUS, name)
     if not isinstance(number, int):
-        raise TypeError(f"the schema of Q.link does not say {name}")
+        raise TypeError(f"the schema of Q.link does not state {name}")
     return number
 
 
 def _most(message: type[qlink.Message], field: str) -> int:
-    """Return how many items a field of a message can hold."""
+    """Return the largest number of items of a field."""
     rules = (rule for rule in message.RULES if isinstance(rule, ArrayRule | BytesRule))
     return next(rule.most for rule in rules if rule.name == field)
 

@@ -1,7 +1,7 @@
-"""A program in Intel HEX: what it puts where, and the reader with which a virtual node rebuilds it.
+"""The memory image of an Intel HEX program, and the reader of virtual nodes.
 
-The reader takes the text in pieces of any size, as it comes over the wire, needs no package, and shares no
-code with `hexfile`, which reads files for the master: that the two agree says something about both.
+The reader takes the text in pieces of any size, as received, needs no package, and shares no code with
+`hexfile`, which reads files for the master, so that each verifies the other.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from itertools import pairwise
 _SPACE = re.compile(rb"[ \t\r\n]*")
 _SEGMENT = 0x1_0000
 _LINEAR = 0x1_0000_0000
-#: Data bytes of every type of record but data.
+#: Data bytes of every type of record except data.
 SIZES = {1: 0, 2: 2, 3: 4, 4: 2, 5: 4}
 
 
@@ -25,9 +25,9 @@ class HexImage:
     """A whole program.
 
     Attributes:
-        text: the Intel HEX text, byte for byte as it is on the wire.
-        segments: address and bytes of each stretch without a gap, sorted.
-        entry: where execution starts, None where the program does not say. CS:IP is told as CS * 65536 + IP.
+        text: the Intel HEX text, byte for byte as on the wire.
+        segments: address and bytes of each contiguous block, sorted.
+        entry: start address, None if the program has none. CS:IP is represented as CS * 65536 + IP.
     """
 
     text: bytes
@@ -36,7 +36,7 @@ class HexImage:
 
     @property
     def size(self) -> int:
-        """Bytes that the program puts into memory."""
+        """Number of bytes that the program puts into memory."""
         return sum(len(data) for _, data in self.segments)
 
     @property
@@ -46,7 +46,7 @@ class HexImage:
 
     @property
     def end(self) -> int:
-        """Address behind the highest of the program; 0 of an empty one."""
+        """Address after the highest of the program; 0 of an empty one."""
         return self.segments[-1][0] + len(self.segments[-1][1]) if self.segments else 0
 
     def memory(self) -> dict[int, int]:
@@ -55,11 +55,11 @@ class HexImage:
 
 
 class BrokenRecord(ValueError):
-    """The text is no Intel HEX. The reader that raised it is of no more use."""
+    """The text is not Intel HEX. The reader that raised it cannot continue."""
 
 
 class HexReader:
-    """Reads the records of a text that comes in pieces, and keeps what they put into memory.
+    """Reads the records of a text in pieces, and builds the memory image.
 
     Attributes:
         records: records read.
@@ -96,7 +96,7 @@ class HexReader:
         self._rest = text[begin:]
 
     def _end_of(self, text: bytes, begin: int) -> int:
-        """Return where the record ends, by its count; behind the text where that is not told yet."""
+        """Return the end of the record from its count; beyond the text if the count is not known yet."""
         if self.segments is not None:
             raise BrokenRecord(f"{text[begin : begin + 8]!r} seen; nothing follows the end record")
         if text[begin : begin + 1] != b":":
@@ -113,7 +113,7 @@ class HexReader:
             self._store(int.from_bytes(record[1:3], "big"), data)
             return
         if kind not in SIZES:
-            raise BrokenRecord(f"type {kind:02X}; there are 00 to 05")
+            raise BrokenRecord(f"type {kind:02X}; types are 00 to 05")
         if len(data) != SIZES[kind]:
             raise BrokenRecord(f"{len(data)} data bytes; type {kind:02X} has {SIZES[kind]}")
         number = int.from_bytes(data, "big")
@@ -127,7 +127,7 @@ class HexReader:
     def _store(self, offset: int, data: bytes) -> None:
         start = self._base + offset
         if offset + len(data) > self._room or start + len(data) > _LINEAR:
-            raise BrokenRecord(f"{len(data)} bytes at {start:#x} run over the end of their segment")
+            raise BrokenRecord(f"{len(data)} bytes at {start:#x} exceed the end of their segment")
         if self._chunks and self._chunks[-1][0] + len(self._chunks[-1][1]) == start:
             self._chunks[-1][1].extend(data)
         else:
@@ -143,7 +143,7 @@ def segments_of(chunks: Iterable[tuple[int, bytes | bytearray]]) -> tuple[tuple[
     ordered = sorted((start, bytes(data)) for start, data in chunks if data)
     for (start, data), (following, _) in pairwise(ordered):
         if following < start + len(data):
-            raise BrokenRecord(f"there is data for {following:#x} twice")
+            raise BrokenRecord(f"overlapping data at {following:#x}")
     joined: list[tuple[int, bytearray]] = []
     for start, data in ordered:
         if joined and joined[-1][0] + len(joined[-1][1]) == start:
@@ -157,4 +157,4 @@ def _digits(text: bytes | bytearray) -> bytes:
     try:
         return unhexlify(text)
     except NoHex:
-        raise BrokenRecord(f"{bytes(text)!r} has a character that is no hexadecimal digit") from None
+        raise BrokenRecord(f"{bytes(text)!r} has a character that is not a hexadecimal digit") from None

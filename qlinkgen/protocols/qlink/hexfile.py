@@ -1,17 +1,17 @@
-"""Reads an Intel HEX file for the master, and finds what is wrong with it before a byte is sent.
+"""Reads and checks an Intel HEX file for the master, before anything is sent.
 
-The judge of the records is the package `intelhex` (extra `load`): form, count, type, checksum, size of the
-special records, data given twice. What it accepts in silence, and this module refuses:
+The package `intelhex` (extra `load`) checks the records: form, count, type, checksum, size of the special
+records, overlapping data. This module also refuses what it accepts:
 
-* a missing end record, and text behind it (it stops reading there);
+* a missing end record, and text after it (where it stops reading);
 * a program without data;
-* data that run over the end of their 64 KiB segment, where type 02 or no address record is in force: the
-  format wraps them around, `intelhex` and some loaders go on above; data beyond the 4 GiB of all addresses;
-* what is no file of text: a folder, a device, a file of more than 16 MiB, characters outside ASCII.
+* data past the end of their 64 KiB segment, with type 02 or no address record in force: the format wraps them
+  around, `intelhex` and some loaders do not; data beyond 4 GiB;
+* other than text files: a folder, a device, a file of more than 16 MiB, characters outside ASCII.
 
-The text is sent as it stands in the file, record by record, upper or lower case; blank lines are left out,
-and every record gets the same line end, the last one too. That is CR LF unless asked otherwise: the document
-says nothing, and a loader that waits for either of the two sees it.
+The text is sent as in the file, record by record, in upper or lower case; blank lines are omitted, and every
+record has the same line end, the last one too: by default CR LF, since the document does not specify it, and
+a loader may wait for either.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from qlinkgen.protocols.qlink.hex_image import SIZES, HexImage
 
 __all__ = ["LINE_ENDS", "MOST_TEXT", "PIECE", "pieces", "read_hex"]
 
-#: Most bytes of text: some 6 MB of program, hours on the bus. More than that is another file.
+#: Most bytes of text: some 6 MB of program, hours on the bus. A larger file is not a program.
 MOST_TEXT = 16 * 1024 * 1024
 LINE_ENDS = (b"\r\n", b"\n", b"\r")
 
@@ -44,18 +44,18 @@ def read_hex(path: str | os.PathLike[str], *, line_end: bytes = b"\r\n") -> HexI
 
     Args:
         path: the file.
-        line_end: what ends every record on the wire: CR LF, LF or CR.
+        line_end: line end of every record on the wire: CR LF, LF or CR.
 
     Returns:
-        The program; its `text` is what a node_program_load sends.
+        The program; its `text` is sent by node_program_load.
 
     Raises:
-        HexFileError: the file cannot be sent; the text begins with file and line.
-        ExtraMissing: the package that checks it is not installed.
-        ValueError: `line_end` is none of the three.
+        HexFileError: the file is invalid; the message begins with file and line.
+        ExtraMissing: the package `intelhex` is not installed.
+        ValueError: `line_end` is not one of the three.
     """
     if line_end not in LINE_ENDS:
-        raise ValueError(f"line_end={line_end!r}: give one of {', '.join(map(repr, LINE_ENDS))}")
+        raise ValueError(f"line_end={line_end!r} must be one of {', '.join(map(repr, LINE_ENDS))}")
     judge = _judge()
     name = os.fspath(path)
     lines = _lines(name, _content(name))
@@ -64,18 +64,16 @@ def read_hex(path: str | os.PathLike[str], *, line_end: bytes = b"\r\n") -> HexI
     _check_reach(name, lines)
     segments = tuple((a, program.tobinstr(start=a, size=b - a)) for a, b in program.segments())
     if not segments:
-        raise HexFileError(
-            "no data record; there is nothing to load: look at how the file was made", file=name
-        )
+        raise HexFileError("no data record, so nothing to load; check how the file was made", file=name)
     text = b"".join(line.encode("ascii") + line_end for line in lines if line)
     return HexImage(text, segments, _entry(program.start_addr))
 
 
 def pieces(text: bytes, size: int = PIECE) -> Iterator[bytes]:
-    """Cut a text into the program data of its requests, all of the same size but the last.
+    """Cut a text into the program data of its requests, all of the same size except the last.
 
     Args:
-        text: what `HexImage.text` holds.
+        text: as in `HexImage.text`.
         size: bytes of each, 1..25.
 
     Raises:
@@ -86,7 +84,7 @@ def pieces(text: bytes, size: int = PIECE) -> Iterator[bytes]:
 
 
 class _Program(Protocol):
-    """What intelhex, which has no types, makes of a file."""
+    """Interface of the program of intelhex, which has no types."""
 
     start_addr: dict[str, int] | None
 
@@ -108,11 +106,11 @@ def _content(name: str) -> bytes:
     path = Path(name)
     try:
         if path.exists() and not path.is_file():
-            raise HexFileError("this is no file; give the path of an Intel HEX file", file=name)
+            raise HexFileError("not a file; pass the path of an Intel HEX file", file=name)
         with path.open("rb") as stream:
             content = stream.read(MOST_TEXT + 1)
     except OSError as fault:
-        raise HexFileError(f"{fault.strerror or fault}; give a file that can be read", file=name) from fault
+        raise HexFileError(f"{fault.strerror or fault}; pass a readable file", file=name) from fault
     if len(content) > MOST_TEXT:
         raise HexFileError(f"more than {MOST_TEXT} bytes; is this the Intel HEX file?", file=name)
     return content
@@ -143,11 +141,11 @@ def _judged(judge: ModuleType, name: str, lines: list[str]) -> _Program:
 
 
 def _complaint(judge: ModuleType, fault: Exception, line: str) -> str:
-    """Say in full what the judge found: it names the rule, this adds what was seen and what to do."""
+    """Return a full error text: intelhex names the rule, this adds what was seen and the fix."""
     if type(fault) is judge.HexRecordError:
         return _no_record(line)
     if isinstance(fault, judge.AddressOverlapError):
-        return f"data for {fault.address:#x} again; each address is given once: were two programs joined?"
+        return f"overlapping data at {fault.address:#x}; each address occurs once: were two programs joined?"
     if isinstance(fault, judge.DuplicateStartAddressRecordError):
         return "a second start address; a program has one: were two programs joined?"
     record = bytes.fromhex(line[1:])
@@ -156,7 +154,7 @@ def _complaint(judge: ModuleType, fault: Exception, line: str) -> str:
     if isinstance(fault, judge.RecordLengthError):
         wanted = record[0] + 5
         return (
-            f"count {record[0]:02X} asks for {wanted} bytes, the record has {len(record)}; was the line cut?"
+            f"count {record[0]:02X} requires {wanted} bytes, the record has {len(record)}; was the line cut?"
         )
     kind, address = record[3], line[3:7]
     if kind not in SIZES:
@@ -177,11 +175,11 @@ def _no_record(line: str) -> str:
 
 
 def _check_end(name: str, lines: list[str]) -> None:
-    """Find the end record, and that nothing follows it. What is in front of it has been judged."""
+    """Check that there is an end record, and nothing after it. Earlier records have been checked."""
     ended = False
     for number, line in enumerate(lines, start=1):
         if ended and line:
-            text = f"{line[:12]!r} behind the end record; nothing may follow it: were two files joined?"
+            text = f"{line[:12]!r} after the end record; nothing may follow it: were two files joined?"
             raise HexFileError(text, file=name, line=number)
         ended = ended or line[7:9] == "01"
     if not ended:
@@ -190,7 +188,7 @@ def _check_end(name: str, lines: list[str]) -> None:
 
 
 def _check_reach(name: str, lines: list[str]) -> None:
-    """Find data that run over the end of their segment."""
+    """Check for data past the end of their segment."""
     base, room = 0, _SEGMENT
     for number, line in enumerate(lines, start=1):
         record = bytes.fromhex(line[1:])
@@ -198,8 +196,8 @@ def _check_reach(name: str, lines: list[str]) -> None:
         offset, data = int.from_bytes(record[1:3], "big"), record[4:-1]
         if kind == 0 and (offset + len(data) > room or base + offset + len(data) > _LINEAR):
             text = (
-                f"{len(data)} bytes at {base + offset:#x} run over the end of their segment, where loaders "
-                "differ; end the record there and go on with an address record"
+                f"{len(data)} bytes at {base + offset:#x} exceed the end of their segment, where loaders "
+                "differ; end the record there and continue with an address record"
             )
             raise HexFileError(text, file=name, line=number)
         if kind == 2:

@@ -1,11 +1,11 @@
 """Inputs and outputs of a virtual node: 24 of each, and the delays from input 1 to output 1 (section 7.1).
 
-Bit 0 is number 1. What the document leaves open, and what this node does:
+Bit 0 is number 1. Assumptions where the document is silent:
 
 * Output 1 follows input 1: T1 after it went high, T2 after it went low. Only the last edge counts: a pulse
   shorter than T1 never reaches output 1. The delay in force when the edge comes holds for it.
-* A master may write output 1 as well. The last one wins; a write does not call off a change on its way.
-* A reset clears the outputs and calls that change off. The inputs are wires and stay.
+* A master may write output 1 as well. The last change wins; a write does not cancel a pending change.
+* A reset clears the outputs and cancels that change. The inputs are wires and keep their levels.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _BYTES = LINES // 8
 
 
 class IoImage:
-    """24 inputs and 24 outputs. Time comes in as an argument.
+    """24 inputs and 24 outputs. Time is an argument.
 
     Attributes:
         outputs: bit 0 is output 1.
@@ -36,7 +36,7 @@ class IoImage:
         return self._inputs
 
     def power_up(self, value: int) -> None:
-        """Put levels on the inputs that were there before anything happened: no edge.
+        """Set the initial levels of the inputs, without an edge.
 
         Raises:
             ValueError: `value` is out of range.
@@ -44,7 +44,7 @@ class IoImage:
         self._inputs = whole("inputs", value, 0, ALL)
 
     def set_inputs(self, value: int, now: float, t1: float, t2: float) -> None:
-        """Put levels on the inputs.
+        """Set the levels of the inputs.
 
         Args:
             value: bit 0 is input 1, 0..0xFFFFFF.
@@ -63,26 +63,26 @@ class IoImage:
         self.advance(now)
 
     def advance(self, now: float) -> None:
-        """Let output 1 do what has become due."""
+        """Apply a due change of output 1."""
         if self._change is not None and now >= self._change[0]:
             self.outputs = self.outputs & ~1 | self._change[1]
             self._change = None
 
     def write(self, value: int, mask: int = ALL) -> None:
-        """Set the outputs under the mask; the others stay."""
+        """Set the outputs under the mask; the others keep their levels."""
         self.outputs = (self.outputs & ~mask | value & mask) & ALL
 
     def clear(self) -> None:
-        """Clear the outputs, and call off a change of output 1 that is on its way."""
+        """Clear the outputs, and cancel a pending change of output 1."""
         self.outputs = 0
         self._change = None
 
     def read_bytes(self, size: int, offset: int) -> bytes:
-        """Return bytes of the inputs, byte 0 first; 0 for those that are not there (settled question 14)."""
+        """Return bytes of the inputs, byte 0 first; 0 for missing ones (settled question 14)."""
         return self._inputs.to_bytes(_BYTES, "little")[offset : offset + size].ljust(size, b"\0")
 
     def write_bytes(self, offset: int, data: bytes) -> None:
-        """Write bytes of the outputs, byte 0 first; those that are not there are ignored."""
+        """Write bytes of the outputs, byte 0 first; missing ones are ignored."""
         kept = data[: max(0, _BYTES - offset)]
         shift = 8 * offset
         self.write(int.from_bytes(kept, "little") << shift, ((1 << 8 * len(kept)) - 1) << shift)

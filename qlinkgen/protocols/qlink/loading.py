@@ -1,7 +1,7 @@
 """Loading a program into a node (section 7.6).
 
-An opening request without data says that a load begins; then the text follows in pieces, numbered from 0. A
-piece whose acknowledgement was lost is sent again under its number, and the node does not store it twice.
+An opening request without data starts the load; then the text follows in pieces, numbered from 0. If an
+acknowledgement is lost, the piece is sent again under its number, and the node does not store it twice.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ RETRY_PAUSE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class LoadProgress:
-    """How far a load is: bytes of the program's text that the node has acknowledged, of all."""
+    """Progress of a load: bytes of the program's text that the node has acknowledged, of the total."""
 
     acknowledged: int
     total: int
@@ -28,12 +28,12 @@ class LoadProgress:
 
 @dataclass(frozen=True, slots=True)
 class LoadReport:
-    """A load that has come to its end.
+    """A completed load.
 
     Attributes:
         size: bytes of text.
-        pieces: requests that carried them.
-        repeats: requests beyond the first for each piece.
+        pieces: number of pieces.
+        repeats: repeated requests.
         seconds: time from the first request to the last answer.
     """
 
@@ -44,23 +44,23 @@ class LoadReport:
 
 
 def load(node: int, text: bytes, *, piece: int = PIECE, patience: float = 5.0) -> Procedure[LoadReport]:
-    """Hand the text of a program to a node; tells LoadProgress.
+    """Send the text of a program to a node; reports LoadProgress.
 
     Args:
         node: the node, 1..16.
-        text: Intel HEX text, checked before.
+        text: checked Intel HEX text.
         piece: bytes in one request, 1..25.
-        patience: seconds for which one piece is tried.
+        patience: time limit for one piece in seconds.
 
     Raises:
-        LoadError: a piece was not acknowledged in that time. The node holds a part of the program; a new load
-            begins from the start.
-        ValueError: nothing to load, or a piece of a size that cannot be.
+        LoadError: a piece was not acknowledged in that time. The node holds part of the program; a new load
+            starts over.
+        ValueError: the text is empty, or `piece` is out of range.
     """
     if not text:
-        raise ValueError("there is nothing to load: the program's text is empty")
+        raise ValueError("the text of the program is empty")
     if not 1 <= piece <= PIECE:
-        raise ValueError(f"piece: {piece} bytes were asked for; a request carries 1..{PIECE}")
+        raise ValueError(f"piece must be 1..{PIECE} bytes, not {piece}")
     total, repeats = len(text), 0
     opening = qlink.NodeProgramLoadRequest(node=node)
     reply = yield from _insist(opening, 0, total, patience)
@@ -80,7 +80,7 @@ def load(node: int, text: bytes, *, piece: int = PIECE, patience: float = 5.0) -
 def _insist(
     request: qlink.NodeProgramLoadRequest, acknowledged: int, total: int, patience: float
 ) -> Procedure[Reply]:
-    """Ask until the piece is acknowledged, or for as long as there is patience."""
+    """Send a piece until it is acknowledged, within the time limit."""
     began: float | None = None
     attempts = 0
     while True:
@@ -92,7 +92,7 @@ def _insist(
             if began is None:
                 began = now - RETRY_PAUSE - error.elapsed
             if now - began >= patience:
-                held = "holds a part of the program" if acknowledged else "may have dropped its program"
+                held = "holds part of the program" if acknowledged else "may have discarded its program"
                 raise LoadError(
                     f"node {request.node}: {acknowledged} of {total} bytes were acknowledged, then no "
                     f"answer for {now - began:.1f} s; the node {held}, so load it again: {error}",

@@ -1,4 +1,4 @@
-"""Which response is the answer to a request, where its shape and echoes do not say it all."""
+"""Additional rules for matching responses to requests."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 """Motions, each taken by its node exactly once and in order (section 7.10).
 
-The counter of a motion tells the node a repeat from a new one. A master that has just been started does not
-know the counter of the last motion a node has taken; if it sent words under the same number, the node would
-take them for a repeat and drop them, and the outputs as well. So a motion without words goes before the first
-one to a node: whatever the node makes of it, the next number is a new one.
+The counter of a motion lets the node distinguish a repeat from a new motion. A master that has just started
+does not know the counter of the last motion of a node; if it sent words under the same number, the node would
+take them for a repeat and drop them, and the outputs as well. So a motion without words is sent before the
+first one to a node: whether or not the node takes it for a repeat, the next number is new.
 
-When no answer came, the words may be queued or not. They stay `pending`, and are sent again under the same
-number before any others, so that they are queued once whichever it was. Clearing the FIFO and resetting the
-node drop them, as the node does.
+Without an answer, the words may be queued or not. They stay `pending`, and are sent again under the same
+number before any others, so that they are queued once in both cases. Clearing the FIFO and resetting the node
+drop them, as the node does.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from qlinkgen.protocols.qlink.facts import WORDS
 
 @dataclass(slots=True)
 class MotionState:
-    """What a master knows of the motions of one node.
+    """A master's state of the motions of one node.
 
     Attributes:
         counter: number of the next motion, 0..255.
-        known: the node does not mistake that number for a repeat.
-        pending: motion that was sent and not answered.
-        streaming: a stream has the node, so nobody else may move it.
+        known: the node cannot take that number for a repeat.
+        pending: an unanswered motion.
+        streaming: a stream uses the node exclusively.
     """
 
     counter: int = 0
@@ -41,23 +41,23 @@ class MotionState:
 
     @property
     def ready(self) -> bool:
-        """A motion can be sent without looking back."""
+        """Whether a motion can be sent directly, without a pending or an empty one first."""
         return self.known and self.pending is None and not self.streaming
 
     def begin(self, request: qlink.MotionRequest) -> bool:
-        """A motion is about to be sent; returns whether it is the first time."""
+        """Start sending a motion; return whether it is new."""
         fresh = self.pending is None
         self.pending = request
         return fresh
 
     def settled(self, request: qlink.MotionRequest) -> None:
-        """The node has taken it."""
+        """Record that the node has taken the motion."""
         self.pending = None
         self.counter = (request.counter + 1) & 0xFF
         self.known = True
 
     def failed(self, error: Exception, *, fresh: bool) -> None:
-        """It was not answered: it stays pending, unless it cannot have been on the line."""
+        """Keep an unanswered motion pending, unless it was not sent."""
         unsent = isinstance(error, (TypeError, ValueError)) or (
             isinstance(error, LinkError) and not error.attempts
         )
@@ -71,33 +71,31 @@ class MotionState:
             )
 
     def drop(self) -> None:
-        """What is pending is not sent again, and neither is its number: a late answer to it means nothing."""
+        """Drop the pending motion and its number, so that a late answer to it is not accepted."""
         if self.pending is not None:
             self.counter = (self.pending.counter + 1) & 0xFF
             self.pending = None
 
     def forget(self) -> None:
-        """The node has dropped what it had, and takes the next motion whatever its number."""
+        """Record a reset: the node takes the next motion with any number."""
         self.drop()
         self.known = True
 
     def unknown(self) -> None:
-        """Another node may have this number now."""
+        """Record that another node may have this number now."""
         self.drop()
         self.known = False
 
 
 def move(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
-    """Hand a motion to a node; the counter in the request is replaced by the right one.
+    """Send a motion to a node; sets the counter of the request.
 
     Raises:
-        RuntimeError: a stream has the node.
-        LinkError: no answer came; the motion is pending.
+        RuntimeError: a stream uses the node.
+        LinkError: no answer was received; the motion is pending.
     """
     if state.streaming:
-        raise RuntimeError(
-            f"node {request.node} is being streamed to; motions in between would mix the paths"
-        )
+        raise RuntimeError(f"node {request.node} is used by a stream; motions in between would mix the paths")
     return (yield from _move(state, request))
 
 
@@ -111,7 +109,7 @@ def _move(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
 
 
 def _settle(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply]:
-    """Ask until the node has taken the request, or leave it pending."""
+    """Send a request until the node has taken it, or leave it pending."""
     fresh = state.begin(request)
     try:
         reply: Reply = yield Ask(request)
@@ -124,15 +122,15 @@ def _settle(state: MotionState, request: qlink.MotionRequest) -> Procedure[Reply
 
 @dataclass(frozen=True, slots=True)
 class MotionProgress:
-    """How far the stream to one node is.
+    """Progress of the stream to one node.
 
     Attributes:
         node: the node.
-        queued: words that the node has taken.
+        queued: number of acknowledged words.
         fifo_space: words that still fit, 0..255.
         position: motor position, encoder counts.
         running: the motor runs.
-        answer: everything the node said.
+        answer: the last response.
     """
 
     node: int
@@ -145,7 +143,7 @@ class MotionProgress:
 
 @dataclass(slots=True)
 class _Feed:
-    """Words on their way to one node."""
+    """The words for one node."""
 
     node: int
     words: Iterator[int]
@@ -164,7 +162,7 @@ class _Feed:
         return self.exhausted and not self.batch and self.polled
 
     def fill(self) -> None:
-        """Have as many words ready as fit into the node and into one motion."""
+        """Take as many words as fit into the node and into one motion."""
         missing = min(self.space, WORDS) - len(self.batch)
         if missing > 0 and not self.exhausted:
             self.batch.extend(islice(self.words, missing))
@@ -179,12 +177,12 @@ def stream(
     patience: float,
     full_pause: float,
 ) -> Procedure[dict[int, int]]:
-    """Hand words to one node or to several in turn, never more than fit; tells MotionProgress.
+    """Send words to one or several nodes in turn, without overflow; reports MotionProgress.
 
     Args:
-        states: what is known of each node.
-        words: path words for each node, 0..65535; taken from the iterables only as they are needed.
-        outputs: outputs 1-8 of each node, kept with every motion.
+        states: state of each node.
+        words: path words for each node, 0..65535; taken from the iterables as needed.
+        outputs: outputs 1-8 of each node, sent with every motion.
         patience: seconds that a node may stay silent before the stream fails.
         full_pause: seconds to wait when no FIFO has room.
 
@@ -195,7 +193,7 @@ def stream(
     """
     for node in words:
         if states[node].streaming:
-            raise RuntimeError(f"node {node} is being streamed to already")
+            raise RuntimeError(f"node {node} is already used by a stream")
     feeds = [_Feed(node, iter(each), outputs.get(node, 0), states[node]) for node, each in words.items()]
     try:
         for feed in feeds:
@@ -213,7 +211,7 @@ def stream(
 
 
 def _feed_once(feed: _Feed, patience: float) -> Procedure[bool]:
-    """One motion to one node; returns whether it has taken words or was found to have room."""
+    """Send one motion to one node; return whether it has taken words or has room."""
     if feed.in_doubt is not None and feed.in_doubt is not feed.state.pending:  # dropped by a clear
         del feed.batch[: len(feed.in_doubt.segments)]
         feed.in_doubt = None
@@ -249,7 +247,7 @@ def _progress(feed: _Feed, answer: qlink.MotionResponse) -> MotionProgress:
 
 
 def _bear(feed: _Feed, error: LinkError, patience: float) -> Procedure[None]:
-    """Let a node be silent for a while: its words are kept, and the others go on."""
+    """Tolerate a silent node within the time limit: its words are kept, and the others continue."""
     now: float = yield Pause(0)
     if feed.silent_since is None:
         feed.silent_since = now - error.elapsed

@@ -1,4 +1,4 @@
-"""State of a virtual node, and its way through time."""
+"""State of a virtual node, and its behaviour over time."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from qlinkgen.protocols.qlink.path_fifo import PathFifo, signed_word
 from qlinkgen.protocols.qlink.program_store import ProgramStore
 from qlinkgen.protocols.qlink.statistics import NodeStatistics, PathRecord
 
-#: Seconds that a time may lie before the one told last: threads and drivers look at the clock in any order.
+#: Seconds by which a time may precede the last one: threads and drivers read the clock in any order.
 _DISORDER = 1.0
 _KNOWN_TYPES = (PositionType.JVL_MACTALK, PositionType.METRONIX)
 
 
 class NodeState:
-    """What a virtual node is, without its commands.
+    """The state of a virtual node, without its commands.
 
-    Times are seconds of any clock, the same one for all calls of a node. An earlier time than the one before
-    counts as that one, up to a second. A node has no lock: one thread at a time.
+    Times are seconds of any clock, the same one for all calls of a node. An earlier time than the last counts
+    as the last, up to a second. A node has no lock: use it from one thread at a time.
 
     Attributes:
-        number: node number that it answers to, 1..16; node_setup changes it.
+        number: node number, 1..16; node_setup changes it.
         t1_delay: seconds from input 1 going high to output 1 going high.
         t2_delay: seconds from input 1 going low to output 1 going low.
-        position_type: how it asks its motor for the position.
+        position_type: how it reads the position of its motor.
         version: major and minor number of the firmware.
         product_id: product, 0..65535.
         serial_number: 0..4294967295.
         unsupported: commands that it does not answer.
         io: inputs and outputs.
         path: FIFO and motor.
-        motor: requests passed through to the motor.
+        motor: requests passed to the motor.
         store: program loader.
-        statistics: what it has counted.
-        record: every path word queued and when it came, None unless asked for.
-        now: latest time that it was told, None before the first.
+        statistics: counts.
+        record: every queued path word with its time, None unless requested.
+        now: latest time passed in, None before the first.
     """
 
     def __init__(
@@ -65,13 +65,13 @@ class NodeState:
         unsupported: Iterable[str] = (),
         record: bool = False,
     ) -> None:
-        """Make a node as it is after power-up.
+        """Make a node as after power-up.
 
         Args:
             number: node number, 1..16.
             capacity: path words that its FIFO holds, 0..255.
-            rate: path words a second that its motor consumes; 0 for one that never moves.
-            displacement: gives how far a path word moves the motor, in encoder counts.
+            rate: path words per second that its motor consumes; 0 for one that never moves.
+            displacement: returns the displacement of a path word, in encoder counts.
             started: whether it consumes path words without a node_start, after a reset too.
             t1_delay: as in node_setup, 0..25.5 s.
             t2_delay: as in node_setup, 0..25.5 s.
@@ -79,14 +79,14 @@ class NodeState:
             version: major and minor number of the firmware, 0..255 each.
             product_id: product, 0..65535.
             serial_number: 0..4294967295.
-            motor: gives what the motor answers to a motor_request, 0..25 bytes.
+            motor: returns the motor's answer to a motor_request, 0..25 bytes.
             motor_seconds: time until a motor_request is completed.
-            check_program: whether it stops acknowledging a program load that is no Intel HEX.
+            check_program: whether it stops acknowledging a program load that is not Intel HEX.
             unsupported: names of commands that it does not answer.
             record: whether to keep every path word.
 
         Raises:
-            ValueError: one of them is out of range, or names no command.
+            ValueError: an argument is out of range, or a command is unknown.
         """
         self.number = whole("number", number, NODES[0], NODES[-1])
         self.t1_delay = positive("t1_delay", t1_delay, "s", 25.5)
@@ -109,8 +109,8 @@ class NodeState:
     def inputs(self) -> int:
         """The 24 inputs, bit 0 is input 1.
 
-        Setting them happens at the latest time that the node was told. Before the first, it sets the levels
-        at power-up, and input 1 has not gone high.
+        Setting them takes effect at the latest time passed in. Before the first, it sets the levels at
+        power-up, without an edge of input 1.
         """
         return self.io.inputs
 
@@ -122,20 +122,20 @@ class NodeState:
             self.set_inputs(value, self.now)
 
     def set_inputs(self, value: int, now: float) -> None:
-        """Put levels on the inputs.
+        """Set the levels of the inputs.
 
         Args:
             value: bit 0 is input 1, 0..0xFFFFFF.
-            now: when, in seconds.
+            now: time in seconds.
 
         Raises:
-            ValueError: `value` is out of range, or `now` far behind the time that was told last.
+            ValueError: `value` is out of range, or `now` precedes the last time by more than a second.
         """
         self.io.set_inputs(value, self.advance(now), self.t1_delay, self.t2_delay)
 
     @property
     def outputs(self) -> int:
-        """The 24 outputs, bit 0 is output 1, as they are at the latest time that the node was told."""
+        """The 24 outputs at the latest time passed in; bit 0 is output 1."""
         return self.io.outputs
 
     @outputs.setter
@@ -144,7 +144,7 @@ class NodeState:
 
     @property
     def position(self) -> int:
-        """Where the motor is, whether or not the node tells it."""
+        """Position of the motor, whether or not the node reports it."""
         return self.path.position
 
     @property
@@ -159,31 +159,30 @@ class NodeState:
 
     @property
     def program(self) -> HexImage | None:
-        """The loaded program, from its end record on."""
+        """The loaded program, once its end record was received."""
         return self.store.image
 
     def advance(self, now: float) -> float:
-        """Let happen what happens until `now`. Returns the time that counts.
+        """Advance the node to `now`. Return the effective time.
 
         Raises:
-            ValueError: `now` is no time, or more than a second before the one told last.
+            ValueError: `now` is not finite, or more than a second before the last time.
         """
         if self.now is not None and now <= self.now:
             if self.now - now > _DISORDER:
                 raise ValueError(
-                    f"now={now!r} after {self.now!r}: time goes forward; "
-                    "take all times of a node from one clock"
+                    f"now={now!r} is before {self.now!r}; take all times of a node from one monotonic clock"
                 )
             return self.now
         if not isfinite(now):
-            raise ValueError(f"now={now!r}: give seconds, a finite number")
+            raise ValueError(f"now={now!r} must be a finite number of seconds")
         self.now = now
         self.io.advance(now)
         self.path.advance(now)
         return now
 
     def reset(self) -> None:
-        """Be as after power-up, but for what a reset keeps."""
+        """Return to the state after power-up, except for the state that a reset keeps."""
         self.path.clear()
         self.path.started = self._started
         self.io.clear()

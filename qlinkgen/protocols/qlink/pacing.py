@@ -1,4 +1,4 @@
-"""What goes on in time: syncs at an interval, and motor requests that take a while."""
+"""Procedures with timing: syncs at an interval, and polling of motor requests."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class SyncTick:
 
     Attributes:
         counter: its number, 0..255.
-        at: when, on the port's clock, seconds.
-        late: seconds after the time at which it was due.
+        at: time on the port's clock, in seconds.
+        late: seconds after its due time.
     """
 
     counter: int
@@ -36,14 +36,14 @@ class SyncTick:
 
 @dataclass(frozen=True, slots=True)
 class SyncReport:
-    """How steady the syncs were.
+    """Timing of the syncs.
 
     Attributes:
         sent: number of syncs.
-        interval: seconds that were asked for between two of them.
-        mean: seconds that were between two of them.
-        jitter: most seconds that one interval differed from what was asked for.
-        missed: intervals that passed without a sync, since the bus or the computer was busy.
+        interval: requested interval in seconds.
+        mean: mean interval in seconds.
+        jitter: largest deviation of an interval from the requested one, in seconds.
+        missed: intervals without a sync, since the bus or the computer was busy.
     """
 
     sent: int
@@ -56,12 +56,12 @@ class SyncReport:
 def sync(
     state: SyncState, interval: float, *, count: int | None, stop: Callable[[], bool]
 ) -> Procedure[SyncReport]:
-    """Send node_sync at an interval, until `count` are sent or `stop()` is true; tells SyncTick.
+    """Send node_sync at an interval, until `count` are sent or `stop()` is true; reports SyncTick.
 
-    The times are counted from the first one, so that an error of one does not move the others.
+    Due times are relative to the first sync, so that errors do not accumulate.
     """
     if interval <= 0:
-        raise ValueError(f"interval: {interval} s was given; it has to be more than 0")
+        raise ValueError(f"interval must be more than 0 s, not {interval}")
     first: float | None = None
     last, sent, slot, jitter, missed = 0.0, 0, 0, 0.0, 0
     while (count is None or sent < count) and not stop():
@@ -88,14 +88,14 @@ def sync(
 def complete(
     request: qlink.MotorRequestRequest, *, poll_interval: float, timeout: float
 ) -> Procedure[qlink.MotorResponsePollResponse]:
-    """Send a motor request, and ask for its result until it is there (sections 7.8, 7.9).
+    """Send a motor request, and poll for its result (sections 7.8, 7.9).
 
     Raises:
         NoReply: the motor has not completed it within `timeout` seconds, or the node does not answer. A
-            request whose answer was lost is not repeated: it may be under way.
+            request whose answer was lost is not repeated, since it may be executing.
     """
     if poll_interval < 0 or timeout < 0:
-        raise ValueError(f"poll_interval {poll_interval} s, timeout {timeout} s: a time is not negative")
+        raise ValueError(f"poll_interval {poll_interval} and timeout {timeout} must be 0 s or more")
     sent: Reply = yield Ask(request)
     poll = qlink.MotorResponsePollRequest(node=request.node)
     while True:

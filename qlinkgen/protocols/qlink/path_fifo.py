@@ -1,7 +1,7 @@
 """The FIFO of path words of a virtual node, and the motor that consumes them (sections 7.10 to 7.13).
 
-A motor takes one word every 1/rate seconds and moves by it. Nothing happens by itself: `advance(now)` works
-out which words are done by then, so that a minute of path costs no more than the words in it.
+A motor consumes one word every 1/rate seconds and moves by it. `advance(now)` computes the words consumed by
+then, so the cost depends only on the number of words.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 
 from qlinkgen.protocols.qlink.arguments import positive, whole
 
-#: A word within a millionth of its end is done, so that times like 0.1 that binary cannot hold lose none.
+#: Tolerance for the end of a word, relative to its duration, for times like 0.1 that are not exact in binary.
 _NEARLY = 1e-6
 
 
@@ -21,22 +21,22 @@ def signed_word(word: int) -> int:
 
 
 def wrapped(position: int) -> int:
-    """Return a position as the 32 bits of the wire show it, in two's complement."""
+    """Return a position as a 32-bit two's complement number, as on the wire."""
     return (position + 0x8000_0000) % 0x1_0000_0000 - 0x8000_0000
 
 
 class PathFifo:
-    """Path words that wait, and the position that the finished ones led to.
+    """Queued path words, and the position after the consumed ones.
 
     Always `queued == drained + dropped + waiting`.
 
     Attributes:
         capacity: words that fit, 0..255.
-        position: where the motor is, a 32-bit number.
-        started: the motor consumes words; a stopped one holds them.
-        queued: words ever taken in.
-        drained: words ever done.
-        dropped: words that `clear` threw away.
+        position: position of the motor, a 32-bit number.
+        started: the motor consumes words; if stopped, it holds them.
+        queued: number of words ever queued.
+        drained: number of words ever consumed.
+        dropped: number of words discarded by `clear`.
     """
 
     def __init__(
@@ -50,33 +50,33 @@ class PathFifo:
         """Make an empty FIFO.
 
         Args:
-            capacity: words that fit, 0..255 (a byte tells the free ones).
-            rate: words a second that the motor takes, 0 for one that never moves.
-            displacement: gives how far a word moves, in encoder counts.
+            capacity: words that fit, 0..255 (the free ones are reported in a byte).
+            rate: words per second that the motor consumes, 0 for one that never moves.
+            displacement: returns the displacement of a word, in encoder counts.
             started: whether the motor consumes words from the beginning.
 
         Raises:
-            ValueError: capacity or rate are out of range.
+            ValueError: capacity or rate is out of range.
         """
         self.capacity = whole("capacity", capacity, 0, 255)
         self.started = started
         self.position = 0
         self.queued = self.drained = self.dropped = 0
-        self._rate = positive("rate", rate, "words a second")
+        self._rate = positive("rate", rate, "words per second")
         self._displacement = displacement
         self._words: deque[int] = deque()
-        # Since when words are consumed without a break, and how many were: no error of rounding adds up.
+        # Start of uninterrupted consumption, and words since: rounding errors do not accumulate.
         self._since: float | None = None
         self._done = 0
 
     @property
     def waiting(self) -> int:
-        """Words in the FIFO; the one that the motor is at counts until it is done."""
+        """Number of words in the FIFO, including the current word of the motor."""
         return len(self._words)
 
     @property
     def space(self) -> int:
-        """Words that still fit."""
+        """Number of words that still fit."""
         return self.capacity - len(self._words)
 
     @property
@@ -86,11 +86,11 @@ class PathFifo:
 
     @property
     def rate(self) -> float:
-        """Words a second that the motor takes."""
+        """Words per second that the motor consumes."""
         return self._rate
 
     def push(self, words: Iterable[int], now: float) -> bool:
-        """Queue words, all or none. Returns whether they fitted."""
+        """Queue words, all or none. Return whether they fitted."""
         self.advance(now)
         fresh = tuple(words)
         if len(fresh) > self.space:
@@ -102,7 +102,7 @@ class PathFifo:
         return True
 
     def advance(self, now: float) -> None:
-        """Move along the words that are done by now."""
+        """Consume the words that are due by `now`."""
         if self._since is None:
             return
         reached = min((now - self._since) * self._rate + _NEARLY, self._done + len(self._words))
@@ -114,28 +114,28 @@ class PathFifo:
             self._since = None
 
     def start(self, now: float) -> None:
-        """Let the motor consume; a start of a started one changes nothing."""
+        """Start consumption; no effect if already started."""
         if not self.started:
             self.started = True
             self._begin(now)
 
     def stop(self) -> None:
-        """Hold the words. The one that the motor is at begins again at the next start."""
+        """Hold the words. The current word starts over at the next start."""
         self.started = False
         self._since = None
 
     def set_rate(self, rate: float, now: float) -> None:
-        """Change how many words a second the motor takes; the one that it is at begins again.
+        """Change the rate of the motor; the current word starts over.
 
         Raises:
-            ValueError: it is not a finite number from 0 up.
+            ValueError: the rate is negative or not finite.
         """
         self.advance(now)
-        self._rate = positive("rate", rate, "words a second")
+        self._rate = positive("rate", rate, "words per second")
         self._begin(now)
 
     def clear(self) -> None:
-        """Throw away what waits; the position stays where the motor is."""
+        """Discard the queued words; the position does not change."""
         self.dropped += len(self._words)
         self._words.clear()
         self._since = None

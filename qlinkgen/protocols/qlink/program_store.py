@@ -1,16 +1,16 @@
 """The program loader of a virtual node (section 7.6).
 
-What the document leaves open, and what this node does:
+Assumptions where the document is silent:
 
-* A request with counter 0 and no program data opens, at any time: a load that was under way is begun again.
-  So does a request with no data at all (settled question 6); the codec makes no difference between the two.
-* A counter that is neither the next nor that of the last piece is not acknowledged, and neither is a piece
-  before an opening: an acknowledged piece is a stored piece.
-* A piece with the counter of the last is a repeat: acknowledged, and not looked at.
-* Text that is no Intel HEX is not acknowledged, nor is anything new after it until the next opening: the
-  protocol has no way to refuse, and a master must not believe in a program that the node does not have.
-  `fault` says what was wrong. A store made with `check=False` acknowledges all the same and keeps the text.
-* The program is there as soon as its end record is; the opening of another load forgets it.
+* A request with counter 0 and no program data opens a load at any time, and restarts a running one.
+  So does an empty request (settled question 6); the codec does not distinguish them.
+* A counter other than the next or that of the last piece is not acknowledged, nor is a piece before an
+  opening: an acknowledged piece is a stored piece.
+* A piece with the counter of the last is a repeat: acknowledged without checking its data.
+* Text that is not Intel HEX is not acknowledged, nor are new pieces after it until the next opening: the
+  protocol has no refusal, and a master must not assume a program that the node does not have. `fault` has the
+  reason. A store made with `check=False` acknowledges it and keeps the text.
+* The program is available once its end record was received; the opening of another load discards it.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ class ProgramStore:
     """Takes a program in pieces and rebuilds its image.
 
     Attributes:
-        loading: a load has been opened and its end record has not come.
-        image: the program, None while there is none.
-        fault: why the load was given up, empty while all is well.
+        loading: a load is open and its end record was not received.
+        image: the program, None without one.
+        fault: why the load failed, empty if it did not.
         text: the pieces stored since the opening, joined.
     """
 
     def __init__(self, statistics: NodeStatistics, *, check: bool = True) -> None:
-        """Begin empty; what happens is counted in `statistics`."""
+        """Make an empty store that counts in `statistics`."""
         self.loading = False
         self.image: HexImage | None = None
         self.fault = ""
@@ -41,7 +41,7 @@ class ProgramStore:
         self._last: int | None = None  # counter of the piece stored last
 
     def take(self, counter: int, data: bytes) -> bool:
-        """Take a request. Returns whether to acknowledge it."""
+        """Process a request. Return whether to acknowledge it."""
         if counter == 0 and not data:
             self._open()
             return True
@@ -66,7 +66,7 @@ class ProgramStore:
         self._last = None
 
     def _read(self, data: bytes) -> bool:
-        """Read text on, unless it is known as broken. Returns whether the piece is to be kept."""
+        """Read text, unless it is known to be broken. Return whether to keep the piece."""
         if self._reader is None or self.fault:
             return not self._check
         try:
@@ -83,7 +83,7 @@ class ProgramStore:
         self.text += data
         self._last = counter
         if self._reader is not None and self._reader.segments is not None and not self.fault:
-            # Line ends behind the end record may come in one more piece: the image is made with each.
+            # Line ends after the end record may arrive in one more piece: the image is made with each.
             self.image = HexImage(bytes(self.text), self._reader.segments, self._reader.entry)
             self.loading = False
 

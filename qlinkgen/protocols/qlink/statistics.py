@@ -1,4 +1,4 @@
-"""What a virtual node has counted."""
+"""Counts and records of a virtual node."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class NodeStatistics:
-    """Counts since the node was made; a reset of the node leaves them.
+    """Counts since the node was made; a reset of the node keeps them.
 
     Attributes:
-        requests: requests for this node, those that it does not support included.
-        unsupported: requests of a command that is switched off.
+        requests: requests for this node, including unsupported ones.
+        unsupported: requests of a disabled command.
         motions: motions taken (section 7.10).
         words: path words queued by them.
-        duplicates: motions with the counter of the one taken last, answered but not taken again.
-        jumps: motions taken whose counter was not one up from the last.
+        duplicates: motions with the counter of the last one taken, answered but not taken again.
+        jumps: motions taken whose counter was not one more than the last.
         overruns: motions with more words than fitted, not taken and not answered.
-        syncs: sync packets that came (section 7.5).
-        missed_syncs: sync packets missing from the run of their counters.
-        repeated_syncs: sync packets with the counter of the one before.
+        syncs: sync packets received (section 7.5).
+        missed_syncs: sync packets missing in the sequence of counters.
+        repeated_syncs: sync packets with the counter of the previous one.
         refused_presets: presets while the motor ran, not taken and not answered (section 7.13).
         motor_requests: motor requests taken (section 7.9).
-        replaced_motor_requests: motor requests that a newer one replaced before they were completed.
+        replaced_motor_requests: motor requests replaced by a newer one before completion.
         program_loads: openings of a program load (section 7.6).
         program_pieces: pieces of a program stored.
         repeated_pieces: pieces acknowledged but not stored twice.
-        refused_pieces: pieces not acknowledged: never opened, wrong counter, or a broken program.
+        refused_pieces: pieces not acknowledged: before an opening, wrong counter, or a broken program.
         resets: resets by command (section 7.7).
     """
 
@@ -53,11 +53,11 @@ class NodeStatistics:
 
 @dataclass(slots=True)
 class PathRecord:
-    """Every path word that a node has queued, in its order; ten bytes of memory a word.
+    """Every path word that a node has queued, in order; ten bytes of memory per word.
 
     Attributes:
-        words: the words as they were on the wire, 0..65535.
-        times: when the motion of each came, in seconds of the node's time.
+        words: the words as on the wire, 0..65535.
+        times: time of the motion of each, in seconds of the node's clock.
     """
 
     words: array[int] = field(default_factory=lambda: array("H"))

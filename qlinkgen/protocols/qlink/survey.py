@@ -1,4 +1,4 @@
-"""Finding out who is on a bus, and how they are."""
+"""Procedures that find the nodes of a bus, and read their status."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qlinkgen.link.procedure import Ask, Procedure, Tell
 from qlinkgen.link.transaction import Reply
 from qlinkgen.protocols.qlink.facts import NODES
 
-#: What a node has to send back that does not answer node_info.
+#: Data of the loop_back to nodes that do not answer node_info.
 _SIGN = b"\x5a\xc3"
 
 
@@ -21,8 +21,8 @@ class Found:
 
     Attributes:
         node: its number, 1..16.
-        info: who it is, None where it does not support that question.
-        seconds: time from the question to the answer.
+        info: its answer to node_info, None if it does not support that.
+        seconds: time from request to answer.
     """
 
     node: int
@@ -32,14 +32,14 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class NodeStatus:
-    """What one node says of itself; None for what it does not answer.
+    """Status of one node; None for unanswered requests.
 
     Attributes:
         node: its number, 1..16.
-        online: it answered something.
+        online: it answered a request.
         position: motor position, encoder counts.
         inputs: its inputs, bit 0 is input 1.
-        last_completion: command of the last completed motor request, 0 while it is not completed.
+        last_completion: command of the last completed motor request, 0 before completion.
     """
 
     node: int
@@ -50,10 +50,10 @@ class NodeStatus:
 
 
 def scan(nodes: Iterable[int] = NODES) -> Procedure[list[Found]]:
-    """Ask each node who it is; tells each Found as soon as it is found.
+    """Ask each node for its identity; reports each Found immediately.
 
-    A bus is mostly not full, so nobody is asked three times at once: those who are silent are asked again
-    after all others, and at last for an echo, since not every node supports node_info.
+    Most buses are not full, so each node is asked only once at first: silent nodes are asked again after all
+    others, and finally with loop_back, since not every node supports node_info.
     """
     silent = list(nodes)
     found: list[Found] = []
@@ -90,9 +90,9 @@ def _ask_once(request: qlink.Message) -> Procedure[Reply | None]:
 
 
 def status(nodes: Iterable[int] = NODES) -> Procedure[list[NodeStatus]]:
-    """Ask each node for its position, inputs and last completion; tells each NodeStatus.
+    """Ask each node for its position, inputs and last completion; reports each NodeStatus.
 
-    A node that answers the first question with silence is not asked the others.
+    A node that does not answer the first request gets no further ones.
     """
     every: list[NodeStatus] = []
     for node in nodes:

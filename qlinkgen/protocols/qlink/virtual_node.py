@@ -1,23 +1,23 @@
-"""A whole Q.link node without hardware: every command of the document, and behaviour in time without a clock.
+"""A simulated Q.link node: every command of the document, with time as an argument.
 
-What the document leaves open, and what this node does (the modules of its parts tell the rest):
+Assumptions where the document is silent (those on its parts are in their modules):
 
 * Power-up and reset leave a node stopped: it fills its FIFO and holds it until node_start, so that a
-  broadcast starts all nodes at the same time. `started=True` makes one that moves at once.
-* The motor runs (status bit 0) while it is started and path words wait. A preset that comes then is not
-  answered and changes nothing; a started motor without words takes it.
-* Without a position type, or with a number that the document does not name, a node knows no position: it
-  sends 0 and leaves the valid bit clear. The motor moves all the same, and a preset is taken.
-* A motion with more words than fit is not taken, in no part, and not answered: an answer would tell the
-  master that its path is queued. Its repeat is taken once there is room. Any counter but that of the motion
-  taken last is new.
-* motor_response_poll tells 0x16, the command number of motor_request; 0 also before the first request.
-* read reads inputs and write writes outputs. motion writes outputs 1 to 8 and leaves the others.
-* The first sync is the base from which missed ones are counted; one with the same counter again is a repeat.
-* A reset empties the FIFO, clears the outputs, and forgets the counters and the motor's request. Number,
-  settings, program and the position of the motor stay.
+  broadcast starts all nodes at the same time. `started=True` makes a node that moves at once.
+* The motor runs (status bit 0) while it is started and has path words. A preset during that is not answered
+  and changes nothing; a started motor without words accepts it.
+* Without a position type, or with an unknown number, a node has no position: it sends 0 and leaves the valid
+  bit clear. The motor moves all the same, and a preset is accepted.
+* A motion with more words than fit is not taken, not even in part, and not answered: an answer would tell the
+  master that its path is queued. Its repeat is taken once there is room. Any counter except that of the last
+  motion taken is new.
+* motor_response_poll reports 0x16, the command number of motor_request; 0 before the first completion.
+* read reads inputs and write writes outputs. motion writes outputs 1 to 8 and keeps the others.
+* Missed syncs are counted from the first sync; one with the same counter again is a repeat.
+* A reset empties the FIFO, clears the outputs, and discards the counters and the motor's request. Number,
+  settings, program and the position of the motor are kept.
 """
-# ruff: noqa: ARG002 -- all handlers take a request and a time, whether they look at them or not
+# ruff: noqa: ARG002 -- all handlers have the same arguments
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from qlinkgen.protocols.qlink.path_fifo import wrapped
 
 
 class VirtualNode(NodeState, SlaveHandlers):
-    """One node. A subclass replaces the methods of the commands that it does otherwise.
+    """One node. Subclasses override the methods of commands.
 
     Arguments and attributes are those of `NodeState`.
     """
@@ -37,14 +37,14 @@ class VirtualNode(NodeState, SlaveHandlers):
     _sync_counter: int | None = None
 
     def handle(self, request: qlink.Message, now: float) -> qlink.Message | None:
-        """Do what a request says.
+        """Execute a request.
 
         Args:
-            request: what came, for any node.
-            now: when, in seconds.
+            request: a received request, for any node.
+            now: time in seconds.
 
         Returns:
-            The response; None where the command has none, is not supported, or is for another node.
+            The response; None if the command has none, is not supported, or is for another node.
         """
         command, _, direction = request.NAME.partition(".")
         if direction != "request" or request.node not in {self.number, qlink.BUS.broadcast}:
@@ -59,14 +59,14 @@ class VirtualNode(NodeState, SlaveHandlers):
     # Node (7.1 to 7.7) --------------------------------------------------------------------------------------
 
     def node_setup(self, request: qlink.NodeSetupRequest, now: float) -> qlink.NodeSetupResponse | None:
-        """Take number and settings; the answer carries the new number (section 7.1, settled question 13)."""
+        """Set number and settings; the answer has the new number (section 7.1, settled question 13)."""
         self.number = request.node_number
         self.t1_delay, self.t2_delay = request.t1_delay, request.t2_delay
         self.position_type = request.position_type
         return qlink.NodeSetupResponse(node=self.number)
 
     def node_info(self, request: qlink.NodeInfoRequest, now: float) -> qlink.NodeInfoResponse | None:
-        """Tell firmware, product and settings (section 7.2)."""
+        """Return firmware, product and settings (section 7.2)."""
         major, minor = self.version
         return qlink.NodeInfoResponse(
             node=self.number,
@@ -80,7 +80,7 @@ class VirtualNode(NodeState, SlaveHandlers):
         )
 
     def node_start(self, request: qlink.NodeStartRequest, now: float) -> None:
-        """Consume path words from now on (section 7.3)."""
+        """Start consuming path words (section 7.3)."""
         self.path.start(self.advance(now))
 
     def node_stop(self, request: qlink.NodeStopRequest, now: float) -> None:
@@ -89,7 +89,7 @@ class VirtualNode(NodeState, SlaveHandlers):
         self.path.stop()
 
     def node_sync(self, request: qlink.NodeSyncRequest, now: float) -> None:
-        """Count it, and those that are missing before it (section 7.5)."""
+        """Count the sync, and missing ones before it (section 7.5)."""
         counts = self.statistics
         counts.syncs += 1
         if self._sync_counter == request.counter:
@@ -107,7 +107,7 @@ class VirtualNode(NodeState, SlaveHandlers):
         return qlink.NodeProgramLoadResponse(node=self.number, counter=request.counter)
 
     def node_reset(self, request: qlink.NodeResetRequest, now: float) -> qlink.NodeResetResponse | None:
-        """Answer, and be as after power-up but for what a reset keeps (section 7.7)."""
+        """Answer, and reset the node (section 7.7)."""
         self.advance(now)
         self.statistics.resets += 1
         self.reset()
@@ -119,14 +119,14 @@ class VirtualNode(NodeState, SlaveHandlers):
     def motor_response_poll(
         self, request: qlink.MotorResponsePollRequest, now: float
     ) -> qlink.MotorResponsePollResponse | None:
-        """Tell whether the motor's request is completed, and its answer (section 7.8)."""
+        """Return whether the motor's request is completed, and its answer (section 7.8)."""
         completed, data = self.motor.poll(self.advance(now))
         return qlink.MotorResponsePollResponse(node=self.number, last_completion=completed, motor_data=data)
 
     def motor_request(
         self, request: qlink.MotorRequestRequest, now: float
     ) -> qlink.MotorRequestResponse | None:
-        """Pass a request on to the motor (section 7.9)."""
+        """Pass a request to the motor (section 7.9)."""
         self.statistics.motor_requests += 1
         if self.motor.take(request.ID, bytes(request.motor_data), self.advance(now)):
             self.statistics.replaced_motor_requests += 1
@@ -151,12 +151,12 @@ class VirtualNode(NodeState, SlaveHandlers):
     def motor_position(
         self, request: qlink.MotorPositionRequest, now: float
     ) -> qlink.MotorPositionResponse | None:
-        """Tell the motor's position (section 7.11)."""
+        """Return the motor's position (section 7.11)."""
         self.advance(now)
         return qlink.MotorPositionResponse(node=self.number, position=self._told_position())
 
     def clear_fifo(self, request: qlink.ClearFifoRequest, now: float) -> qlink.ClearFifoResponse | None:
-        """Throw away the path words that wait; the next motion is new (section 7.12)."""
+        """Discard the queued path words; the next motion is new (section 7.12)."""
         self.advance(now)
         self.path.clear()
         self._motion_counter = None
@@ -207,13 +207,13 @@ class VirtualNode(NodeState, SlaveHandlers):
         return qlink.ClearOutputsResponse(node=self.number)
 
     def loop_back(self, request: qlink.LoopBackRequest, now: float) -> qlink.LoopBackResponse | None:
-        """Return what came (section 7.19)."""
+        """Return the received data (section 7.19)."""
         return qlink.LoopBackResponse(node=self.number, offset=request.offset, data=request.data)
 
     # What a motion does -------------------------------------------------------------------------------------
 
     def _take_motion(self, request: qlink.MotionRequest, now: float) -> bool:
-        """Take a motion that is new, all of it or nothing. Returns whether it was taken."""
+        """Take a new motion, completely or not at all. Return whether it was taken."""
         counts = self.statistics
         if not self.path.push(request.segments, now):
             counts.overruns += 1

@@ -1,7 +1,7 @@
 """The Trio fibre-optic network: nodes of the ring, for blocking programs and for asyncio.
 
-`MotionCoordinator` has the network's words of Trio BASIC as methods, `MembraneKeypad` keys and a display.
-Each joins the ring at one port, and sends on what is for others. Messages and their errors are in
+`MotionCoordinator` has the network commands of Trio BASIC as methods, `MembraneKeypad` keys and a display.
+Each joins the ring at one port, and forwards messages for others. Messages and their errors are in
 `qlinkgen.codecs.trio`.
 """
 

@@ -1,4 +1,4 @@
-"""The same nodes for asyncio: what waits is awaited, the rest is as in `nodes`."""
+"""Nodes of the ring for asyncio: waiting methods are coroutines, otherwise as in `nodes`."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from qlinkgen.transport.ring_aio import AsyncRingDriver, drive_async
 
 
 class AsyncClient(Client[N]):
-    """What the clients for asyncio share; they are made, and used, inside a running event loop."""
+    """Base class of asyncio clients; create and use them in a running event loop."""
 
     driver: AsyncRingDriver
 
     def __init__(self, node: N, driver: AsyncRingDriver, *, tx_timeout: float = TX_TIMEOUT) -> None:
-        """Use a node that a driver keeps at work."""
+        """Use a node run by a driver."""
         super().__init__(node, tx_timeout=tx_timeout)
         self.driver = driver
 
@@ -35,20 +35,20 @@ class AsyncClient(Client[N]):
             raise self._no_room()
 
     async def wait_until(self, condition: Callable[[], object], timeout: float | None = None) -> None:
-        """Wait until something is so; see `BlockingClient.wait_until`."""
+        """Wait for a condition; see `BlockingClient.wait_until`."""
         if await self.driver.until(lambda _now: bool(condition()) or None, timeout) is None:
-            raise NothingCame(f"what was waited for did not come about in {timeout} s", elapsed=timeout or 0)
+            raise NothingCame(f"condition not met within {timeout} s", elapsed=timeout or 0)
 
     async def flush(self, timeout: float | None = None) -> None:
-        """Wait until everything in the transmit buffer was handed to the port."""
+        """Wait until the transmit buffer is empty."""
         await self.wait_until(lambda: self.engine.idle, timeout)
 
     async def sleep(self, seconds: float) -> None:
-        """Let time pass on the node's clock; the node goes on sending and receiving."""
+        """Sleep on the node's clock; the node continues sending and receiving."""
         await self.driver.pause(seconds)
 
     async def close(self) -> None:
-        """Send what is still in the transmit buffer, leave the ring, and close the port."""
+        """Send the transmit buffer, leave the ring, and close the port."""
         await self.driver.close()
 
     async def __aenter__(self) -> Self:
@@ -61,7 +61,7 @@ class AsyncClient(Client[N]):
 
 
 class AsyncMotionCoordinator(CoordinatorClient, AsyncClient[CoordinatorNode]):
-    """A Motion Coordinator for asyncio. The event loop keeps the node at work; see `MotionCoordinator`."""
+    """A Motion Coordinator for asyncio. The event loop runs the node; see `MotionCoordinator`."""
 
     def __init__(
         self,
@@ -78,7 +78,7 @@ class AsyncMotionCoordinator(CoordinatorClient, AsyncClient[CoordinatorNode]):
 
     @classmethod
     def driven(cls, node: CoordinatorNode, driver: AsyncRingDriver) -> Self:
-        """Use a node that something else keeps at work, such as a simulated ring."""
+        """Wrap a node driven elsewhere, e.g. by a simulated ring."""
         client = cls.__new__(cls)
         AsyncClient.__init__(client, node, driver)
         return client
@@ -96,7 +96,7 @@ class AsyncMotionCoordinator(CoordinatorClient, AsyncClient[CoordinatorNode]):
         return value
 
     async def key(self, channel: int) -> bool:
-        """KEY #channel; see `MotionCoordinator.key`. Without a character other tasks get their turn."""
+        """KEY #channel; see `MotionCoordinator.key`. Without a character it yields to other tasks."""
         check_channel(channel)
         if not self.node.received:
             await self.driver.give_way()
@@ -107,12 +107,12 @@ class AsyncMotionCoordinator(CoordinatorClient, AsyncClient[CoordinatorNode]):
         await self.transmit(send_message(n, type_, data1, data2))
 
     async def keypad_mode(self, n: int, mode: trio.KeypadModeEnum | int) -> None:
-        """Choose what a keypad sends for its keys; BASIC has no word for this message."""
+        """Set the mode of a keypad; BASIC has no command for this message."""
         await self.transmit(mode_message(n, mode))
 
 
 class AsyncMembraneKeypad(AsyncClient[KeypadNode]):
-    """A membrane keypad for asyncio; see `MembraneKeypad`. Pressing a key waits for nothing."""
+    """A membrane keypad for asyncio; see `MembraneKeypad`. Pressing a key does not wait."""
 
     def __init__(
         self, port: Port, *, on_event: OnEvent | None = None, **options: Unpack[KeypadOptions]
@@ -124,28 +124,28 @@ class AsyncMembraneKeypad(AsyncClient[KeypadNode]):
 
     @classmethod
     def driven(cls, node: KeypadNode, driver: AsyncRingDriver) -> Self:
-        """Use a node that something else keeps at work, such as a simulated ring."""
+        """Wrap a node driven elsewhere, e.g. by a simulated ring."""
         client = cls.__new__(cls)
         AsyncClient.__init__(client, node, driver)
         return client
 
     def press(self, *keys: int | str) -> None:
-        """Press keys, one after the other, and let each one go before the next."""
+        """Press and release keys, one after the other."""
         for key in keys:
             self.key_down(key)
             self.key_up(key)
 
     def key_down(self, key: int | str) -> bool:
-        """Press a key and hold it; return whether its character went to the ring."""
+        """Press a key and hold it; return whether its character was sent."""
         return self.driver.act(lambda now: self.node.press(key, now))
 
     def key_up(self, key: int | str) -> bool:
-        """Let a key go; return whether a character went to the ring, which it does in mode on_off."""
+        """Release a key; return whether a character was sent, as in mode on_off."""
         return self.driver.act(lambda now: self.node.release(key, now))
 
     @property
     def lines(self) -> list[str]:
-        """What the display shows, row by row."""
+        """Rows of the display."""
         return self.node.display.lines
 
     def __str__(self) -> str:

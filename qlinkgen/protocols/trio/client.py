@@ -1,6 +1,6 @@
-"""What the clients of all nodes share: the common part, and the part of blocking programs.
+"""Base classes of the clients of all nodes, and of those for blocking programs.
 
-A client lets a program use a node; a driver keeps the node at work meanwhile (`qlinkgen.transport.ring`).
+A program uses a node through a client, while a driver runs the node (`qlinkgen.transport.ring`).
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ Item = str | Number | Formatted
 
 
 def engine_of(node: Node) -> RingNode:
-    """Return the engine of a node; a passive one is nothing else."""
+    """Return the engine of a node; a passive node is an engine."""
     return node if isinstance(node, RingNode) else node.link
 
 
 def paced_baud(port: Port) -> int | None:
-    """Return the speed of a port where bytes take their time, for the `baud` of an engine."""
+    """Return the speed of a paced port, else None, for the `baud` of an engine."""
     return port.baud if port.capabilities.paced is Ability.YES else None
 
 
 @contextlib.contextmanager
 def closing_on_error(port: Port) -> Iterator[Port]:
-    """Close a port that was opened for a node which then can not be made."""
+    """Close a port if an error occurs while its node is made."""
     try:
         yield port
     except BaseException:
@@ -52,10 +52,10 @@ def closing_on_error(port: Port) -> Iterator[Port]:
 
 
 class Driver(Protocol):
-    """What keeps a node at work, as far as all clients use it."""
+    """The interface of drivers that all clients use."""
 
     def act(self, action: Callable[[float], T]) -> T:
-        """Do something to the node, at the time that the action is given."""
+        """Call an action on the node with the current time."""
         ...
 
     def now(self) -> float:
@@ -64,11 +64,11 @@ class Driver(Protocol):
 
 
 class Client(Generic[N]):
-    """What the clients share whatever drives their node.
+    """Base class of clients with any driver.
 
     Attributes:
         node: the behaviour without input or output.
-        driver: what keeps it at work.
+        driver: the driver of the node.
         tx_timeout: seconds that a message waits for room in the transmit buffer.
     """
 
@@ -85,12 +85,12 @@ class Client(Generic[N]):
 
     @property
     def counters(self) -> RingCounters:
-        """What the node has seen of the ring."""
+        """Counts of messages and faults."""
         return self.engine.counters
 
     @property
     def netstat(self) -> NetStat:
-        """What has gone wrong since it was cleared; `netstat = 0` clears it, as in BASIC."""
+        """Errors since the status was cleared; `netstat = 0` clears it, as in BASIC."""
         return self.engine.netstat
 
     @netstat.setter
@@ -98,7 +98,7 @@ class Client(Generic[N]):
         self.engine.netstat = NetStat(status)
 
     def clear_netstat(self) -> NetStat:
-        """Clear the status, and return what it was; nothing that happens in between is lost."""
+        """Clear the status, and return the old one, atomically."""
 
         def clear(_now: float) -> NetStat:
             status, self.engine.netstat = self.engine.netstat, NetStat(0)
@@ -111,20 +111,20 @@ class Client(Generic[N]):
         return self.driver.now()
 
     def _put(self, message: trio.Message) -> Callable[[float], bool | None]:
-        """What to try until there is room for a message."""
+        """Return the action to try until there is room for a message."""
         return lambda now: self.engine.send(message, now) or None
 
     def _no_room(self) -> NoRoom:
         self.driver.act(self.engine.refuse)
         return NoRoom(
-            f"the transmit buffer had no room for {self.tx_timeout:g} s (NETSTAT bit 0): messages of other "
-            "nodes come first, so look for one that sends without end, or send less",
+            f"the transmit buffer was full for {self.tx_timeout:g} s (NETSTAT bit 0): forwarded messages go "
+            "first; find the node that keeps sending, or send less",
             elapsed=self.tx_timeout,
         )
 
 
 class CoordinatorClient(Client[CoordinatorNode]):
-    """What a program on a Motion Coordinator has without waiting for anything."""
+    """Methods of a Motion Coordinator that do not wait."""
 
     @property
     def vr(self) -> Variables:
@@ -132,14 +132,14 @@ class CoordinatorClient(Client[CoordinatorNode]):
         return self.node.vr
 
     def defkey(self, key: int | str, *values: int) -> None:
-        """Define what channel 3 returns for a key and those behind it: DEFKEY(key, value, value, ...).
+        """Define the values of channel 3 for a key and the following ones: DEFKEY(key, value, value, ...).
 
         Args:
             key: the character that the keypad sends, or its number.
-            values: for this key and the following ones; a key that was never defined returns its number.
+            values: for this key and the following ones; an undefined key returns its number.
 
         Raises:
-            ValueError: there is no such key.
+            ValueError: the key is out of range.
         """
         self.node.keys.define(ord(key) if isinstance(key, str) else key, *values)
 
@@ -149,56 +149,56 @@ class CoordinatorClient(Client[CoordinatorNode]):
 
     @staticmethod
     def _texts(n: int, items: tuple[Item, ...], sep: str, end: str) -> Iterator[trio.Message]:
-        text_message(n, " ")  # a wrong number is refused before anything is sent
+        text_message(n, " ")  # refuses a wrong number before anything is sent
         return (text_message(n, piece) for piece in pieces(printed(items, sep, end)))
 
 
 class BlockingClient(Client[N]):
-    """What the clients of blocking programs share."""
+    """Base class of clients for blocking programs."""
 
     driver: RingDriver
 
     def __init__(self, node: N, driver: RingDriver, *, tx_timeout: float = TX_TIMEOUT) -> None:
-        """Use a node that a driver keeps at work."""
+        """Use a node run by a driver."""
         super().__init__(node, tx_timeout=tx_timeout)
         self.driver = driver
 
     def transmit(self, message: trio.Message) -> None:
         """Send any message; its address counts the nodes along the ring, 1-15.
 
-        It returns when the message is in the transmit buffer. The sender never knows whether it arrives.
+        Returns when the message is in the transmit buffer. Delivery is not confirmed.
 
         Raises:
-            NoRoom: the buffer had no room in time.
-            EncodeError: of the generated module: a field is out of its range.
-            PortLost: the port went away.
+            NoRoom: the buffer stayed full.
+            EncodeError: of the generated module: a field is out of range.
+            PortLost: the port was lost.
         """
         if self.driver.until(self._put(message), self.tx_timeout) is None:
             raise self._no_room()
 
     def wait_until(self, condition: Callable[[], object], timeout: float | None = None) -> None:
-        """Wait until something is so, looking whenever the node has seen something: WAIT UNTIL.
+        """Wait for a condition, checked after each event of the node: WAIT UNTIL.
 
         Raises:
-            NothingCame: it was not so within `timeout` seconds.
+            NothingCame: the condition was not met within `timeout` seconds.
         """
         if self.driver.until(lambda _now: bool(condition()) or None, timeout) is None:
-            raise NothingCame(f"what was waited for did not come about in {timeout} s", elapsed=timeout or 0)
+            raise NothingCame(f"condition not met within {timeout} s", elapsed=timeout or 0)
 
     def flush(self, timeout: float | None = None) -> None:
-        """Wait until everything in the transmit buffer was handed to the port.
+        """Wait until the transmit buffer is empty.
 
         Raises:
-            NothingCame: something is still there after `timeout` seconds.
+            NothingCame: the buffer is not empty after `timeout` seconds.
         """
         self.wait_until(lambda: self.engine.idle, timeout)
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass; the node goes on sending and receiving."""
+        """Sleep; the node continues sending and receiving."""
         self.driver.pause(seconds)
 
     def close(self) -> None:
-        """Send what is still in the transmit buffer, leave the ring, and close the port."""
+        """Send the transmit buffer, leave the ring, and close the port."""
         self.driver.close()
 
     def __enter__(self) -> Self:

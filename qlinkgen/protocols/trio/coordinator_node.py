@@ -1,6 +1,7 @@
-"""A Motion Coordinator as a node of the ring: what it does with messages, and the messages it makes.
+"""A Motion Coordinator as a node of the ring: handling of received messages, and making of messages.
 
-No input or output and no clock here: `node.link` is the engine that a driver serves, and `now` comes in.
+It has no input or output and no clock: `node.link` is the engine that a driver runs, and `now` is an
+argument.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from qlinkgen.protocols.trio.variables import KeyTable, Variables
 
 
 class CoordinatorCounters:
-    """What a Motion Coordinator has dropped.
+    """Counts of dropped messages and characters.
 
     Attributes:
-        characters_lost: characters for which the receive buffer had no room; the newest are dropped.
-        variables_lost: messages for a variable that it does not have.
-        ignored: messages that mean something to a keypad only.
+        characters_lost: characters dropped because the receive buffer was full.
+        variables_lost: messages for a variable that does not exist.
+        ignored: messages that only apply to keypads.
     """
 
     __slots__ = ("characters_lost", "ignored", "variables_lost")
@@ -45,8 +46,8 @@ class CoordinatorNode:
         link: the engine: NETSTAT, counters, events.
         vr: the variables.
         keys: the DEFKEY table.
-        received: characters that nobody has read yet, at most 256.
-        counters: what it has dropped.
+        received: unread characters, at most 256.
+        counters: counts of dropped messages and characters.
     """
 
     kind = "coordinator"
@@ -61,7 +62,7 @@ class CoordinatorNode:
         self.counters = CoordinatorCounters()
 
     def reset(self) -> None:
-        """Be switched off and on: what is under way and what was received is lost; variables stay."""
+        """Switch off and on: messages being sent and received data are lost; variables are kept."""
         self.link.reset()
         self.received.clear()
 
@@ -76,7 +77,7 @@ class CoordinatorNode:
             self.vr[message.number] = message.value
         else:
             self.counters.variables_lost += 1
-            text = f"there is no VR({message.number}), the last one is VR({LAST_VARIABLE})"
+            text = f"VR({message.number}) does not exist; the last one is VR({LAST_VARIABLE})"
             self.link.events.append(Dropped(now, message, text))
 
     def _characters(self, message: trio.CharacterTransfer, now: float) -> None:
@@ -89,7 +90,7 @@ class CoordinatorNode:
             self.link.events.append(Dropped(now, message, text))
 
     def take(self, channel: int) -> int | None:
-        """Return the character that came first and forget it, None where there is none.
+        """Remove and return the oldest character, None if there is none.
 
         Args:
             channel: 3 for its value by the DEFKEY table, 4 for its number.
@@ -109,7 +110,7 @@ def text_message(node: int, text: str) -> trio.Message:
 
 
 def mode_message(node: int, mode: trio.KeypadModeEnum | int) -> trio.Message:
-    """Return the message that sets the mode of a keypad; BASIC has no word for it."""
+    """Return the message that sets the mode of a keypad; BASIC has no command for it."""
     return trio.KeypadMode(address=wire_address(node), mode=mode)
 
 
@@ -117,13 +118,13 @@ def send_message(node: int, kind: int, data1: int, data2: Number | None) -> trio
     """Return the message of SEND(node, kind, data1[, data2]).
 
     Raises:
-        ValueError: an argument is out of its range.
-        TypeError: data2 is missing, or is one too many.
+        ValueError: an argument is out of range.
+        TypeError: data2 is missing, or not allowed.
     """
     address = wire_address(node)
     if kind == OFFSET:
         if data2 is not None:
-            raise TypeError(f"data2: {data2!r} was given; a keypad offset (type {OFFSET}) has data1 alone")
+            raise TypeError(f"data2: {data2!r} was given; a keypad offset (type {OFFSET}) has only data1")
         return trio.KeypadOffset(address=address, offset=wire_address(data1, "data1"))
     if kind != VARIABLE:
         raise ValueError(
@@ -131,6 +132,6 @@ def send_message(node: int, kind: int, data1: int, data2: Number | None) -> trio
             "(keypad offset), which are not the types on the wire"
         )
     if isinstance(data2, bool) or not isinstance(data2, Number):
-        raise TypeError(f"data2: {data2!r} was given; a direct variable transfer needs the value there")
-    # The codec rounds any number that knows its exact ratio to the nearest step.
+        raise TypeError(f"data2: {data2!r} was given; a direct variable transfer needs the value")
+    # The codec rounds any number with an exact ratio to the nearest step.
     return trio.DirectVariableTransfer(address=address, number=data1, value=cast(Decimal, data2))

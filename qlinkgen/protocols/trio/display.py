@@ -1,19 +1,19 @@
 """The text display of a membrane keypad.
 
-The document shows it in use and does not describe it. What its examples use is here:
+The document does not describe it. It supports the characters that its examples use:
 
 =================  ====================================================================================
 characters         effect
 =================  ====================================================================================
 12                 clears the display; the cursor goes home
 14                 the cursor goes home, to the upper left
-20                 the cursor gets invisible
+20                 the cursor becomes invisible
 27, 72, p          the cursor goes to place p: row p // columns, column p % columns
 13 and 10          start of the row, and next row
-32 to 126          stands at the cursor, which moves on; behind the last place comes the first
+32 to 126          is written at the cursor, which advances; after the last place it wraps to the first
 =================  ====================================================================================
 
-Anything else is ignored and counted. A sequence may be spread over messages.
+Other characters are ignored and counted. A sequence may be spread over messages.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ _CLEAR, _HOME, _HIDE, _ESCAPE = "\x0c", "\x0e", "\x14", "\x1b"
 
 
 class Display:
-    """What a keypad shows.
+    """The display of a keypad.
 
     Attributes:
-        rows: of the display.
+        rows: number of rows.
         columns: characters in a row.
-        place: of the cursor, 0 being the upper left.
-        cursor_visible: it is shown.
-        ignored: characters that mean nothing here.
+        place: position of the cursor, 0 being the upper left.
+        cursor_visible: the cursor is visible.
+        ignored: number of ignored characters.
     """
 
     def __init__(self, rows: int = ROWS, columns: int = COLUMNS) -> None:
-        """Make a display that is empty.
+        """Make an empty display.
 
         Raises:
-            ValueError: it has no places, or more than a seven-bit character can tell apart.
+            ValueError: it has no places, or more than a seven-bit character can address.
         """
         if rows < 1 or columns < 1 or rows * columns > 128:
             raise ValueError(f"rows, columns: {rows} and {columns} were given; a display has 1 to 128 places")
@@ -46,9 +46,9 @@ class Display:
         self.reset()
 
     def reset(self) -> None:
-        """Be empty, as when the keypad is switched on."""
+        """Clear everything, as when the keypad is switched on."""
         self._cells = [" "] * (self.rows * self.columns)
-        self._escape = ""  # what has come of a sequence
+        self._escape = ""  # an incomplete sequence
         self.place = 0
         self.cursor_visible = True
         self.ignored = 0
@@ -96,11 +96,11 @@ class Display:
 
     @property
     def lines(self) -> list[str]:
-        """Rows from above, without the blanks at their ends."""
+        """Rows from the top, without trailing blanks."""
         cells = "".join(self._cells)
         return [cells[at : at + self.columns].rstrip() for at in range(0, len(cells), self.columns)]
 
     @property
     def text(self) -> str:
-        """All rows, one a line."""
+        """All rows, one per line."""
         return "\n".join(self.lines)

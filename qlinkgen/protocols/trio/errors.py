@@ -1,4 +1,4 @@
-"""Errors of a node of the ring; the port stays in order, and the node goes on."""
+"""Errors of a ring node; port and node remain usable."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from qlinkgen.errors import LinkError
 
 
 class NoRoom(LinkError, TimeoutError):
-    """A message found no room in the transmit buffer in time: NETSTAT bit 0 is set, nothing was sent."""
+    """The transmit buffer stayed full: NETSTAT bit 0 is set, nothing was sent."""
 
 
 class NothingCame(LinkError, TimeoutError):
-    """What was waited for did not come in time."""
+    """A wait timed out."""

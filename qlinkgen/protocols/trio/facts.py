@@ -1,4 +1,4 @@
-"""What the document says beyond the bytes, and what this project has settled where it says nothing."""
+"""Facts of the document beyond encoding, and assumptions where it is silent."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from qlinkgen.codecs.trio import BUS
 
 #: BASIC's number of the next node along the ring, whose address on the wire is 1 (Network Node Addressing).
 FIRST_NODE = 10
-#: Most nodes of a ring.
+#: Largest number of nodes of a ring.
 MOST_NODES: int = BUS.last_node or 0
 LAST_NODE = FIRST_NODE + MOST_NODES - 1
 #: Last variable of a Motion Coordinator (GET, VR(x)).
 LAST_VARIABLE = 250
-#: Characters that a Motion Coordinator keeps until they are read (Network Buffers).
+#: Size of the receive buffer of a Motion Coordinator in characters (Network Buffers).
 RECEIVE_BUFFER = 256
-#: Input by way of the DEFKEY table, and the same input as it came (GET, KEY).
+#: Channels of input through the DEFKEY table, and of unchanged input (GET, KEY).
 KEYS, CHARACTERS = 3, 4
 #: Message types of SEND, which are not those on the wire (SEND).
 VARIABLE, OFFSET = 1, 2
-#: Characters of one message at most.
+#: Most characters of one message.
 LONGEST_TEXT = 256
-#: What ends a line of PRINT, unless a semicolon stands there.
+#: Line end of PRINT, unless it ends in a semicolon.
 LINE_END = "\r\n"
-#: Decimals of a number that is printed without a format.
+#: Decimals of a number printed without a format.
 DECIMALS = 4
-#: A keypad in mode on_off sends this much more for a key that goes up than for the same key going down.
+#: Added to the number of a key on release, in mode on_off.
 KEY_UP = 64
 
 
@@ -31,7 +31,7 @@ def wire_address(node: int, what: str = "n") -> int:
     """Return the address on the wire, 1-15, of a node by BASIC's number, 10-24.
 
     Raises:
-        ValueError: it is no such number.
+        ValueError: the number is out of range.
     """
     if type(node) is not int or not FIRST_NODE <= node <= LAST_NODE:
         raise ValueError(
@@ -42,10 +42,10 @@ def wire_address(node: int, what: str = "n") -> int:
 
 
 def check_channel(channel: int) -> int:
-    """Return a channel of GET and KEY if it is one of the network's."""
+    """Return a channel of GET and KEY after checking that it is one of the network's."""
     if channel not in {KEYS, CHARACTERS}:
         raise ValueError(
-            f"channel: {channel!r} was given; the network's are {KEYS} (by the DEFKEY table) and "
-            f"{CHARACTERS} (characters as they came)"
+            f"channel: {channel!r} was given; the network's are {KEYS} (through the DEFKEY table) and "
+            f"{CHARACTERS} (unchanged characters)"
         )
     return channel

@@ -1,4 +1,4 @@
-"""A membrane keypad as a node of the ring: its keys, its display, and what puts it into network mode."""
+"""A membrane keypad as a node of the ring: keys, display and network mode."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _MODES = (trio.KeypadModeEnum.ON_ONLY, trio.KeypadModeEnum.ON_OFF)
 
 
 class KeypadCounters:
-    """What a keypad has dropped.
+    """Counts of dropped keys and messages.
 
     Attributes:
         early_keys: key presses before it had its offset.
         early_messages: messages to it before it had its offset.
-        lost_keys: key presses that found no room in the transmit buffer.
-        ignored: messages that mean nothing to a keypad, such as variables, and unknown modes.
+        lost_keys: key presses lost because the transmit buffer was full.
+        ignored: messages without a meaning for a keypad, such as variables, and unknown modes.
     """
 
     __slots__ = ("early_keys", "early_messages", "ignored", "lost_keys")
@@ -39,21 +39,21 @@ class KeypadCounters:
 class KeypadNode:
     """The behaviour of a membrane keypad.
 
-    Until it is told its offset it is not in network mode: it sends nothing, neither keys nor the messages of
-    others, and what is sent to it is lost. All of that is counted.
+    Until it receives its offset it is not in network mode: it neither sends keys nor forwards messages, and
+    messages to it are lost. All of these are counted.
 
     Attributes:
         link: the engine: counters, events.
-        display: what it shows.
-        offset: nodes along the ring to which it sends its keys, None until it was told.
+        display: the display.
+        offset: number of nodes along the ring to the receiver of its keys, None until it is received.
         mode: what it sends for a key.
-        counters: what it has dropped.
+        counters: counts of dropped keys and messages.
     """
 
     kind = "keypad"
 
     def __init__(self, *, rows: int = ROWS, columns: int = COLUMNS, **options: Unpack[NodeOptions]) -> None:
-        """Make a keypad that was just switched on; the other options are those of `RingNode`."""
+        """Make a keypad as just switched on; the other options are those of `RingNode`."""
         options.setdefault("codec", trio)
         self.link = RingNode(on_message=self._handle, **options)
         self.display = Display(rows, columns)
@@ -61,7 +61,7 @@ class KeypadNode:
         self.reset()
 
     def reset(self) -> None:
-        """Be switched off and on: the offset, the mode and the display are lost."""
+        """Switch off and on: offset, mode and display are lost."""
         self.link.reset()
         self.link.passes = False
         self.display.reset()
@@ -74,7 +74,7 @@ class KeypadNode:
             self.link.passes = True
         elif self.offset is None:
             self.counters.early_messages += 1
-            text = "the keypad has no offset yet: send it one before anything else (SEND, type 2)"
+            text = "the keypad has no offset yet: send it first (SEND, type 2)"
             self.link.events.append(Dropped(now, message, text))
         elif isinstance(message, trio.CharacterTransfer):
             self.display.feed(message.characters)
@@ -84,19 +84,19 @@ class KeypadNode:
             self.counters.ignored += 1
 
     def press(self, key: int | str, now: float) -> bool:
-        """Press a key; return whether its character goes to the ring.
+        """Press a key; return whether its character is sent.
 
         Args:
             key: number of the key, 0-63, which is the character that it sends; or that character.
             now: the time.
 
         Raises:
-            ValueError: there is no such key.
+            ValueError: the key is out of range.
         """
         return self._send(check_key(key), now)
 
     def release(self, key: int | str, now: float) -> bool:
-        """Let a key go; in mode on_off that sends the key's character plus 64. Otherwise as `press`."""
+        """Release a key; in mode on_off this sends the key's character plus 64. Otherwise like `press`."""
         character = check_key(key) + KEY_UP
         return self.mode == trio.KeypadModeEnum.ON_OFF and self._send(character, now)
 
@@ -113,7 +113,7 @@ class KeypadNode:
 
 
 def check_key(key: int | str) -> int:
-    """Return the number of a key if it is one; a digit or letter may be given as text."""
+    """Return the number of a key after checking it; a digit or letter may be passed as text."""
     code = ord(key) if isinstance(key, str) and len(key) == 1 else key
     if type(code) is not int or not 0 <= code < KEY_UP:
         raise ValueError(f"key: {key!r} was given; keys have the numbers 0 to {KEY_UP - 1}")

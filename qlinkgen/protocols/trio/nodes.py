@@ -19,9 +19,9 @@ from qlinkgen.protocols.trio.errors import NothingCame
 from qlinkgen.protocols.trio.facts import LINE_END, check_channel
 from qlinkgen.protocols.trio.keypad_node import KeypadNode
 from qlinkgen.protocols.trio.options import (
-    CoordinatorFaceOptions,
-    FaceOptions,
-    KeypadFaceOptions,
+    ClientOptions,
+    CoordinatorClientOptions,
+    KeypadClientOptions,
     KeypadOptions,
     NodeOptions,
 )
@@ -32,15 +32,15 @@ from qlinkgen.transport.ring import OnEvent, RingDriver, drive
 
 
 class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
-    """A Motion Coordinator: the network's words of BASIC as methods.
+    """A Motion Coordinator: the network commands of BASIC as methods.
 
-    A thread of its own receives and sends on, so the node does its part on the ring whatever the program
-    does. Any number of threads may use it. Nodes are numbered as in BASIC: 10 is the next one along the ring,
-    24 the fifteenth; a number past the end of the ring goes round.
+    A separate thread receives and forwards, independently of the program. Any number of threads may use it.
+    Nodes are numbered as in BASIC: 10 is the next one along the ring, 24 the fifteenth; a number past the end
+    of the ring wraps around.
 
     Attributes:
         node: the behaviour without input or output.
-        driver: what keeps it at work.
+        driver: the driver of the node.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
         """Join the ring at a port.
 
         Args:
-            port: receives from the node before, and transmits to the next one.
+            port: receives from the previous node, and transmits to the next one.
             tx_timeout: seconds that a message waits for room in the transmit buffer.
             on_event: called with each event of the engine (`qlinkgen.link.ring_events`).
             options: `cut_through`, `patience` and `room` of `RingNode`.
@@ -64,14 +64,14 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
         super().__init__(node, drive(port, node.link, on_event=on_event), tx_timeout=tx_timeout)
 
     @classmethod
-    def open(cls, name: str, baud: int = 115200, **options: Unpack[CoordinatorFaceOptions]) -> Self:
+    def open(cls, name: str, baud: int = 115200, **options: Unpack[CoordinatorClientOptions]) -> Self:
         """Join the ring at a device or URL. Raises the errors of `open_port`."""
         with closing_on_error(open_port(name, baud=baud)) as port:
             return cls(port, **options)
 
     @classmethod
     def driven(cls, node: CoordinatorNode, driver: RingDriver) -> Self:
-        """Use a node that something else keeps at work, such as a simulated ring."""
+        """Wrap a node driven elsewhere, e.g. by a simulated ring."""
         client = cls.__new__(cls)
         BlockingClient.__init__(client, node, driver)
         return client
@@ -82,28 +82,28 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
         Args:
             n: number of the receiver, 10-24.
             items: text, numbers (with four decimals), `VALUE(number, width, decimals)`, `CHR`, `CURSOR`.
-            sep: what stands between items.
-            end: what follows them; `end=""` is BASIC's semicolon at the end of the line.
+            sep: separator of items.
+            end: text after the items; `end=""` is BASIC's semicolon at the end of the line.
 
         Raises:
-            ValueError: a number of a node, or a character, that there is not. Nothing was sent.
-            NoRoom: the transmit buffer had no room in time.
-            PortLost: the port went away.
+            ValueError: a node number or a character is out of range. Nothing was sent.
+            NoRoom: the transmit buffer stayed full.
+            PortLost: the port was lost.
         """
         for message in self._texts(n, items, sep, end):
             self.transmit(message)
 
     def get(self, channel: int, timeout: float | None = None) -> int:
-        """GET #channel: return the character that came first, waiting for one if there is none.
+        """GET #channel: remove and return the oldest character; wait for one if there is none.
 
         Args:
             channel: 3 for its value by the DEFKEY table, 4 for the number of the character.
             timeout: seconds to wait, None for ever.
 
         Raises:
-            NothingCame: nothing in that time.
-            ValueError: it is another channel.
-            PortLost: the port went away.
+            NothingCame: no character in that time.
+            ValueError: the channel is not one of the network's.
+            PortLost: the port was lost.
         """
         value = self.driver.until(self._take(channel), timeout)
         if value is None:
@@ -111,9 +111,9 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
         return value
 
     def key(self, channel: int) -> bool:
-        """KEY #channel: tell whether a character is there; it stays there.
+        """KEY #channel: return whether there is a character, without removing it.
 
-        A program may ask again and again: when there is none, this gives way to the node for a millisecond.
+        A program may poll: without a character, this yields to the node for a millisecond.
         """
         check_channel(channel)
         if not self.node.received:
@@ -130,24 +130,24 @@ class MotionCoordinator(CoordinatorClient, BlockingClient[CoordinatorNode]):
             data2: any number; it is rounded to a multiple of 2 to the power of -32.
 
         Raises:
-            ValueError: an argument is out of its range.
-            TypeError: data2 is missing, or is one too many.
-            NoRoom: the transmit buffer had no room in time.
-            PortLost: the port went away.
+            ValueError: an argument is out of range.
+            TypeError: data2 is missing, or not allowed.
+            NoRoom: the transmit buffer stayed full.
+            PortLost: the port was lost.
         """
         self.transmit(send_message(n, type_, data1, data2))
 
     def keypad_mode(self, n: int, mode: trio.KeypadModeEnum | int) -> None:
-        """Choose what a keypad sends for its keys; BASIC has no word for this message."""
+        """Set the mode of a keypad; BASIC has no command for this message."""
         self.transmit(mode_message(n, mode))
 
 
 class MembraneKeypad(BlockingClient[KeypadNode]):
-    """A membrane keypad. It sends nothing, and passes nothing on, before it is told its offset.
+    """A membrane keypad. It neither sends nor forwards before it receives its offset.
 
     Attributes:
         node: the behaviour without input or output.
-        driver: what keeps it at work.
+        driver: the driver of the node.
     """
 
     def __init__(
@@ -159,35 +159,35 @@ class MembraneKeypad(BlockingClient[KeypadNode]):
         super().__init__(node, drive(port, node.link, on_event=on_event))
 
     @classmethod
-    def open(cls, name: str, baud: int = 115200, **options: Unpack[KeypadFaceOptions]) -> Self:
+    def open(cls, name: str, baud: int = 115200, **options: Unpack[KeypadClientOptions]) -> Self:
         """Join the ring at a device or URL. Raises the errors of `open_port`."""
         with closing_on_error(open_port(name, baud=baud)) as port:
             return cls(port, **options)
 
     @classmethod
     def driven(cls, node: KeypadNode, driver: RingDriver) -> Self:
-        """Use a node that something else keeps at work, such as a simulated ring."""
+        """Wrap a node driven elsewhere, e.g. by a simulated ring."""
         client = cls.__new__(cls)
         BlockingClient.__init__(client, node, driver)
         return client
 
     def press(self, *keys: int | str) -> None:
-        """Press keys, one after the other, and let each one go before the next."""
+        """Press and release keys, one after the other."""
         for key in keys:
             self.key_down(key)
             self.key_up(key)
 
     def key_down(self, key: int | str) -> bool:
-        """Press a key and hold it; return whether its character went to the ring."""
+        """Press a key and hold it; return whether its character was sent."""
         return self.driver.act(lambda now: self.node.press(key, now))
 
     def key_up(self, key: int | str) -> bool:
-        """Let a key go; return whether a character went to the ring, which it does in mode on_off."""
+        """Release a key; return whether a character was sent, as in mode on_off."""
         return self.driver.act(lambda now: self.node.release(key, now))
 
     @property
     def lines(self) -> list[str]:
-        """What the display shows, row by row."""
+        """Rows of the display."""
         return self.node.display.lines
 
     def __str__(self) -> str:
@@ -195,11 +195,11 @@ class MembraneKeypad(BlockingClient[KeypadNode]):
 
 
 class PassiveNode(BlockingClient[RingNode]):
-    """A node that sends everything on and tells what it sees; it may send messages too.
+    """A node that forwards every message and reports it; it may send messages too.
 
     Attributes:
-        node: the engine, which tells of each message (`Passed`, `Taken`).
-        driver: what keeps it at work.
+        node: the engine, which reports each message (`Passed`, `Taken`).
+        driver: the driver of the node.
     """
 
     def __init__(
@@ -213,7 +213,7 @@ class PassiveNode(BlockingClient[RingNode]):
         super().__init__(node, drive(port, node, on_event=on_event))
 
     @classmethod
-    def open(cls, name: str, baud: int = 115200, **options: Unpack[FaceOptions]) -> Self:
+    def open(cls, name: str, baud: int = 115200, **options: Unpack[ClientOptions]) -> Self:
         """Join the ring at a device or URL. Raises the errors of `open_port`."""
         with closing_on_error(open_port(name, baud=baud)) as port:
             return cls(port, **options)

@@ -1,4 +1,4 @@
-"""What the nodes of a ring may be given, by name: all of it is handed on to `RingNode` and to the clients."""
+"""Keyword arguments of ring nodes, passed to `RingNode` and to the clients."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from qlinkgen.transport.ring import OnEvent
 
 
 class RingOptions(TypedDict, total=False):
-    """Options of `RingNode` beside its speed."""
+    """Options of `RingNode` except its speed."""
 
     codec: RingCodec
     cut_through: bool
@@ -18,32 +18,32 @@ class RingOptions(TypedDict, total=False):
 
 
 class NodeOptions(RingOptions, total=False):
-    """Options of `RingNode`; `baud` is that of the port unless given."""
+    """Options of `RingNode`; `baud` is by default that of the port."""
 
     baud: int | None
 
 
 class KeypadOptions(NodeOptions, total=False):
-    """Options of a keypad: rows and columns of its display too."""
+    """Options of a keypad, including rows and columns of its display."""
 
     rows: int
     columns: int
 
 
-class FaceOptions(RingOptions, total=False):
-    """What the client of a passive node is opened with."""
+class ClientOptions(RingOptions, total=False):
+    """Options of `open` of a passive node."""
 
     on_event: OnEvent | None
 
 
-class CoordinatorFaceOptions(FaceOptions, total=False):
-    """What the client of a Motion Coordinator is opened with."""
+class CoordinatorClientOptions(ClientOptions, total=False):
+    """Options of `open` of a Motion Coordinator."""
 
     tx_timeout: float
 
 
-class KeypadFaceOptions(FaceOptions, total=False):
-    """What the client of a keypad is opened with."""
+class KeypadClientOptions(ClientOptions, total=False):
+    """Options of `open` of a keypad."""
 
     rows: int
     columns: int

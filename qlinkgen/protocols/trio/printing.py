@@ -1,4 +1,4 @@
-"""What PRINT makes of its items: text, numbers with `[width, decimals]`, control characters."""
+"""Formatting of the items of PRINT: text, numbers with `[width, decimals]`, control characters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from qlinkgen.protocols.trio.facts import DECIMALS, LONGEST_TEXT
 
 #: A number that BASIC can print.
 Number = int | float | Decimal | Fraction
-#: Greatest width of a printed number.
+#: Largest width of a printed number.
 WIDEST = 127
 
 
@@ -24,32 +24,32 @@ class Formatted(NamedTuple):
     decimals: int
 
     def __str__(self) -> str:
-        """Return the number, to the right of its field; asterisks where the field is too narrow."""
+        """Return the number, right-aligned in its field; asterisks if the field is too narrow."""
         text = f"{Decimal(self.number) if isinstance(self.number, int) else self.number:.{self.decimals}f}"
         if not text.strip("-0."):
-            text = text.lstrip("-")  # there is no -0.0 on a display
+            text = text.lstrip("-")  # a display does not show -0.0
         return text.rjust(self.width) if len(text) <= self.width or not self.width else "*" * self.width
 
 
 def VALUE(number: Number, width: int = 0, decimals: int = DECIMALS) -> Formatted:  # noqa: N802  # as CHR
-    """Return what BASIC writes as `number[width, decimals]`, and with `width=0` as `number[decimals]`.
+    """Return `number[width, decimals]` of BASIC, and with `width=0` `number[decimals]`.
 
     Args:
-        number: to be printed, rounded half to even.
-        width: characters of the field, point, sign and decimals included; 0 for as many as are needed. In a
-            field that is too narrow asterisks stand instead of a wrong number.
-        decimals: digits behind the point, 0 for none and no point.
+        number: number to print, rounded half to even.
+        width: characters of the field, including point, sign and decimals; 0 for as many as needed. A field
+            that is too narrow is filled with asterisks.
+        decimals: digits after the point, 0 for none and no point.
 
     Raises:
-        TypeError: it is no number.
-        ValueError: a width or decimals out of range, or a number that is infinite or none.
+        TypeError: `number` is not a number.
+        ValueError: width or decimals is out of range, or the number is not finite.
     """
     if isinstance(number, bool) or not isinstance(number, Number):
         raise TypeError(f"number: {number!r} was given; give an int, a float, a Decimal or a Fraction")
     if isinstance(number, Fraction):
         number = Decimal(number.numerator) / Decimal(number.denominator)
     if not -math.inf < number < math.inf:
-        raise ValueError(f"number: {number} was given; only what is finite has digits")
+        raise ValueError(f"number: {number} was given; give a finite number")
     for name, given in (("width", width), ("decimals", decimals)):
         if type(given) is not int or not 0 <= given <= WIDEST:
             raise ValueError(f"{name}: {given!r} was given; give 0 to {WIDEST}")
@@ -68,10 +68,10 @@ def CHR(code: int) -> str:  # noqa: N802  # programs of the document read as the
 
 
 def CURSOR(position: int) -> str:  # noqa: N802
-    """Return what moves the cursor of a display, 0 being the upper left: `CHR(27);CHR(72);CHR(position)`.
+    """Return the sequence that moves the cursor, 0 being the upper left: `CHR(27);CHR(72);CHR(position)`.
 
     Raises:
-        ValueError: no display has that place.
+        ValueError: the position is out of range.
     """
     if type(position) is not int or not 0 <= position <= 127:
         raise ValueError(f"CURSOR: {position!r} was given; places have the numbers 0 to 127")
@@ -79,7 +79,7 @@ def CURSOR(position: int) -> str:  # noqa: N802
 
 
 def printed(items: tuple[str | Number | Formatted, ...], sep: str, end: str) -> str:
-    """Return all that one PRINT sends.
+    """Return the text that one PRINT sends.
 
     Raises:
         TypeError: an item is neither text nor a number.
@@ -101,6 +101,6 @@ def _text(item: str | Number | Formatted) -> str:
 
 
 def pieces(text: str) -> Iterator[str]:
-    """Cut a text into what one message can hold."""
+    """Cut a text into pieces for one message each."""
     for start in range(0, len(text), LONGEST_TEXT):
         yield text[start : start + LONGEST_TEXT]

@@ -13,8 +13,8 @@ from qlinkgen.protocols.trio.printing import Number
 class Variables:
     """VR(0) to VR(250).
 
-    They read as floats, as BASIC's do. A value that came over the ring has up to 63 bits, more than a float
-    keeps: `exact` has them all.
+    Values are read as floats, as in BASIC. A value received over the ring has up to 63 bits, more than a
+    float holds: `exact` returns all of them.
     """
 
     def __init__(self) -> None:
@@ -50,19 +50,19 @@ class Variables:
 
 
 class KeyTable:
-    """What channel 3 makes of a character: DEFKEY.
+    """Values of characters on channel 3: DEFKEY.
 
-    A character that was never defined stands for its own number.
+    The value of an undefined character is its own number.
     """
 
     def __init__(self) -> None:
         self._values = list(range(128))
 
     def define(self, key: int, *values: int) -> None:
-        """Define the values of a key and of those behind it: `DEFKEY(key, value, value, ...)`.
+        """Define the values of a key and of the following ones: `DEFKEY(key, value, value, ...)`.
 
         Raises:
-            ValueError: there is no such key.
+            ValueError: the key is out of range.
         """
         if type(key) is not int or not values or not 0 <= key <= key + len(values) - 1 <= 127:
             raise ValueError(
