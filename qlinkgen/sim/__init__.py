@@ -1,4 +1,4 @@
-"""The other side of the wire, simulated: a line with faults, a virtual clock, a bus behind a pty.
+"""Simulation: lines with faults, virtual clocks, buses on ptys.
 
 `pty_bus` is not imported here: it needs a POSIX system, the rest does not.
 """

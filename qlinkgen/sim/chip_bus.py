@@ -1,4 +1,4 @@
-"""An MC1231A chip set on a simulated serial link: on a virtual clock, or behind a pty.
+"""An MC1231A chip set on a simulated serial link: on a virtual clock, or on a pty.
 
 wire = chip_wire(ChipSet())
 host = Host(VirtualPort(wire))                    # on a clock of its own
@@ -26,11 +26,11 @@ def chip_wire(
     """Return a link with a chip set at its end, for a `VirtualPort` or a `PtyBus`.
 
     Args:
-        chip: the chip set, or its end of the link where more is to be chosen of that.
-        baud: bits a second, or None: bytes take no time.
-        faults: what goes wrong on the link; to "slaves" is to the chip set, to "master" to the host.
-        chunks: in what pieces bytes arrive; see `Wire`.
-        forgets: seconds of silence after which the chip's end forgets a packet begun; 0: never.
+        chip: the chip set, or a configured engine of it.
+        baud: bits per second, or None for an unpaced link.
+        faults: faults of the link; "slaves" is the chip set, "master" the host.
+        chunks: chunks in which bytes arrive; see `Wire`.
+        forgets: seconds of silence after which the chip's end discards an incomplete packet; 0: never.
     """
     engine = chip if isinstance(chip, ChipEngine) else ChipEngine(chip, forgets=forgets)
     wire = Wire(baud=baud, faults=faults, chunks=chunks, collisions=False)  # a line for each direction

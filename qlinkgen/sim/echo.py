@@ -1,4 +1,4 @@
-"""The local echo of a two-wire adapter, whole or flawed."""
+"""The local echo of a two-wire adapter, complete or faulty."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from qlinkgen.sim.errors import FaultPlanError
 
 
 class Echo:
-    """What the outside hears of its own transmissions.
+    """The outside's echo of its own transmissions.
 
-    An adapter that leaves its receiver on hears what it sends. Some switch it on too late or off too soon, so
-    a head or a tail is missing; and on a bad line bytes come back changed.
+    An adapter with an enabled receiver receives its own bytes. Some enable it too late or disable it too
+    early, so a head or a tail is missing; and on a bad line bytes are corrupted.
 
     Attributes:
-        partial: chance of a missing head or tail, 0 to 1.
-        changed: chance of one to three changed bytes, 0 to 1.
-        seed: of the random numbers.
-        counts: how often each of "partial" and "changed" has happened, and "whole" for an echo without flaw.
+        partial: probability of a missing head or tail, 0 to 1.
+        changed: probability of one to three changed bytes, 0 to 1.
+        seed: seed of the random numbers.
+        counts: counts of "partial", "changed" and "whole" echoes.
     """
 
     def __init__(self, *, partial: float = 0.0, changed: float = 0.0, seed: int = 0) -> None:
         for name, rate in (("partial", partial), ("changed", changed)):
             if not 0 <= rate <= 1 or math.isnan(rate):
-                raise FaultPlanError(f"{name} of an echo is {rate}: a chance is a number from 0 to 1")
+                raise FaultPlanError(f"{name} of an echo must be a probability from 0 to 1, not {rate}")
         self.partial = partial
         self.changed = changed
         self.seed = seed
@@ -32,7 +32,7 @@ class Echo:
         self._random = random.Random(f"echo {seed}")
 
     def hear(self, data: bytes) -> tuple[int, bytes]:
-        """Return how many bytes are missing at the head, and what is heard of `data`: at least one byte."""
+        """Return the number of bytes missing at the head, and the echo of `data`: at least one byte."""
         chance = self._random
         cut = chance.random() < self.partial and len(data) > 1
         change = chance.random() < self.changed

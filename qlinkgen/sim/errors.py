@@ -6,8 +6,8 @@ from qlinkgen.errors import QlinkgenError
 
 
 class FaultPlanError(QlinkgenError, ValueError):
-    """A plan of faults says something that it must not."""
+    """A fault plan is invalid."""
 
 
 class SimulationError(QlinkgenError, RuntimeError):
-    """The simulation was used in a way that has no meaning, or can not come to an end."""
+    """The simulation was used wrongly, or cannot end."""

@@ -1,4 +1,4 @@
-"""The kinds of faults, and how often and how badly each may happen."""
+"""The kinds of faults, with their probability and extent."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ class Kind:
 
     Attributes:
         name: as written in a plan.
-        doc: what happens, for people.
-        unit: of its extent ("bits", "bytes", "seconds"), empty where it has none.
-        low: least extent unless the plan says otherwise.
-        high: greatest extent unless the plan says otherwise.
-        slaves_only: only what a slave sends can fail in this way.
+        doc: description.
+        unit: unit of its extent ("bits", "bytes", "seconds"), empty without an extent.
+        low: default lower bound of the extent.
+        high: default upper bound of the extent.
+        slaves_only: only transmissions of slaves can fail in this way.
     """
 
     name: str
@@ -31,7 +31,7 @@ class Kind:
 
     @property
     def whole(self) -> bool:
-        """The extent is a count, from 1 on."""
+        """Whether the extent is a count, from 1 on."""
         return self.unit in {"bits", "bytes"}
 
 
@@ -42,17 +42,17 @@ KINDS = {
         Kind("flip", "bits arrive changed", "bits", 1, 3),
         Kind("truncate", "the tail is missing, or the head"),
         Kind("delay", "a little late", "seconds", 0.0, 0.0001),
-        Kind("late", "an answer comes after its time", "seconds", 0.05, 0.2, slaves_only=True),
+        Kind("late", "an answer arrives after its deadline", "seconds", 0.05, 0.2, slaves_only=True),
         Kind("duplicate", "sent twice, with a gap between", "seconds", 0.0, 0.001),
-        Kind("stray", "a valid frame that nobody asked for"),
-        Kind("noise", "random bytes before it, behind it, or alone", "bytes", 1, 20),
+        Kind("stray", "an unsolicited valid frame"),
+        Kind("noise", "random bytes before it, after it, or alone", "bytes", 1, 20),
         Kind("silent", "a station sends nothing for a time", "seconds", 0.1, 1.0, slaves_only=True),
     )
 }
 
 
 class Rate(NamedTuple):
-    """How often a fault happens, and its extent: drawn between two bounds in the unit of its kind."""
+    """Probability of a fault, and the bounds of its extent in the unit of its kind."""
 
     chance: float
     low: float
@@ -63,41 +63,43 @@ RateLike = float | tuple[float, float, float] | Rate
 
 
 def make_rate(name: str, given: RateLike) -> Rate:
-    """Check what was given for a kind, a chance or (chance, low, high), and fill in the usual extent.
+    """Check the value for a kind, a probability or (probability, low, high), and fill in the default extent.
 
     Raises:
-        FaultPlanError: a chance outside 0 to 1, or an extent that the kind cannot have.
+        FaultPlanError: a probability outside 0 to 1, or an invalid extent.
     """
     kind = KINDS[name]
     if not isinstance(given, tuple):
         return Rate(check_chance(name, given), kind.low, kind.high)
     if len(given) != 3:
-        raise FaultPlanError(f"{name} is {given!r}: give a chance, or the three of (chance, low, high)")
+        raise FaultPlanError(f"{name} must be a probability or (probability, low, high), not {given!r}")
     chance, low, high = given
     if not kind.unit:
-        raise FaultPlanError(f"{name} is {given!r}: {kind.doc} has no extent; give the chance alone")
+        raise FaultPlanError(f"{name}={given!r}: {name} has no extent; give only the probability")
     if not 0 <= low <= high < math.inf:
         raise FaultPlanError(
-            f"{name} goes from {low:g} to {high:g}: {kind.unit} from 0 on, the lower bound first"
+            f"{name} must have bounds of 0 {kind.unit} or more in ascending order, not {low:g} to {high:g}"
         )
     if kind.whole and (low < 1 or low % 1 or high % 1):
-        raise FaultPlanError(f"{name} goes from {low:g} to {high:g}: {kind.unit} are counted, 1 or more")
+        raise FaultPlanError(
+            f"{name} must have integer bounds of 1 {kind.unit} or more, not {low:g} to {high:g}"
+        )
     return Rate(check_chance(name, chance), low, high)
 
 
 def check_chance(name: str, given: float) -> float:
-    """Return a chance as it is if it is one.
+    """Return a probability after checking it.
 
     Raises:
         FaultPlanError: it is not from 0 to 1.
     """
     if not 0 <= given <= 1:
-        raise FaultPlanError(f"{name} is {given:g}: a chance is a number from 0 to 1, 0.02 for 2 %")
+        raise FaultPlanError(f"{name} must be a probability from 0 to 1, such as 0.02 for 2 %, not {given:g}")
     return float(given)
 
 
 def format_rate(name: str, rate: Rate) -> str:
-    """Return the text that is parsed to this rate again."""
+    """Return the text from which this rate is parsed."""
     kind = KINDS[name]
     usual = not kind.unit or (rate.low, rate.high) == (kind.low, kind.high)
     extent = "" if usual else f":{_short(rate.low)}-{_short(rate.high)}"

@@ -1,4 +1,4 @@
-"""What faults do to a transmission, and the account of them."""
+"""Effects of faults on a transmission, and their counts."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ Direction = Literal["to_slaves", "to_master"]
 
 
 class Disturbed(NamedTuple):
-    """What becomes of one transmission.
+    """One disturbed transmission.
 
     Attributes:
-        data: what is left of it, b"" for nothing.
-        lead: bytes lost at its head; they take their time all the same.
-        tail: bytes lost at its tail.
-        wait: seconds that it begins late.
-        again: seconds from its end until it is sent once more, None for never.
-        before: noise and strays that come first, one right behind the other.
-        after: noise and strays that follow, each with its seconds from the end.
+        data: the remaining bytes, b"" if none.
+        lead: number of bytes lost at its head, which still take line time.
+        tail: number of bytes lost at its tail.
+        wait: delay in seconds.
+        again: seconds from its end to its repetition, None without one.
+        before: noise and strays before it, without gaps.
+        after: noise and strays after it, each with the seconds from its end.
     """
 
     data: bytes
@@ -35,13 +35,13 @@ class Disturbed(NamedTuple):
 
 
 class Injected(NamedTuple):
-    """One fault that was injected.
+    """One injected fault.
 
     Attributes:
-        at: seconds, the time of the transmission that it befell.
+        at: time of the transmission in seconds.
         kind: name of the fault.
-        direction: where that transmission was going, "to_slaves" or "to_master".
-        data: the bytes concerned: lost, left, changed, repeated, or extra ones.
+        direction: direction of the transmission, "to_slaves" or "to_master".
+        data: the bytes concerned: lost, remaining, changed, repeated, or extra ones.
     """
 
     at: float
@@ -59,12 +59,12 @@ class PlainCounts(TypedDict):
 
 
 class FaultCounts:
-    """How often each kind of fault was injected.
+    """Counts of injected faults.
 
     Attributes:
-        to_slaves: by kind, in what the master sent.
-        to_master: by kind, in what slaves sent. "silent" counts the times of silence.
-        silenced: answers that were swallowed in times of silence, the first of each included.
+        to_slaves: by kind, in transmissions of the master.
+        to_master: by kind, in transmissions of slaves. "silent" counts periods of silence.
+        silenced: answers suppressed in periods of silence, including the first of each.
     """
 
     __slots__ = ("silenced", "to_master", "to_slaves")
@@ -80,7 +80,7 @@ class FaultCounts:
 
     @property
     def total(self) -> int:
-        """All faults of all kinds."""
+        """Number of faults of all kinds."""
         return sum(self.to_slaves.values()) + sum(self.to_master.values())
 
     def as_dict(self) -> PlainCounts:

@@ -15,29 +15,29 @@ _EXAMPLE = "write for example drop=0.01,flip=0.02,late=0.01:0.05-0.2,seed=3"
 
 
 class PlanText(NamedTuple):
-    """What a text says about a plan."""
+    """The parsed text of a plan."""
 
     rates: dict[str, RateLike]
     settings: dict[str, str]
 
 
 def parse_parts(text: str, settings: tuple[str, ...]) -> PlanText:
-    """Read the parts of a plan: rates, `all` spread over those not named, and settings as they stand.
+    """Parse the parts of a plan: rates, `all` spread over the kinds not listed, and settings as text.
 
     Raises:
-        FaultPlanError: a part that is no part, names nothing known, or comes twice.
+        FaultPlanError: a part is invalid, unknown, or duplicate.
     """
     found: dict[str, str] = {}
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or not name or not value:
             raise FaultPlanError(
-                f"{part.strip()!r} is no part of a fault plan: a part is NAME=VALUE; {_EXAMPLE}"
+                f"{part.strip()!r} is not a part of a fault plan: a part is NAME=VALUE; {_EXAMPLE}"
             )
         if name not in KINDS and name not in settings and name != "all":
-            raise FaultPlanError(f"{part.strip()!r}: there is no fault {name!r}; {_choices(name, settings)}")
+            raise FaultPlanError(f"{part.strip()!r}: unknown fault {name!r}; {_choices(name, settings)}")
         if name in found:
-            raise FaultPlanError(f"{part.strip()!r}: {name} was given before; keep one of the two")
+            raise FaultPlanError(f"{part.strip()!r}: duplicate {name}; keep one of the two")
         found[name] = value
     rates: dict[str, RateLike] = {}
     if "all" in found:
@@ -50,7 +50,7 @@ def parse_parts(text: str, settings: tuple[str, ...]) -> PlanText:
 def _choices(name: str, settings: tuple[str, ...]) -> str:
     known = [*KINDS, "all", *settings]
     close = difflib.get_close_matches(name, known, 1)
-    return f"did you mean {close[0]}?" if close else f"there are {', '.join(known)}"
+    return f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
 
 
 def _parse_rate(name: str, value: str) -> RateLike:
@@ -61,7 +61,7 @@ def _parse_rate(name: str, value: str) -> RateLike:
     if match is None:
         unit = KINDS[name].unit
         rule = (
-            f"behind the colon stands its extent in {unit}, LOW-HIGH or one number"
+            f"after the colon comes its extent in {unit}, LOW-HIGH or one number"
             if unit
             else "it has no extent"
         )
@@ -72,5 +72,7 @@ def _parse_rate(name: str, value: str) -> RateLike:
 
 def _parse_number(name: str, text: str) -> float:
     if not re.fullmatch(_NUMBER, text.strip()):
-        raise FaultPlanError(f"{name}={text}: a chance is a number from 0 to 1, 0.02 for 2 %; {_EXAMPLE}")
+        raise FaultPlanError(
+            f"{name}={text}: not a probability from 0 to 1, such as 0.02 for 2 %; {_EXAMPLE}"
+        )
     return float(text)

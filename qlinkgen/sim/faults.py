@@ -1,4 +1,4 @@
-"""What goes wrong on the line: how often, how badly, and the account of it."""
+"""Random faults of a line: probabilities, extents and counts."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from qlinkgen.sim.fault_text import parse_parts
 
 __all__ = ["KINDS", "TO_MASTER", "TO_SLAVES", "Disturbed", "FaultCounts", "FaultPlan", "Injected", "Rate"]
 
-# Noise that comes alone does so within this time, in seconds, after the transmission that it was drawn for.
+# Largest delay of separate noise after its transmission, in seconds.
 _ALONE_WITHIN = 0.01
-# How many earlier answers a stray frame is chosen from.
+# Number of recent answers from which a stray frame is chosen.
 _REMEMBERED = 64
 _SETTINGS = ("seed", "to")
 _DIRECTIONS = {"both": (TO_SLAVES, TO_MASTER), "slaves": (TO_SLAVES,), "master": (TO_MASTER,)}
 
 
 class _Side:
-    """The chances in one direction, with what is needed to draw them all by one number in most cases.
+    """The probabilities in one direction, with a table to draw all of them by one number in most cases.
 
     Attributes:
-        any: chance that at least one fault happens.
-        table: (kind, its chance, the chance that it or one behind it in the table happens).
+        any: probability of at least one fault.
+        table: (kind, its probability, the probability of it or any later kind).
     """
 
     __slots__ = ("any", "counts", "direction", "table")
@@ -44,18 +44,18 @@ class _Side:
 
 
 class FaultPlan:
-    """Random faults, each kind with its own chance in each transmission, drawn independently of the others.
+    """Random faults, each kind with its own probability per transmission, drawn independently.
 
-    Every plan has a stream of random numbers of its own: the same seed and the same traffic give the same
-    faults, bit for bit. A plan belongs to one line; `FaultPlan.parse(str(plan))` makes the same one anew.
+    Every plan has its own random numbers: the same seed and the same traffic give the same faults, bit for
+    bit. A plan belongs to one line; `FaultPlan.parse(str(plan))` makes an equal one.
 
     Attributes:
         rates: `Rate` of each kind.
-        seed: of the random numbers.
-        to: which way faults happen, "both", "slaves" or "master".
-        counts: what was injected so far. A fault that had no effect is not counted: what is dropped is not
-            damaged as well, a single byte is not truncated, and before the first answer there is no stray.
-        log: every `Injected` fault if the plan was asked to keep them, else None.
+        seed: seed of the random numbers.
+        to: direction of the faults, "both", "slaves" or "master".
+        counts: faults injected so far. Faults without effect are not counted: a dropped transmission is not
+            damaged as well, a single byte is not truncated, and a stray needs an earlier answer.
+        log: every `Injected` fault if `keep_log` was set, else None.
     """
 
     def __init__(
@@ -75,32 +75,32 @@ class FaultPlan:
         strays: Callable[[random.Random], bytes] | Sequence[bytes] = (),
         keep_log: bool = False,
     ) -> None:
-        """Give each kind a chance from 0 to 1, or (chance, low, high) with the bounds of its extent.
+        """Make a plan. Each kind has a probability from 0 to 1, or (probability, low, high) with its extent.
 
         Args:
             drop: nothing arrives.
             flip: 1 to 3 bits arrive changed; the extent is in bits.
             truncate: the tail is missing, in one case of four the head.
-            delay: it comes up to 0.1 ms late; the extent is in seconds.
-            late: a slave answers 0.05 to 0.2 s late, and what it sends next stays behind that; seconds.
-            duplicate: it is sent again after a gap of up to 1 ms; seconds.
-            stray: a valid frame comes unasked, before the transmission or behind it.
-            noise: 1 to 20 random bytes before it, behind it, or alone within the next 10 ms; the extent is
+            delay: delay of up to 0.1 ms; the extent is in seconds.
+            late: a slave answers 0.05 to 0.2 s late, with its next transmissions after that; seconds.
+            duplicate: repetition after a gap of up to 1 ms; seconds.
+            stray: an unsolicited valid frame before or after the transmission.
+            noise: 1 to 20 random bytes before it, after it, or alone within the next 10 ms; the extent is
                 in bytes.
             silent: from this answer on the slave sends nothing for 0.1 to 1 s; seconds.
-            to: "both", or only what is going to the "slaves" or to the "master".
-            seed: of the random numbers.
-            strays: frames to choose strays from, or a function that makes one from a random.Random; the
-                latest answers of all slaves unless given.
+            to: "both", or only transmissions to the "slaves" or to the "master".
+            seed: seed of the random numbers.
+            strays: frames to choose strays from, or a function that makes one from a random.Random; by
+                default the latest answers of all slaves.
             keep_log: keep every fault in `log`.
 
         Raises:
-            FaultPlanError: a chance, an extent or a direction that there is not.
+            FaultPlanError: a probability, an extent or a direction is invalid.
         """
         given = (drop, flip, truncate, delay, late, duplicate, stray, noise, silent)
         self.rates = {name: make_rate(name, rate) for name, rate in zip(KINDS, given, strict=True)}
         if to not in _DIRECTIONS:
-            raise FaultPlanError(f"to is {to!r}: faults go to one of {', '.join(_DIRECTIONS)}")
+            raise FaultPlanError(f"to must be one of {', '.join(_DIRECTIONS)}, not {to!r}")
         self.to = to
         self.seed = seed
         self.counts = FaultCounts()
@@ -121,22 +121,22 @@ class FaultPlan:
 
     @classmethod
     def parse(cls, text: str) -> FaultPlan:
-        """Make a plan of a text such as `drop=0.01,flip=0.02,late=0.01:0.05-0.2,seed=3`.
+        """Parse a text such as `drop=0.01,flip=0.02,late=0.01:0.05-0.2,seed=3`.
 
-        A part is a kind with its chance and, behind a colon, the bounds of its extent. `all=0.05` spreads 5 %
-        evenly over every kind that is not named itself. `seed=3` and `to=master` are the settings.
+        A part is a kind with its probability and, after a colon, the bounds of its extent. `all=0.05` spreads
+        5 % evenly over every kind not listed. `seed=3` and `to=master` are settings.
 
         Raises:
-            FaultPlanError: a part is wrong; the text says which, and what it may be.
+            FaultPlanError: a part is invalid.
         """
         rates, settings = parse_parts(text, _SETTINGS)
         seed = settings.get("seed", "0")
         if not re.fullmatch(r"[-+]?\d+", seed):
-            raise FaultPlanError(f"seed={seed}: a seed is a whole number; write for example seed=3")
+            raise FaultPlanError(f"seed={seed}: not an integer; write for example seed=3")
         return cls(**rates, to=settings.get("to", "both"), seed=int(seed))  # type: ignore[arg-type]
 
     def __str__(self) -> str:
-        """Return the text that makes this plan again; `strays` and `keep_log` have none."""
+        """Return the text from which this plan is parsed, without `strays` and `keep_log`."""
         parts = [format_rate(name, rate) for name, rate in self.rates.items() if rate.chance]
         if self.to != "both":
             parts.append(f"to={self.to}")
@@ -146,7 +146,7 @@ class FaultPlan:
         return f"FaultPlan({str(self)!r})"
 
     def disturb(self, data: bytes, now: float, source: str, *, to_master: bool) -> Disturbed | None:
-        """Return what becomes of a transmission, None where nothing happens to it. For the line alone."""
+        """Return the disturbed transmission, None if it is not disturbed. For use by the line only."""
         side = self._to_master if to_master else self._to_slaves
         what = None
         if self._silent_until and self._silent_until.get(source, now) > now:
@@ -188,8 +188,8 @@ class FaultPlan:
         return Disturbed(data, lead, tail, wait, again, before, after)
 
     def _draw(self, side: _Side) -> set[str]:
-        # At least one fault is known to happen, and up to the first hit each chance is the one given that
-        # knowledge: for the last kind it is 1.
+        # At least one fault happens; up to the first hit, probabilities are conditional on that: 1 for the
+        # last kind.
         hit: set[str] = set()
         for name, chance, this_or_later in side.table:
             if self._random.random() < (chance if hit else chance / this_or_later):

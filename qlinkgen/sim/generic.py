@@ -1,4 +1,4 @@
-"""A node of any protocol where one master asks and nodes answer: it knows the schema and nothing more."""
+"""A node of any protocol with a master, derived from the schema alone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from qlinkgen.link.codec import Codec, Framed, Message
 
-#: What a rule of a generated module is called, to its smallest legal value.
+#: Name of a rule class of a generated module to its smallest legal value.
 _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
     "IntRule": lambda rule: rule.ranges[0][0],
     "MaskRule": lambda rule: 0,  # noqa: ARG005
@@ -22,12 +22,12 @@ _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the modul
 class GenericNode:
     """Answers every command with the defaults of its response.
 
-    Fields that repeat the request do so, and those that a sender has to choose have their smallest legal
-    value. It remembers nothing: what is written to it cannot be read back.
+    Echoed fields repeat the request, and required fields have their smallest legal value. It has no state:
+    written values cannot be read back.
 
     Attributes:
-        number: address that it answers to; 0 where frames have none.
-        requests: how often it was asked.
+        number: address of the node; 0 for frames without one.
+        requests: number of requests.
     """
 
     def __init__(self, codec: Codec, number: int = 0) -> None:
@@ -41,7 +41,7 @@ class GenericNode:
             if command.response is not None
         }
 
-    def handle(self, request: Framed, now: float) -> Message | None:  # noqa: ARG002  # what stations are asked
+    def handle(self, request: Framed, now: float) -> Message | None:  # noqa: ARG002  # the interface of nodes
         """Return the response to a request; None if the command has none or is unknown."""
         self.requests += 1
         command = self._commands.get(type(request))
@@ -56,7 +56,7 @@ class GenericNode:
 
 
 def required_values(message: type[Message]) -> dict[str, object]:
-    """Return a legal value for each field of a message class that has no default; the address is left out."""
+    """Return a legal value for each field of a message class without a default, except the address."""
     rules = {rule.name: rule for rule in getattr(message, "RULES", ())}
     parameters = inspect.signature(message).parameters.values()
     return {

@@ -1,9 +1,9 @@
-"""A ring in real time whose places are simulated nodes and ports: any program joins it at a port.
+"""A ring in real time of simulated nodes and ports, which programs can join.
 
-`PortRing` takes the places in their order: nodes, and ports such as the master ends of ptys. What a program
-sends at a port goes to the place behind it, through faults and at the pace of the line; what comes from the
-place before is read there. `ring_bus` makes the ring of the command line: simulated nodes, and one pty for
-the outside between the last and the first.
+`PortRing` takes the places in order: nodes, and ports such as the master ends of ptys. Bytes sent by a
+program at a port go to the next place, with faults and at the speed of the line; bytes from the previous
+place can be read there. `ring_bus` makes the ring of the command line: simulated nodes, and one pty for the
+outside between the last and the first.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from qlinkgen.transport.pty import PtyPort, open_pty
 
 
 class PortPlace:
-    """A port as a station of the ring: what comes from the ring is written, what is read goes to the ring.
+    """A port as a station of the ring: writes bytes from the ring, sends bytes read into the ring.
 
     Attributes:
-        port: where a program is, directly or at the other end of a pty.
+        port: the port of a program, or the master end of its pty.
     """
 
     def __init__(self, port: Port) -> None:
@@ -38,21 +38,21 @@ class PortPlace:
         self._since = 0.0
 
     def receive(self, data: bytes, _now: float) -> None:
-        """Hand on what comes from the place before."""
+        """Write bytes from the previous place to the port."""
         self.port.write(data)
 
     def put(self, data: bytes, now: float) -> None:
-        """Take what the program at the port sends."""
+        """Take bytes sent by the program."""
         self._since = now
         self._waiting += data
 
     def bytes_to_send(self, _now: float) -> bytes:
-        """Return what goes to the next place."""
+        """Return the bytes for the next place."""
         data, self._waiting = self._waiting, b""
         return data
 
     def next_timer(self) -> float | None:
-        """Return when there was something to send."""
+        """Return the time of the oldest unsent bytes."""
         return self._since if self._waiting else None
 
 
@@ -62,7 +62,7 @@ class PortRing(PtyBus):
     Attributes:
         nodes: the simulated nodes, in the order of the ring.
         ports: the ports, in the order of the ring.
-        paths: what a program opens to join the ring at each port.
+        paths: device names for programs, of each port.
     """
 
     def __init__(
@@ -71,24 +71,24 @@ class PortRing(PtyBus):
         """Make a ring.
 
         Args:
-            places: nodes or their kinds, such as "keypad"; and for programs ports with a descriptor, or
-                "port" for a new pty.
-            baud: bits a second, or None: bytes take no time.
-            faults: a plan for all hops, or plans by the number of the place that the hop leads away from.
+            places: nodes or their kinds, such as "keypad"; for programs, ports with a descriptor, or "port"
+                for a new pty.
+            baud: bits per second, or None for an unpaced ring.
+            faults: a plan for all hops, or plans by the number of the place before the hop.
 
         Raises:
-            PortError: there is no pty to be had.
+            PortError: a pty cannot be opened.
             SimulationError: no port among the places, more than 15 places, or a port without a descriptor.
         """
         self.nodes: list[Node] = []
         self.ports: list[Port] = []
         self._places: list[PortPlace] = []
         wire = RingWire(trio, baud=baud, faults=faults, outside=False)
-        with contextlib.ExitStack() as opened:  # closes new ptys where the ring can not be made
+        with contextlib.ExitStack() as opened:  # closes new ptys if an error occurs
             for number, place in enumerate(places):
                 wire.attach(self._engine(place, baud, opened), f"place {number}")
             if not self.ports:
-                raise SimulationError("no place of the ring is a port: where all are nodes, use VirtualRing")
+                raise SimulationError("the ring has no port; use VirtualRing for a ring of nodes")
             descriptors = [_descriptor(port) for port in self.ports]
             super().__init__(wire, port=self.ports[0])
             opened.pop_all()
@@ -96,7 +96,7 @@ class PortRing(PtyBus):
         self._look = make_looker(*descriptors, self._waker.descriptor)
 
     def _engine(self, place: str | Node | Port, baud: int | None, opened: contextlib.ExitStack) -> Engine:
-        """Take what stands at a place."""
+        """Return the engine of a place."""
         if place == "port":
             place = opened.enter_context(open_pty(baud=baud or 115200))
         if isinstance(place, Port):
@@ -131,7 +131,7 @@ class PortRing(PtyBus):
 def _descriptor(port: Port) -> int:
     descriptor = port.fileno()
     if descriptor is None:
-        raise SimulationError(f"{port.name} has no descriptor to wait for: use a pty or a serial port")
+        raise SimulationError(f"{port.name} has no descriptor to wait on; use a pty or a serial port")
     return descriptor
 
 
@@ -159,22 +159,22 @@ def ring_bus(
     faults: Faults = None,
     **options: Unpack[RingOptions],
 ) -> RingBus:
-    """Put simulated nodes on a ring, and the outside at a new pty.
+    """Make a ring of simulated nodes, with the outside on a new pty.
 
-    Seen from the outside the first node is the next one: number 10 in BASIC, address 1 on the wire.
+    For the outside the first node is the next one: number 10 in BASIC, address 1 on the wire.
 
     Args:
         ring: kinds such as "coordinator,keypad,coordinator", or nodes, at most 14.
         link: path of a symbolic link to the pty, so that its name is known beforehand.
-        baud: bits a second, or None: bytes take no time.
-        faults: a plan for all hops, or plans by the number of the node that the hop leads away from; the
-            outside has the last number.
-        options: for each node that is made here; see `RingNode`.
+        baud: bits per second, or None for an unpaced ring.
+        faults: a plan for all hops, or plans by the number of the node before the hop; the outside has the
+            last number.
+        options: options of each new node; see `RingNode`.
 
     Raises:
         PortError: the link cannot be made.
         CapabilityMissing: this system has no ptys.
-        SimulationError: an argument out of its range.
+        SimulationError: an argument is out of range.
     """
     nodes = make_nodes(ring, baud=baud, **options)
     wire = RingWire(trio, baud=baud, faults=faults)

@@ -1,7 +1,7 @@
-"""Several programs on one virtual clock: each in a thread, and only one at a time, always in the same order.
+"""Several programs on one virtual clock: each in a thread, one at a time, in a fixed order.
 
-A program runs until it has to wait. When all of them wait, the clock goes on to the next event, and each
-looks whether that was what it waits for. So plain blocking code runs on simulated time, the same every time.
+A program runs until it has to wait. When all of them wait, the clock advances to the next event, and each
+checks its condition. So plain blocking code runs on simulated time, deterministically.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 
 
 class _Program(threading.Thread):
-    """One program, and the baton that lets it run."""
+    """One program, and the semaphore that lets it run."""
 
     def __init__(self, owner: Programs, name: str, function: Callable[[], None]) -> None:
         super().__init__(name=name, daemon=True)
@@ -43,10 +43,11 @@ class _Program(threading.Thread):
 
 
 class Programs:
-    """Runs programs side by side on a clock that others move.
+    """Runs programs concurrently on a simulated clock.
 
     Args:
-        advance: goes on to the next event, but not beyond a time; False where nothing will ever happen.
+        advance: advances to the next event, at most to a given time; returns False if there are no more
+            events.
     """
 
     def __init__(self, advance: Callable[[float], bool]) -> None:
@@ -57,14 +58,14 @@ class Programs:
         self._stuck = False
 
     def run(self, functions: Sequence[Callable[[], Result]]) -> list[Result]:
-        """Run all programs to their ends; return what they return.
+        """Run all programs to their ends; return their results.
 
         Raises:
-            SimulationError: all of them wait for something that will never happen.
-            BaseException: what the first of them that failed has raised; the others are stopped.
+            SimulationError: deadlock: all of them wait, and there are no more events.
+            BaseException: the exception of the first failed program; the others are stopped.
         """
         if self._programs:
-            raise SimulationError("programs are running already: start them all with one call of run")
+            raise SimulationError("programs are already running; start all of them with one call of run")
         self._stopping = self._stuck = False
         results: dict[int, Result] = {}
 
@@ -89,10 +90,10 @@ class Programs:
         return [results[place] for place in range(len(programs))]
 
     def give_way(self, due: float) -> None:
-        """Wait until something has happened, at the latest until `due`.
+        """Wait for an event, at the latest until `due`.
 
         Raises:
-            SimulationError: nothing will ever happen, or another program has failed.
+            SimulationError: there are no more events, or another program has failed.
         """
         program = self._running
         if program is None or threading.current_thread() is not program:
@@ -106,18 +107,18 @@ class Programs:
         self.check()
 
     def check(self) -> None:
-        """Raise what ends a program that others have stopped."""
+        """Raise the exception that ends a stopped program."""
         if self._stuck:
             raise _nothing_happens()
         if self._stopping:
-            raise _Stopped("another program has failed, so this one was stopped")
+            raise _Stopped("stopped because another program has failed")
 
     def stop(self) -> None:
         """End all programs as soon as they wait."""
         self._stopping = True
 
     def pass_on(self, program: _Program) -> None:
-        """Let the next program run; after the last one has had its turn, time goes on."""
+        """Let the next program run; after the last one, advance the time."""
         programs = self._programs
         at = programs.index(program)
         following = [each for each in programs[at + 1 :] if not each.ended]
@@ -127,7 +128,7 @@ class Programs:
         alive = [each for each in programs if not each.ended]
         if not alive:
             return
-        # A program that has ended may have done something right before: let everybody look first.
+        # A program may have acted just before its end: let all others check their conditions first.
         if not self._stopping and not program.ended and not self._advance(min(each.due for each in alive)):
             self._stuck = self._stopping = True
         self._hand(alive[0])
@@ -138,11 +139,11 @@ class Programs:
 
 
 class _Stopped(SimulationError):
-    """A program was ended since another one has failed."""
+    """A program was stopped because another one has failed."""
 
 
 def _nothing_happens() -> SimulationError:
     return SimulationError(
-        "everybody waits, and nothing is going to happen: give a timeout, or look for the message that was "
-        "never sent, or went to another node"
+        "deadlock: all programs wait, and there are no more events; use a timeout, or look for a message "
+        "that was not sent, or was sent to another node"
     )

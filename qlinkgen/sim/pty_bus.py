@@ -1,4 +1,4 @@
-"""A simulated line behind a pty: any program opens it as a serial port, in real time."""
+"""A simulated line on a pty, which programs open as a serial port, in real time."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from qlinkgen.transport.port import Port
 from qlinkgen.transport.pty import open_pty
 from qlinkgen.transport.waker import Waker
 
-# `select` oversleeps by about 60 us, more than half a byte time at 115200 baud. The last stretch before
-# something is due, in seconds, is therefore waited for by looking again and again.
+# `select` oversleeps by about 60 us, more than half a byte time at 115200 baud. The last part of a wait, in
+# seconds, is therefore done by polling.
 _SPIN = 80e-6
 # `select` takes no descriptor from here on (FD_SETSIZE).
 _SELECT_LIMIT = 1024
@@ -31,14 +31,14 @@ class PtyBus:
 
     For the command line: `run` in the main thread, `request_stop` from a signal handler, `close` at the end.
     In a test: `with PtyBus(wire) as bus:` runs it in a thread. The line belongs to the thread that runs it;
-    what another thread wants to do with it goes through `call`.
+    other threads access it through `call`.
 
-    A line with a baud is paced: chunks="byte" spreads the bytes of an answer like a UART would.
+    A line with a baud is paced: chunks="byte" spreads the bytes of an answer like a UART.
 
     Attributes:
         wire: the line.
-        port: our end of it.
-        path: device name of the other end, for the program under test.
+        port: the master end of the pty.
+        path: device name of the slave end, for the program under test.
     """
 
     def __init__(
@@ -48,14 +48,13 @@ class PtyBus:
 
         Args:
             wire: the line, with its stations.
-            link: path of a symbolic link to the other end, so that its name is known beforehand.
-            port: use this port in place of a new pty, such as that of a real adapter; it must have a
-                descriptor.
+            link: path of a symbolic link to the slave end, so that its name is known beforehand.
+            port: use this port instead of a new pty, such as a real adapter; it must have a descriptor.
 
         Raises:
             PortError: the link cannot be made.
             CapabilityMissing: this system has no ptys.
-            SimulationError: the port has no descriptor to wait for.
+            SimulationError: the port has no descriptor to wait on.
         """
         self.wire = wire
         self.port = port or open_pty(link, baud=wire.baud or 115200)
@@ -63,7 +62,7 @@ class PtyBus:
         descriptor = self.port.fileno()
         if descriptor is None:
             raise SimulationError(
-                f"{self.port.name} has no descriptor to wait for: use a pty or a serial port"
+                f"{self.port.name} has no descriptor to wait on; use a pty or a serial port"
             )
         self._waker = Waker()
         self._look = make_looker(descriptor, self._waker.descriptor)
@@ -79,7 +78,7 @@ class PtyBus:
         """Run the line in this thread until `request_stop` is called.
 
         Raises:
-            PortLost: a port went away, or was closed.
+            PortLost: a port was lost or closed.
         """
         with self._running, contextlib.ExitStack() as held:
             for port in self._all_ports():
@@ -104,14 +103,14 @@ class PtyBus:
                     self._answer_calls()
 
     def _wait(self, due: float | None) -> bool:
-        """Return whether there is something to read, at the latest when `due` has come."""
+        """Return whether there are bytes to read, at the latest at `due`."""
         look, clock = self._look, self.port.now
         if due is None:
             return look(None)
         left = due - clock()
         if left > _SPIN and look(left - _SPIN):
             return True
-        while not look(0.0):  # once at least: what is due all the time must not hide what comes in
+        while not look(0.0):  # at least once, so that permanently due events do not block reading
             if clock() >= due:
                 return False
         return True
@@ -122,23 +121,23 @@ class PtyBus:
             self._calls.popleft()()
 
     def request_stop(self) -> None:
-        """Let `run` return at once; for any thread, for a signal handler, and also before `run` begins."""
+        """Make `run` return immediately; for any thread and signal handlers, also before `run` begins."""
         self._stopping = True
         self._waker.wake()
 
     def call(self, function: Callable[[], object]) -> None:
-        """Let the thread that runs the line call a function soon, such as one that detaches a station."""
+        """Make the thread that runs the line call a function, such as one that detaches a station."""
         self._calls.append(function)
         self._waker.wake()
 
     def start(self) -> Self:
-        """Run the line in a thread of its own.
+        """Run the line in a separate thread.
 
         Raises:
-            SimulationError: it runs already, or was stopped.
+            SimulationError: it is already running, or was stopped.
         """
         if self._thread is not None or self._stopping:
-            raise SimulationError(f"the bus at {self.path} was started before: make a new one")
+            raise SimulationError(f"the bus at {self.path} was already started; make a new one")
         self._thread = threading.Thread(target=self._run_thread, name=f"bus {self.path}", daemon=True)
         self._thread.start()
         return self
@@ -148,7 +147,7 @@ class PtyBus:
             self.run()
 
     def stop(self) -> None:
-        """Stop the line, wait for its thread, and raise here what made it fail there, if anything."""
+        """Stop the line, wait for its thread, and raise its exception, if any."""
         self.request_stop()
         if self._thread is not None:
             self._thread.join()
@@ -157,7 +156,7 @@ class PtyBus:
             raise failure
 
     def close(self) -> None:
-        """Stop the line, wherever it runs, and close the pty. Closing twice does no harm."""
+        """Stop the line in any thread, and close the pty. Closing twice is allowed."""
         if self._closed:
             return
         try:
@@ -174,7 +173,7 @@ class PtyBus:
         self._running = threading.RLock()
 
     def fail(self, failure: BaseException) -> None:
-        """Keep a failure for `stop` to raise."""
+        """Keep an exception for `stop` to raise."""
         self._failure = failure
 
     def __enter__(self) -> Self:
@@ -187,11 +186,11 @@ class PtyBus:
 
 
 def make_looker(*descriptors: int) -> Callable[[float | None], bool]:
-    """Return a function that waits until one of these can be read, at most some seconds, or without end."""
+    """Return a function that waits until one of these can be read, with an optional timeout."""
     if max(descriptors) < _SELECT_LIMIT:
         return lambda seconds: bool(select.select(descriptors, (), (), seconds)[0])
     poll = select.poll()
     for descriptor in descriptors:
         poll.register(descriptor, select.POLLIN)
-    # Whole milliseconds, rounded down: the rest is waited for by looking again.
+    # Whole milliseconds, rounded down: the rest is polled.
     return lambda seconds: bool(poll.poll(None if seconds is None else int(seconds * 1000)))

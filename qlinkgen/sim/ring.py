@@ -1,12 +1,12 @@
-"""A ring as a model of discrete events: each node hears the one before it, and nobody else.
+"""A discrete-event model of a ring: each node hears only the previous one.
 
-It is the line of `wire.py` with other routes. The nodes stand in the order in which they were attached; the
-outside, where the program under test is, stands between the last one and the first. Without an outside the
-last node feeds the first.
+It is the line of `wire.py` with other routes. The nodes are in the order in which they were attached; the
+outside, with the program under test, is between the last one and the first. Without an outside the last node
+is connected to the first.
 
-Hop `i` is the fibre that leads away from place `i`; the outside's place is the last. A `FaultPlan` on a hop
-disturbs whole messages: it collects one before it lets it go on, so on a hop with a plan every message is
-late by its own length. A hop without one hands on each byte as it comes.
+Hop `i` is the fibre from place `i` to the next; the outside's place is the last. A `FaultPlan` on a hop
+disturbs whole messages: it collects a message before forwarding it, so on a hop with a plan every message is
+delayed by its own length. A hop without one forwards each byte immediately.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from qlinkgen.sim.faults import FaultPlan
 from qlinkgen.sim.traffic import Chunk, Engine, Route, Sender
 from qlinkgen.sim.wire import LINE, Chunks, Wire
 
-#: Plans for all hops together, or for some of them by the number of the place that they lead away from.
+#: A plan for all hops, or plans by the number of the place before the hop.
 Faults = FaultPlan | Mapping[int, FaultPlan] | None
 
 
@@ -27,8 +27,8 @@ class _Hop:
     """One fibre.
 
     Attributes:
-        line: sends what is on it by itself, such as noise.
-        held: bytes of a message that is not complete yet.
+        line: sender of bytes without a station, such as noise.
+        held: bytes of an incomplete message.
     """
 
     __slots__ = ("held", "line")
@@ -42,7 +42,7 @@ class RingWire(Wire):
     """The fibres of a ring, and the nodes at them.
 
     Attributes:
-        lost: bytes that were sent to a node that is switched off.
+        lost: number of bytes sent to switched-off nodes.
     """
 
     def __init__(
@@ -57,14 +57,14 @@ class RingWire(Wire):
         """Make a ring without nodes.
 
         Args:
-            codec: the generated module of the protocol, which knows where a message begins and ends.
-            baud: bits a second, or None: what is sent arrives at once.
-            faults: what goes wrong on all hops, or on some.
-            chunks: see `Wire`; "byte" where bytes take their time, else "frame".
-            outside: there is a place for the program under test.
+            codec: the generated module of the protocol, for the boundaries of messages.
+            baud: bits per second, or None: bytes arrive immediately.
+            faults: a plan for all hops, or plans for some.
+            chunks: see `Wire`; by default "byte" on a paced ring, else "frame".
+            outside: add a place for the program under test.
 
         Raises:
-            SimulationError: an argument out of range.
+            SimulationError: an argument is out of range.
         """
         self._marking = codec.MARKING
         self._plans: Mapping[int, FaultPlan] = faults if isinstance(faults, Mapping) else {}
@@ -93,16 +93,16 @@ class RingWire(Wire):
                 route.outside = after is self._outside
                 route.on_line = True
         self._places = places
-        most = self._marking.address_mask  # there is no address for another one
+        most = self._marking.address_mask  # limited by the addresses
         if len(places) > most:
-            raise SimulationError(f"{len(places)} places, the outside's included: a ring has {most} at most")
+            raise SimulationError(f"{len(places)} places, including the outside's; a ring has at most {most}")
 
     def plan(self, hop: int) -> FaultPlan | None:
-        """Return what goes wrong on a hop."""
+        """Return the fault plan of a hop."""
         return self._plans.get(hop, self.faults)
 
     def switch_off(self, engine: Engine) -> None:
-        """Switch a node off: it hears and sends nothing, so the ring is open at its place.
+        """Switch a node off: it neither receives nor sends, so the ring is open at its place.
 
         Raises:
             SimulationError: it is not on this ring.
@@ -113,7 +113,7 @@ class RingWire(Wire):
         self._connect()
 
     def switch_on(self, engine: Engine) -> None:
-        """Switch a node on again. What it forgets meanwhile is for the caller to reset.
+        """Switch a node on again. The caller has to reset its volatile state.
 
         Raises:
             SimulationError: it is not on this ring.
@@ -128,10 +128,10 @@ class RingWire(Wire):
             super()._watch(station)
 
     def step(self, until: float) -> bool:
-        """Go on to the next event, but not beyond `until`; False where there is none before it ends.
+        """Advance to the next event, at most to `until`; return False if there is none before that.
 
         Raises:
-            SimulationError: stations answer one another without end.
+            SimulationError: stations answer one another endlessly.
         """
         due = self.next_timer()
         if due is not None and due <= until:
@@ -144,7 +144,7 @@ class RingWire(Wire):
 
     @property
     def now(self) -> float:
-        """The time up to which everything has happened."""
+        """The current time of the simulation."""
         return self._now
 
     # what is on a hop
@@ -165,7 +165,7 @@ class RingWire(Wire):
                 self._send_disturbed(station, None, now, what)
 
     def _whole(self, hop: _Hop, data: bytes) -> Iterator[bytes]:
-        """Yield each message when its end has come, and what stands in front of a header."""
+        """Yield each complete message, and bytes before a header."""
         marking = self._marking
         for byte in data:
             if not byte & marking.marker:

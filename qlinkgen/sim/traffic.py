@@ -1,4 +1,4 @@
-"""What moves on a line: who sends, who hears, and the bytes on their way. Internal to the simulation."""
+"""Senders, routes and bytes in transit on a line. Internal to the simulation."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from typing import Protocol
 
 
 class Engine(Protocol):
-    """What a line needs of a station: a sans-IO engine of `qlinkgen.link`, or anything of that shape."""
+    """The interface of stations: a sans-IO engine of `qlinkgen.link`, or a similar object."""
 
     def receive(self, data: bytes, now: float, /) -> object:
-        """Hear bytes whose last one arrived at `now`."""
+        """Process bytes, the last of which arrived at `now`."""
 
     def bytes_to_send(self, now: float, /) -> bytes:
-        """Return what goes on the line now, b"" while nothing is due."""
+        """Return the bytes to send now, b"" if none are due."""
 
     def next_timer(self) -> float | None:
-        """Return when `bytes_to_send` will have something, None while it will not."""
+        """Return the time of the next call of `bytes_to_send`, None if none is needed."""
 
 
 class Sender:
-    """Who sends: a station, or without an engine the outside or the line itself."""
+    """A sender: a station, or without an engine the outside or the line itself."""
 
     __slots__ = (
         "bytes_to_send",
@@ -38,8 +38,8 @@ class Sender:
         self.name = name
         self.engine = engine
         self.hears_stations = hears_stations
-        self.due: float | None = None  # the timer of the engine that stands in the queue of events
-        self.free = -math.inf  # when all that it has to send will have been sent
+        self.due: float | None = None  # the queued timer of the engine
+        self.free = -math.inf  # end of its queued transmissions
         self.route = Route(self, ())
         if engine is not None:  # bound once: these are called for every chunk
             self.receive = engine.receive
@@ -48,7 +48,7 @@ class Sender:
 
 
 class Route:
-    """Who hears what a sender sends: these stations, and the outside or not."""
+    """Receivers of a sender's transmissions: stations, and the outside or not."""
 
     __slots__ = ("hearers", "on_line", "outside", "sender")
 
@@ -58,11 +58,11 @@ class Route:
         self.sender = sender
         self.hearers = hearers
         self.outside = outside
-        self.on_line = on_line  # an echo is not: it comes from the adapter
+        self.on_line = on_line  # not so for an echo, which the adapter makes
 
 
 class Chunk:
-    """Bytes that are sent without a gap."""
+    """Bytes sent without a gap."""
 
     __slots__ = ("begin", "data", "end", "hits", "lead", "order", "own", "position", "route", "stop", "tail")
 
@@ -71,16 +71,16 @@ class Chunk:
     ) -> None:
         self.route = route
         self.data = data
-        self.own = own  # what its sender hears of it, where there is an echo
-        self.lead = lead  # byte times that pass before its first byte
-        self.tail = tail  # and behind its last one, while the sender is still busy
+        self.own = own  # its echo for the sender, if any
+        self.lead = lead  # byte times before its first byte
+        self.tail = tail  # and after its last one, while the sender is still busy
         self.begin = self.end = 0.0
         self.order = 0
-        self.position = self.stop = 0  # of the piece that arrives next
-        self.hits: set[int] | None = None  # bytes that met another sender
+        self.position = self.stop = 0  # bounds of the next piece to arrive
+        self.hits: set[int] | None = None  # indices of collided bytes
 
     def mark(self, begin: float, end: float, byte_time: float, harmless: float) -> None:
-        """Remember the bytes that another sender meets from `begin` to `end`."""
+        """Record the bytes that collide with another sender from `begin` to `end`."""
         first = int((begin - self.begin + harmless) / byte_time)
         last = math.ceil((end - self.begin - harmless) / byte_time)
         self.hits = (self.hits or set()) | set(range(first, last))

@@ -1,4 +1,4 @@
-"""A port on a simulated line with a clock of its own: hours of bus time in seconds, the same every time."""
+"""A port on a simulated line with a virtual clock: fast and deterministic."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from qlinkgen.transport.port import Ability, Capabilities, Port, closed_here
 
 
 class VirtualPort(Port):
-    """The outside's port on a `Wire`. Time moves only while it reads or sleeps, and never by the real clock.
+    """The outside's port on a `Wire`. Time advances only in `read` and `sleep`, independently of real time.
 
     Attributes:
         wire: the line.
@@ -32,20 +32,20 @@ class VirtualPort(Port):
         """Open the port.
 
         Args:
-            wire: the line; one port for each.
-            baud: speed for the arithmetic of a driver; that of the line if it has one, else 115200.
-            reaction: seconds the host needs from the arrival of bytes until it has them in hand; one number,
-                or the two that it is drawn between.
-            seed: of the draws.
-            start: the time at which the clock begins, in seconds.
-            name: for error texts.
+            wire: the line; it has one port.
+            baud: nominal speed; that of the line if it has one, else 115200.
+            reaction: seconds from the arrival of bytes until the host can read them; one number, or the
+                bounds of a random one.
+            seed: seed of the random numbers.
+            start: initial time of the clock, in seconds.
+            name: name in error texts.
 
         Raises:
-            SimulationError: a reaction below 0 or without end, or the greater of the two first.
+            SimulationError: a negative or infinite reaction, or bounds in the wrong order.
         """
         low, high = reaction if isinstance(reaction, tuple) else (reaction, reaction)
         if not 0 <= low <= high < math.inf:
-            raise SimulationError(f"reaction is {reaction}: seconds from 0 on, the lower bound first")
+            raise SimulationError(f"reaction must be 0 s or more, the lower bound first, not {reaction}")
         self.wire = wire
         self.name = name
         self.baud = baud or wire.baud or 115200
@@ -68,13 +68,13 @@ class VirtualPort(Port):
         return self._now
 
     def read(self, timeout: float) -> bytes:
-        """Return what has come, or let time pass until something comes, at most `timeout` seconds.
+        """Return received bytes, or let time pass until some arrive, at most `timeout` seconds.
 
-        Returns b"" when nothing came; the clock has then moved by exactly `timeout`.
+        Returns b"" if none arrived; the clock has then advanced by exactly `timeout`.
 
         Raises:
             PortLost: the port was closed.
-            SimulationError: an endless timeout, and nothing that could ever end it.
+            SimulationError: an infinite timeout without any pending event.
         """
         self._check_open()
         data = self._take(self._now)
@@ -87,14 +87,14 @@ class VirtualPort(Port):
             return self._take(self._now)
         if not end < math.inf:
             raise SimulationError(
-                f"{self.name}: read with a timeout of {timeout} s, but nobody on the line is going to send: "
-                "it would never return; give a timeout that ends, or send first"
+                f"{self.name}: read with a timeout of {timeout} s would never return, as no station is going "
+                "to send; use a finite timeout, or send first"
             )
         self._now = end
         return b""
 
     def write(self, data: bytes) -> None:
-        """Send. The clock does not move: the bytes are on their way when this returns.
+        """Send. The clock does not advance: the bytes are in transit when this returns.
 
         Raises:
             PortLost: the port was closed.
@@ -103,20 +103,20 @@ class VirtualPort(Port):
         self.wire.transmit(data, self._now)
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass. What arrives meanwhile waits to be read.
+        """Let time pass. Bytes arriving meanwhile can be read afterwards.
 
         Raises:
             PortLost: the port was closed.
-            SimulationError: less than 0 seconds, or endless ones.
+            SimulationError: negative or infinite seconds.
         """
         self._check_open()
         if not 0 <= seconds < math.inf:
-            raise SimulationError(f"{self.name}: sleep of {seconds} s: it must be 0 or more, and end")
+            raise SimulationError(f"{self.name}: sleep must be 0 s or more and finite, not {seconds}")
         self._now += seconds
         self.wire.advance(self._now)
 
     def close(self) -> None:
-        """Close the port; the line goes on without it. Closing twice does no harm."""
+        """Close the port; the line continues without it. Closing twice is allowed."""
         self._closed = True
 
     def _check_open(self) -> None:

@@ -1,4 +1,4 @@
-"""A whole ring on a virtual clock: nodes, fibres, faults, and the programs on the nodes."""
+"""A ring on a virtual clock: nodes, fibres, faults, and the programs on the nodes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _passive(**options: Unpack[NodeOptions]) -> RingNode:
     return RingNode(**options)
 
 
-#: Makes a node of each kind that a ring can be described with; options are those of `RingNode`.
+#: Kind of node to its constructor; options are those of `RingNode`.
 KINDS: dict[str, Callable[..., Node]] = {
     "coordinator": CoordinatorNode,
     "keypad": KeypadNode,
@@ -42,10 +42,10 @@ def make_nodes(ring: str | Iterable[str | Node], **options: Unpack[NodeOptions])
 
     Args:
         ring: kinds such as "coordinator,keypad,coordinator", or nodes, or both in a list.
-        options: for each node that is made here; see `RingNode`.
+        options: options of each new node; see `RingNode`.
 
     Raises:
-        SimulationError: there is no such kind, or no node at all.
+        SimulationError: a kind is unknown, or the ring is empty.
     """
     parts = ring.split(",") if isinstance(ring, str) else ring
     nodes = [_make(part.strip(), options) if isinstance(part, str) else part for part in parts]
@@ -56,12 +56,12 @@ def make_nodes(ring: str | Iterable[str | Node], **options: Unpack[NodeOptions])
 
 def _make(kind: str, options: NodeOptions) -> Node:
     if kind not in KINDS:
-        raise SimulationError(f"there is no node of the kind {kind!r}; a ring is made of {', '.join(KINDS)}")
+        raise SimulationError(f"unknown kind of node {kind!r}; kinds are {', '.join(KINDS)}")
     return KINDS[kind](**options)
 
 
 class VirtualRing:
-    """A closed ring of simulated nodes. Time passes only while a program waits, or in `sleep` and `settle`.
+    """A closed ring of simulated nodes. Time advances only while a program waits, or in `sleep` and `settle`.
 
     Attributes:
         nodes: the behaviours, in the order of the ring.
@@ -80,12 +80,12 @@ class VirtualRing:
 
         Args:
             ring: see `make_nodes`; at most 15 nodes.
-            baud: bits a second, or None: bytes take no time.
-            faults: a plan for all hops, or plans by the number of the node that the hop leads away from.
-            options: for each node that is made here; see `RingNode`.
+            baud: bits per second, or None for an unpaced ring.
+            faults: a plan for all hops, or plans by the number of the node before the hop.
+            options: options of each new node; see `RingNode`.
 
         Raises:
-            SimulationError: an argument out of its range.
+            SimulationError: an argument is out of range.
         """
         self.nodes = make_nodes(ring, baud=baud, **options)
         self.wire = RingWire(trio, baud=baud, faults=faults, outside=False)
@@ -124,16 +124,16 @@ class VirtualRing:
     def _node(self, place: int, kind: type[T]) -> T:
         node = self.nodes[place]
         if not isinstance(node, kind):
-            raise SimulationError(f"node {place} is no {kind.__name__} but a {type(node).__name__}")
+            raise SimulationError(f"node {place} is a {type(node).__name__}, not a {kind.__name__}")
         return node
 
     # time
 
     def run(self, *programs: Callable[[], T]) -> list[T]:
-        """Run blocking programs side by side to their ends; return what they return.
+        """Run blocking programs concurrently to their ends; return their results.
 
         Raises:
-            SimulationError: all of them wait for something that will never happen.
+            SimulationError: deadlock: all of them wait, and there are no more events.
         """
         return self._programs.run(programs)
 
@@ -146,7 +146,7 @@ class VirtualRing:
         self.wire.advance(self.now + seconds)
 
     def settle(self, limit: float = math.inf) -> None:
-        """Go on until nothing is under way any more, or `limit` seconds have passed."""
+        """Advance until no message is in transit, or for `limit` seconds."""
         end = self.now + limit
         while self.wire.step(end) and self.now < end:
             pass
@@ -154,18 +154,18 @@ class VirtualRing:
     # nodes
 
     def switch_off(self, place: int) -> None:
-        """Switch a node off: the ring is open there, and everything that would have to pass it is lost."""
+        """Switch a node off: the ring is open there, and messages passing it are lost."""
         self.wire.switch_off(engine_of(self.nodes[place]))
 
     def switch_on(self, place: int) -> None:
-        """Switch a node on again; a keypad has lost its offset, a Motion Coordinator what it had received."""
+        """Switch a node on again; a keypad loses its offset, a Motion Coordinator its receive buffer."""
         node = self.nodes[place]
         node.reset()
         self.wire.switch_on(engine_of(node))
 
 
 class HostedNode(RingDriver):
-    """Lets a blocking program use a node of a `VirtualRing`."""
+    """Driver of a node of a `VirtualRing` for blocking programs."""
 
     def __init__(self, ring: VirtualRing, node: Node) -> None:
         self.node = engine_of(node)
@@ -185,7 +185,7 @@ class HostedNode(RingDriver):
         """See `RingDriver.until`.
 
         Raises:
-            SimulationError: nothing will ever happen.
+            SimulationError: there are no more events.
         """
         ring = self._ring
         due = math.inf if timeout is None else ring.now + timeout
@@ -201,7 +201,7 @@ class HostedNode(RingDriver):
         self._ring.give_way(self._ring.now + GIVE_WAY)
 
     def pause(self, seconds: float) -> None:
-        """Let time pass on the virtual clock."""
+        """Sleep on the virtual clock."""
         self.until(lambda _now: None, seconds)
 
     def close(self) -> None:
@@ -209,7 +209,7 @@ class HostedNode(RingDriver):
 
 
 class AsyncHostedNode(AsyncRingDriver):
-    """Lets tasks use a node of a `VirtualRing`."""
+    """Driver of a node of a `VirtualRing` for asyncio."""
 
     def __init__(self, ring: VirtualRing, node: Node) -> None:
         self.node = engine_of(node)
@@ -225,10 +225,10 @@ class AsyncHostedNode(AsyncRingDriver):
         return self._driver.act(function)
 
     async def until(self, attempt: Callable[[float], T | None], timeout: float | None) -> T | None:
-        """See `RingDriver.until`; other tasks get their turn after each event.
+        """See `RingDriver.until`; other tasks run after each event.
 
         Raises:
-            SimulationError: nothing will ever happen, and there is no timeout.
+            SimulationError: there are no more events, and no timeout.
         """
         ring = self._ring
         due = math.inf if timeout is None else ring.now + timeout
@@ -237,10 +237,10 @@ class AsyncHostedNode(AsyncRingDriver):
             if ring.now >= due:
                 return None
             await asyncio.sleep(0)
-            # Other tasks may be about to send: only when nobody has for a while will nobody ever.
+            # Other tasks may be about to send: deadlock only after they had some turns.
             idle = 0 if ring.wire.step(due) else idle + 1
             if idle > _IDLE_ROUNDS:
-                raise SimulationError("nothing is going to happen on the ring: give a timeout, or send first")
+                raise SimulationError("there are no more events on the ring; use a timeout, or send first")
         ring.wire.wake(self.node)
         return value
 
@@ -249,12 +249,12 @@ class AsyncHostedNode(AsyncRingDriver):
         await self.pause(GIVE_WAY)
 
     async def pause(self, seconds: float) -> None:
-        """Let time pass on the virtual clock."""
+        """Sleep on the virtual clock."""
         await self.until(lambda _now: None, seconds)
 
     async def close(self) -> None:
         """Do nothing: the node stays on the ring."""
 
 
-#: Turns of the event loop without anything on the ring after which it is taken for stuck.
+#: Turns of the event loop without an event on the ring that count as a deadlock.
 _IDLE_ROUNDS = 10_000

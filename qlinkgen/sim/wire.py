@@ -1,12 +1,11 @@
-"""A half-duplex RS485 line as a model of discrete events: who hears what, and when.
+"""A discrete-event model of a half-duplex RS485 line.
 
-Like the engines, the line has no clock and does no input or output: `now` comes in as an argument, in
-seconds, and must not run backwards. One side of it is the outside: the program under test, on a virtual
-clock (`virtual.py`) or behind a pty (`pty_bus.py`). The stations are engines in this process, each
-attached as one of its own.
+Like the engines, the line has no clock and does no input or output: `now` is an argument, in seconds, and
+must not decrease. One participant is the outside: the program under test, on a virtual clock (`virtual.py`)
+or on a pty (`pty_bus.py`). The stations are engines in this process, each attached separately.
 
-What one station sends in one go is a transmission. A `FaultPlan` may disturb each one; what is left of it
-goes on the line byte behind byte and is heard by everybody but its sender.
+The bytes that a station sends in one call are a transmission. A `FaultPlan` may disturb each one; the rest of
+it is sent byte after byte and received by all participants except its sender.
 """
 
 from __future__ import annotations
@@ -27,31 +26,31 @@ __all__ = ["LINE", "OUTSIDE", "Chunks", "Engine", "Hears", "Tap", "Wire"]
 OUTSIDE: Final = "outside"
 """Name of the outside as a source: the master, as a rule."""
 LINE: Final = "line"
-"""Name of the source of what no station sent: noise and stray frames."""
+"""Name of the source of noise and stray frames."""
 
 Chunks = Literal["frame", "byte", "random"]
 Hears = Literal["all", "outside"]
 Tap = Callable[[float, str, bytes], object]
 
-# At the same instant bytes arrive first, then held transmissions begin, then the stations get their turn.
+# Order of simultaneous events: bytes arrive, held transmissions begin, stations send.
 _ARRIVE, _BEGIN, _SUBMIT, _TURN = range(4)
-# More events than this in one instant are stations that answer one another without end.
+# Most simultaneous events; more are stations that answer one another endlessly.
 _MOST_AT_ONCE = 100_000
-# Two senders disturb one another when they overlap by more than this part of a bit; a stop bit is silent.
+# Two senders collide when they overlap by more than this part of a bit; a stop bit is silent.
 _HARMLESS_BITS = 0.5
 
 
 class Wire:
-    """The line, its stations, and its ways to fail.
+    """The line, its stations, and its faults.
 
     Attributes:
-        baud: speed of the line in bits a second, None where bytes take no time.
-        byte_time: seconds one byte takes, 0.0 where bytes take no time.
-        chunks: in what pieces a transmission arrives.
-        faults: the plan of faults, if any.
-        collisions: how many transmissions began while another one was on the line.
-        taps: functions called with (seconds, source, bytes) for everything on the line as it arrives, damage
-            included. The source is OUTSIDE, LINE, or the name of a station.
+        baud: speed of the line in bits per second, None for an unpaced line.
+        byte_time: duration of one byte in seconds, 0.0 on an unpaced line.
+        chunks: chunks in which a transmission arrives.
+        faults: the fault plan, if any.
+        collisions: number of transmissions that began during another one.
+        taps: functions called with (seconds, source, bytes) for all arriving bytes, including damage. The
+            source is OUTSIDE, LINE, or the name of a station.
     """
 
     def __init__(
@@ -64,26 +63,26 @@ class Wire:
         collisions: bool = True,
         chunks: Chunks = "frame",
     ) -> None:
-        """Make a line that nobody is on yet.
+        """Make a line without stations.
 
         Args:
-            baud: bits a second, or None: what is sent arrives at once, and nothing can collide.
+            baud: bits per second, or None: bytes arrive immediately, without collisions.
             bits_per_byte: start, data, parity and stop bits.
-            faults: what goes wrong, None for nothing. A plan belongs to one line.
-            echo: the outside also hears what it sends, as with most two-wire adapters.
-            collisions: what two stations send at the same time is garbled; if not, both get through.
-            chunks: a transmission arrives as a whole at its end ("frame"), byte by byte, or in pieces of
-                random size; each piece arrives at the end of its last byte.
+            faults: fault plan, None for none. A plan belongs to one line.
+            echo: the outside receives its own bytes, as with most two-wire adapters.
+            collisions: simultaneous transmissions are garbled; if not, both arrive.
+            chunks: a transmission arrives as a whole at its end ("frame"), byte by byte, or in chunks of
+                random size; each chunk arrives at the end of its last byte.
 
         Raises:
-            SimulationError: an argument out of range.
+            SimulationError: an argument is out of range.
         """
         if baud is not None and baud <= 0:
-            raise SimulationError(f"baud is {baud}: it must be above 0; None makes bytes take no time")
+            raise SimulationError(f"baud must be above 0, or None for an unpaced line, not {baud}")
         if bits_per_byte <= 0:
-            raise SimulationError(f"bits_per_byte is {bits_per_byte}: it must be above 0, usually 10")
+            raise SimulationError(f"bits_per_byte must be above 0, usually 10, not {bits_per_byte}")
         if chunks not in {"frame", "byte", "random"}:
-            raise SimulationError(f'chunks is {chunks!r}: it must be "frame", "byte" or "random"')
+            raise SimulationError(f"chunks must be 'frame', 'byte' or 'random', not {chunks!r}")
         self.baud = baud
         self.byte_time = bits_per_byte / baud if baud else 0.0
         self.chunks = chunks
@@ -93,7 +92,7 @@ class Wire:
         self._collide_at_all = collisions and baud is not None
         self._harmless = _HARMLESS_BITS / baud if baud else 0.0
         self._echo = (echo if isinstance(echo, Echo) else Echo()) if echo else None
-        # Streams of their own, so that neither a collision nor a split changes which faults come after it.
+        # Separate random streams, so that collisions and splits do not change later faults.
         seed = faults.seed if faults else 0
         self._garble = random.Random(f"collisions {seed}")
         self._split = random.Random(f"chunks {seed}")
@@ -117,19 +116,19 @@ class Wire:
 
         Args:
             engine: the station.
-            name: as taps and error texts call it; "station 1" and so on when it is empty.
-            hears: "all" that is on the line, as it is; or "outside", not what other stations send. With many
-                stations most of the time goes into answers to others, so this is for long runs.
+            name: name for taps and error texts; by default "station 1" and so on.
+            hears: "all" traffic of the line, or only "outside", not other stations, which saves most of the
+                time of long runs with many stations.
 
         Raises:
             SimulationError: the name is taken, or `hears` is something else.
         """
         if hears not in {"all", "outside"}:
-            raise SimulationError(f'hears is {hears!r}: it must be "all" or "outside"')
+            raise SimulationError(f"hears must be 'all' or 'outside', not {hears!r}")
         self._attached += 1
         name = name or f"station {self._attached}"
         if name in {OUTSIDE, LINE, *(station.name for station in self._stations)}:
-            raise SimulationError(f"there is a station {name!r} already: give each one a name of its own")
+            raise SimulationError(f"duplicate station {name!r}; names must be unique")
         station = Sender(name, engine, hears_stations=hears == "all")
         self._stations.append(station)
         self._connect()
@@ -137,7 +136,7 @@ class Wire:
         return name
 
     def detach(self, engine: Engine) -> None:
-        """Take a station off the line; what it has already sent still arrives.
+        """Remove a station from the line; its sent bytes still arrive.
 
         Raises:
             SimulationError: it is not on this line.
@@ -148,7 +147,7 @@ class Wire:
         self._connect()
 
     def wake(self, engine: Engine) -> None:
-        """Ask a station for its timer again, after it was changed by something other than this line.
+        """Read the timer of a station again, after a change from outside the line.
 
         Raises:
             SimulationError: it is not on this line.
@@ -159,10 +158,10 @@ class Wire:
         for station in self._stations:
             if station.engine is engine:
                 return station
-        raise SimulationError(f"{engine!r} is not on this line: attach it first")
+        raise SimulationError(f"{engine!r} is not on this line; attach it first")
 
     def _connect(self) -> None:
-        # On a bus everybody hears everybody else. Another topology is another way to fill in these routes.
+        # On a bus all stations hear all others. Other topologies fill in these routes differently.
         everybody = tuple(self._stations)
         listeners = [station for station in everybody if station.hears_stations]
         for station in everybody:
@@ -175,7 +174,7 @@ class Wire:
     # the outside
 
     def transmit(self, data: bytes, now: float) -> None:
-        """Let the outside send. While it still sends, this waits behind it like in a UART.
+        """Let the outside send. Bytes are queued after earlier ones, like in a UART.
 
         Raises:
             SimulationError: `now` runs backwards.
@@ -185,7 +184,7 @@ class Wire:
             self._send(self._outside, bytes(data), now)
 
     def take(self, now: float) -> bytes:
-        """Return what the outside has heard by `now` and has not taken yet.
+        """Return bytes received by the outside until `now` and not taken yet.
 
         Raises:
             SimulationError: `now` runs backwards.
@@ -198,14 +197,14 @@ class Wire:
         return heard[0] if len(heard) == 1 else b"".join(heard)
 
     def take_piece(self, now: float) -> bytes:
-        """Return what `take` would, but only up to the end of the first piece as `chunks` has cut it."""
+        """Return the same as `take`, but only the first chunk."""
         self.advance(now)
         return self._heard.pop(0) if self._heard else b""
 
     # time
 
     def next_timer(self) -> float | None:
-        """Return when something happens next, None when nothing ever will unless the outside sends."""
+        """Return the time of the next event, None if there is none."""
         queue = self._queue
         while queue:
             at, _, _, item = queue[0]
@@ -215,14 +214,14 @@ class Wire:
         return None
 
     def advance(self, now: float) -> None:
-        """Let everything happen that is due by `now`, in the order of its time.
+        """Process all events until `now`, in order of time.
 
         Raises:
-            SimulationError: `now` runs backwards, or stations answer one another without end.
+            SimulationError: `now` decreases, or stations answer one another endlessly.
         """
         if not self._now <= now < math.inf:
             raise SimulationError(
-                f"now is {now}, but the line is at {self._now}: time moves on, and never ends"
+                f"now must be finite and not before {self._now}, the time of the line, not {now}"
             )
         queue = self._queue
         if queue and queue[0][0] <= now:
@@ -230,14 +229,14 @@ class Wire:
         self._now = now
 
     def run(self, until: float) -> float | None:
-        """Advance until the outside has heard something, but not beyond `until`, which may be infinite.
+        """Advance until the outside has received bytes, at most to `until`, which may be infinite.
 
         Returns:
-            The time when it heard something. None when it did not; the line is then at `until` if that
-            is finite.
+            The time of reception. None if no bytes were received; the line is then at `until` if that is
+            finite.
 
         Raises:
-            SimulationError: stations answer one another without end.
+            SimulationError: stations answer one another endlessly.
         """
         if self._heard or self._run(until, until_heard=True):
             return self._now
@@ -251,7 +250,7 @@ class Wire:
             at, kind, _, item = heappop(queue)
             if isinstance(item, Sender) and item.due != at:
                 continue  # its timer has changed since
-            # A station that names a time gone by means now.
+            # A past timer of a station means now.
             if at > last:
                 last = self._now = at
                 at_once = 0
@@ -275,7 +274,7 @@ class Wire:
         station = item if isinstance(item, Sender) else item.route.sender
         raise SimulationError(
             f"more than {_MOST_AT_ONCE} events at {self._now} s, the last at {station.name!r}: a timer must "
-            "not stay due while nothing is sent, and who answers one another needs a baud or a turnaround"
+            "not stay due without sending; stations that answer one another need a baud or a turnaround"
         )
 
     # events
@@ -321,11 +320,11 @@ class Wire:
             self._push(end + gap, _SUBMIT, Chunk(extra, data))
 
     def _extra_route(self, _sender: Sender) -> Route:
-        """Who hears what is on the line by itself: here everybody, whoever was sending."""
+        """Return the receivers of noise and strays: here all participants."""
         return self._line.route
 
     def _submit(self, at: float, chunk: Chunk) -> float:
-        """Put a chunk behind what its sender has to send, like a UART; return when that is all sent."""
+        """Queue a chunk after earlier ones of its sender, like a UART; return the end of transmission."""
         sender = chunk.route.sender
         begin = max(at, sender.free)
         sender.free = end = begin + (chunk.lead + len(chunk.data) + chunk.tail) * self.byte_time
@@ -362,7 +361,7 @@ class Wire:
             end = min(other.end, chunk.end)
             if end - begin <= self._harmless or other.route.sender is chunk.route.sender:
                 continue
-            # An echo shows the collision of what it is the echo of; it disturbs nobody itself.
+            # An echo shows the collision of its transmission; it does not collide itself.
             if chunk.route.on_line:
                 other.mark(begin, end, self.byte_time, self._harmless)
             if other.route.on_line:
@@ -371,7 +370,7 @@ class Wire:
         self.collisions += met
 
     def _cut(self, chunk: Chunk) -> None:
-        """Decide where the next piece of a chunk ends, and let it arrive then."""
+        """Determine the end of the next piece of a chunk, and schedule its arrival."""
         size = len(chunk.data)
         if self.chunks == "frame":
             stop = size
@@ -380,7 +379,7 @@ class Wire:
         else:
             stop = self._split.randint(chunk.position + 1, size)
         chunk.stop = stop
-        # The order stays that of the chunk: the pieces of two chunks of one instant must not mix.
+        # Keep the order of chunks: pieces of simultaneous chunks must not be mixed.
         heappush(self._queue, (chunk.begin + stop * self.byte_time, _ARRIVE, chunk.order, chunk))
 
     def _arrive(self, now: float, chunk: Chunk) -> None:

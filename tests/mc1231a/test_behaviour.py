@@ -165,7 +165,7 @@ def test_a_command_error_is_raised_where_it_is_asked_for(rig: Rig) -> None:
     axis = rig.host.axis(1)
     axis.set_acc(value=0.25)
     axis.set_kp(value=9)
-    axis.update()  # nobody asks
+    axis.update()  # not checked
     with pytest.raises(CommandError, match=r"axis 1: .*clr_status") as info:
         axis.raise_command_error()
     assert info.value.status & AxisStatus.COMMAND_ERROR

@@ -26,7 +26,7 @@ CALLS = 60
 
 
 def test_threads_share_a_host_and_never_an_axis() -> None:
-    """Each selects its axis and uses it in one go: nobody else's packet comes between."""
+    """Each selects its axis and uses it atomically, without packets of others in between."""
     with make_rig(Setting("blocking", "memory")) as rig:
         wrong: list[Any] = []
 

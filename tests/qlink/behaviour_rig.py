@@ -231,7 +231,7 @@ class Rig:
         return call()
 
     def move(self, number: int, words: list[int], outputs: int = 0) -> qlink.MotionResponse:
-        """Send unique words; settle them if there is no answer."""
+        """Send unique words; settle them after a missing answer."""
         for _ in range(PATIENCE if self.faulty else 1):
             try:
                 return self.bus.motion(number, outputs=outputs, segments=words)

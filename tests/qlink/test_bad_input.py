@@ -220,9 +220,7 @@ class TestCtrlC:
             with pytest.raises(KeyboardInterrupt):
                 rig.bus.load(1, hex_text(3))
             assert not rig.bus.engine.busy
-            assert rig.bus.motor_position(1).position == 0, (
-                "the answer that was not waited for is no answer to this"
-            )
+            assert rig.bus.motor_position(1).position == 0, "a late answer is not the answer to this request"
             rig.bus.load(1, hex_text(3))
             image = rig.node.program
             assert image is not None

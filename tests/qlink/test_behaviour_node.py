@@ -300,7 +300,7 @@ class TestSetup:
             with pytest.raises(LinkError):
                 rig.bus.node_info(0)
             assert rig.wire.collisions == 3
-        else:  # without line time there is no collision: one of both is the answer, the other a stray
+        else:  # without line time they do not collide: one of both is the answer, the other a stray
             info = rig.bus.node_info(0)
             assert info.node == info.serial_number
             other = rig.bus.motor_position(2 if info.node == 5 else 5)

@@ -48,7 +48,7 @@ class Answerer:
 
 
 class Talker:
-    """Sends at given times, whatever it hears."""
+    """Sends at given times, regardless of the traffic."""
 
     def __init__(self, *sending: tuple[float, bytes]) -> None:
         self.sending = list(sending)
@@ -68,7 +68,7 @@ Heard = list[tuple[float, str, bytes]]
 
 
 def listen(wire: Wire) -> Heard:
-    """Return a list that fills with all that is on the line."""
+    """Return a list that collects all traffic of the line."""
     heard: Heard = []
     wire.taps.append(lambda at, source, data: heard.append((at, source, data)))
     return heard
@@ -79,7 +79,7 @@ def sources(heard: Heard, source: str) -> list[bytes]:
 
 
 def ask(port: VirtualPort, request: bytes = REQUEST, *, within: float = 0.02) -> list[tuple[float, bytes]]:
-    """Send a request, and return all that is heard until the time is over."""
+    """Send a request, and return the bytes received within a time."""
     port.write(request)
     end = port.now() + within
     heard = []
@@ -91,7 +91,7 @@ def ask(port: VirtualPort, request: bytes = REQUEST, *, within: float = 0.02) ->
 
 
 class Run:
-    """Transactions on a line with faults, as the plan, a tap, the station and the outside have seen them."""
+    """Transactions on a line with faults, as seen by the plan, a tap, the station and the outside."""
 
     def __init__(
         self,
@@ -111,7 +111,7 @@ class Run:
         self.tap = listen(self.wire)
         port = VirtualPort(self.wire)
         self.answers = [ask(port, within=within) for _ in range(count)]
-        # What is late or follows alone comes to its end before anything is counted.
+        # Late and separate bytes arrive before anything is counted.
         port.sleep(10.0)
         self.rest = port.read(0)
 
@@ -123,7 +123,7 @@ class Run:
         return sources(self.tap, source)
 
     def log(self) -> str:
-        """Everything with every bit of its times."""
+        """All events with exact times."""
         rows = [f"{at.hex()} {source} {data.hex()}" for at, source, data in self.tap]
         return "\n".join([*rows, self.outside.hex(), repr(self.plan.counts.as_dict()), repr(self.plan.log)])
 

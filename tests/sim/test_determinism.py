@@ -1,4 +1,4 @@
-"""The same seed gives the same bytes at the same times, to the last bit, in any process."""
+"""The same seed gives the same bytes at exactly the same times, in any process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def everything(seed: int, chunks: Chunks = "random") -> str:
-    """All that a run with every kind of accident has brought, times included."""
+    """All events of a run with every kind of fault, including times."""
     plan = FaultPlan.parse(f"all=0.9,seed={seed}")
     wire = Wire(baud=19200, faults=plan, chunks=chunks, echo=Echo(partial=0.1, changed=0.1, seed=seed))
     for number in range(1, 5):

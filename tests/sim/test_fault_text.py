@@ -1,4 +1,4 @@
-"""Fault plans as text, and what is no plan."""
+"""Fault plans as text, valid and invalid."""
 
 from __future__ import annotations
 
@@ -71,41 +71,41 @@ def test_text_comes_back(arguments: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "'' is no part of a fault plan: a part is NAME=VALUE"),
-        ("drop", "'drop' is no part of a fault plan"),
-        ("drop=", "'drop=' is no part"),
-        ("=0.1", "'=0.1' is no part"),
-        ("drop=0.1,", "'' is no part"),
-        ("dorp=0.1", "'dorp=0.1': there is no fault 'dorp'; did you mean drop?"),
+        ("", "'' is not a part of a fault plan: a part is NAME=VALUE"),
+        ("drop", "'drop' is not a part of a fault plan"),
+        ("drop=", "'drop=' is not a part"),
+        ("=0.1", "'=0.1' is not a part"),
+        ("drop=0.1,", "'' is not a part"),
+        ("dorp=0.1", "'dorp=0.1': unknown fault 'dorp'; did you mean drop?"),
         (
             "x=0.1",
-            "there are drop, flip, truncate, delay, late, duplicate, stray, noise, silent, all, seed, to",
+            "known are drop, flip, truncate, delay, late, duplicate, stray, noise, silent, all, seed, to",
         ),
-        ("drop=0.1,drop=0.2", "'drop=0.2': drop was given before"),
-        ("drop=much", "drop=much: a chance is a number from 0 to 1"),
-        ("drop=nan", "drop=nan: a chance is a number"),
-        ("drop=2", "drop is 2: a chance is a number from 0 to 1, 0.02 for 2 %"),
-        ("drop=-0.1", "drop is -0.1: a chance"),
-        ("drop=2%", "drop=2%: a chance is a number from 0 to 1, 0.02 for 2 %"),
-        ("all=1.5", "all is 1.5: a chance"),
-        ("all=x", "all=x: a chance"),
-        ("drop=0.1:1-2", "drop is (0.1, 1.0, 2.0): nothing arrives has no extent"),
+        ("drop=0.1,drop=0.2", "'drop=0.2': duplicate drop"),
+        ("drop=much", "drop=much: not a probability from 0 to 1"),
+        ("drop=nan", "drop=nan: not a probability"),
+        ("drop=2", "drop must be a probability from 0 to 1, such as 0.02 for 2 %, not 2"),
+        ("drop=-0.1", "drop must be a probability from 0 to 1, such as 0.02 for 2 %, not -0.1"),
+        ("drop=2%", "drop=2%: not a probability from 0 to 1"),
+        ("all=1.5", "all must be a probability from 0 to 1, such as 0.02 for 2 %, not 1.5"),
+        ("all=x", "all=x: not a probability"),
+        ("drop=0.1:1-2", "drop=(0.1, 1.0, 2.0): drop has no extent"),
         ("drop=0.1:x", "drop=0.1:x: it has no extent"),
-        ("late=0.1:", "late=0.1:: behind the colon stands its extent in seconds, LOW-HIGH or one number"),
-        ("late=0.1:50ms", "behind the colon stands its extent in seconds"),
-        ("late=0.1:1-2-3", "behind the colon"),
-        ("late=0.1:2-1", "late goes from 2 to 1: seconds from 0 on, the lower bound first"),
-        ("late=0.1:-2", "late goes from -2 to -2"),
-        ("late=0.1:1e999", "late goes from inf to inf"),
-        ("late=0.1:nan", "behind the colon"),
-        ("flip=0.1:0-3", "flip goes from 0 to 3: bits are counted, 1 or more"),
-        ("noise=0.1:1.5-3", "noise goes from 1.5 to 3: bytes are counted"),
-        ("seed=x", "seed=x: a seed is a whole number"),
-        ("seed=1.5", "seed=1.5: a seed is a whole number"),
-        ("to=me", "to is 'me': faults go to one of both, slaves, master"),
+        ("late=0.1:", "late=0.1:: after the colon comes its extent in seconds, LOW-HIGH or one number"),
+        ("late=0.1:50ms", "after the colon comes its extent in seconds"),
+        ("late=0.1:1-2-3", "after the colon"),
+        ("late=0.1:2-1", "late must have bounds of 0 seconds or more in ascending order, not 2 to 1"),
+        ("late=0.1:-2", "late must have bounds of 0 seconds or more in ascending order, not -2 to -2"),
+        ("late=0.1:1e999", "late must have bounds of 0 seconds or more in ascending order, not inf to inf"),
+        ("late=0.1:nan", "after the colon"),
+        ("flip=0.1:0-3", "flip must have integer bounds of 1 bits or more, not 0 to 3"),
+        ("noise=0.1:1.5-3", "noise must have integer bounds of 1 bytes or more, not 1.5 to 3"),
+        ("seed=x", "seed=x: not an integer"),
+        ("seed=1.5", "seed=1.5: not an integer"),
+        ("to=me", "to must be one of both, slaves, master, not 'me'"),
     ],
 )
-def test_what_is_no_plan(text: str, reason: str) -> None:
+def test_invalid_plans(text: str, reason: str) -> None:
     with pytest.raises(FaultPlanError) as caught:
         FaultPlan.parse(text)
     assert reason in str(caught.value)

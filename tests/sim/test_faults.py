@@ -1,4 +1,4 @@
-"""Each kind of fault does what it says, and the counts are what a listener on the line sees."""
+"""Each kind of fault has its effect, and the counts agree with a listener on the line."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_a_sender_is_as_long_busy_with_what_is_lost() -> None:
 
 
 class Scripted(FaultPlan):
-    """Does to each transmission what was written down for it."""
+    """Applies a scripted disturbance to each transmission."""
 
     def __init__(self, *script: Disturbed | None) -> None:
         super().__init__()
@@ -108,7 +108,7 @@ class Scripted(FaultPlan):
 
 
 def ends(*script: Disturbed | None) -> list[tuple[bytes, float]]:
-    """What is on the line when "first" and "second" are sent at once: ends in byte times."""
+    """The traffic when "first" and "second" are sent simultaneously: ends in byte times."""
     wire = Wire(baud=BAUD, faults=Scripted(*script))
     tap = listen(wire)
     wire.transmit(b"first", 0.0)
@@ -237,7 +237,7 @@ def test_stray_frames_are_earlier_answers() -> None:
     assert strays == [ANSWER] * plan.counts["stray"]
     assert run.outside == ANSWER * (1000 + plan.counts["stray"])
     assert 300 < plan.counts["stray"] < 500
-    assert run.station.everything.count(ANSWER) == len(strays)  # everybody hears them
+    assert run.station.everything.count(ANSWER) == len(strays)  # all stations receive them
 
 
 def test_there_is_no_stray_before_the_first_answer() -> None:
@@ -352,7 +352,7 @@ def test_all_of_them_together_add_up() -> None:
 
 
 def test_chances_are_those_given() -> None:
-    # One draw decides for most transmissions; what follows must not change the chances of the single kinds.
+    # One draw decides for most transmissions; further draws must keep the probability of each kind.
     chances = {"drop": 0.0, "flip": 0.1, "truncate": 0.25, "delay": 0.03, "duplicate": 0.4, "noise": 0.01}
     plan = FaultPlan(**chances, seed=11)  # type: ignore[arg-type]
     pairs: Counter[tuple[str, ...]] = Counter()

@@ -1,4 +1,4 @@
-"""A node that knows the schema alone answers every command of every protocol, legally."""
+"""A node derived from the schema alone answers every command of every protocol with valid values."""
 
 from __future__ import annotations
 

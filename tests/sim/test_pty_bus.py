@@ -1,4 +1,4 @@
-"""The line behind a real pty: programs on the other side, real time, and a clean end."""
+"""The line on a real pty: programs on the other side, real time, and a clean end."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from qlinkgen.sim.pty_bus import PtyBus
 from qlinkgen.transport import PtyPort, open_pty
 from tests.sim.lines import ANSWER, REQUEST, Answerer, Talker
 
-# Seconds that nothing here needs; a wait that long has failed.
+# Time limit in seconds; a longer wait has failed.
 PATIENCE = 20.0
 ROOT = Path(__file__).parents[2]
 
 
 class Client:
-    """A program that has opened the port and reads what comes, with the time at which it came."""
+    """A program that has opened the port and reads, recording the time of each chunk."""
 
     def __init__(self, path: str) -> None:
         self.descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY)
@@ -37,7 +37,7 @@ class Client:
         os.write(self.descriptor, data)
 
     def read(self, size: int) -> bytes:
-        """Return exactly so many bytes."""
+        """Return exactly that many bytes."""
         self.pieces = []
         missing = size
         while missing > 0:
@@ -178,7 +178,7 @@ def test_stop_before_run() -> None:
 
 
 def test_start_twice() -> None:
-    with PtyBus(Wire(baud=None)) as bus, pytest.raises(SimulationError, match="started before"):
+    with PtyBus(Wire(baud=None)) as bus, pytest.raises(SimulationError, match="already started"):
         bus.start()
 
 

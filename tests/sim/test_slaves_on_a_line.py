@@ -1,4 +1,4 @@
-"""Slave engines of a real protocol on the line: sixteen of them, and what they do under endless garbage."""
+"""Slave engines of a real protocol on the line: sixteen of them, also under endless noise."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from qlinkgen.sim.wire import Chunks
 
 
 class Repeater:
-    """Repeats what a loop_back brings, as the protocol wants it."""
+    """Repeats the data of a loop_back, as the protocol requires."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -32,7 +32,7 @@ def bus(wire: Wire, numbers: range = range(1, 17)) -> list[SlaveEngine]:
 
 
 def loop(port: VirtualPort, node: int, data: bytes, within: float = 0.02) -> list[Any]:
-    """Ask a node, and return every frame that is heard until the time is over."""
+    """Send a request to a node, and return every frame received within a time."""
     decoder = qlink.StreamDecoder("response")
     port.write(qlink.LoopBackRequest(node=node, offset=0, data=data).to_frame())
     end = port.now() + within
@@ -93,7 +93,7 @@ def test_endless_garbage_ends_when_the_time_is_over() -> None:
     for _ in range(20):
         begin = port.now()
         loop(port, 1, b"anybody?", within=0.05)
-        # A read takes what is there and no longer than it was given, so a deadline holds under any traffic.
+        # A read takes available bytes within its timeout, so a deadline holds under any traffic.
         assert port.now() - begin == pytest.approx(0.05)
     assert wire.collisions >= 20
     assert len(wire._queue) < 20

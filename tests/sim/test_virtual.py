@@ -1,4 +1,4 @@
-"""The port with a clock of its own."""
+"""The port with a virtual clock."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_a_transaction_takes_exactly_its_time() -> None:
     wire.attach(Answerer(turnaround=0.001))
     port = VirtualPort(wire)
     port.write(REQUEST)
-    assert port.now() == 0.0  # the bytes are on their way
+    assert port.now() == 0.0  # the bytes are in transit
     assert port.read(1.0) == ANSWER
     assert port.now() == len(REQUEST) * BYTE + 0.001 + len(ANSWER) * BYTE
 
@@ -81,7 +81,7 @@ def test_a_host_needs_time_to_react() -> None:
     port = VirtualPort(wire, reaction=0.1)
     assert port.read(5.0) == b"a"
     assert port.now() == 1.1
-    assert port.read(5.0) == b"b"  # came meanwhile
+    assert port.read(5.0) == b"b"  # received meanwhile
     assert port.now() == 1.1
     assert port.read(5.0) == b"c"
     assert port.now() == 2.1
@@ -136,13 +136,13 @@ def test_capabilities() -> None:
 
 @pytest.mark.parametrize("reaction", [-0.1, math.nan, math.inf, (0.2, 0.1), (-1.0, 1.0)])
 def test_wrong_reactions(reaction: float | tuple[float, float]) -> None:
-    with pytest.raises(SimulationError, match="reaction is"):
+    with pytest.raises(SimulationError, match="reaction must be"):
         VirtualPort(Wire(baud=None), reaction=reaction)
 
 
 @pytest.mark.parametrize("seconds", [-0.1, math.nan, math.inf])
 def test_wrong_sleeps(seconds: float) -> None:
-    with pytest.raises(SimulationError, match="sleep of"):
+    with pytest.raises(SimulationError, match="sleep must be"):
         VirtualPort(Wire(baud=None)).sleep(seconds)
 
 

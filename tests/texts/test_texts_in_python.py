@@ -22,7 +22,7 @@ from qlinkgen.model.protocol import Protocol
 from tests.texts.samples import CASES, HARMLESS, HOSTILE, TEXTS, harmless, turned
 from tests.texts.slots import SCHEMAS, Slot, is_label, protocol_of, slots
 
-#: A name of its own: the shipped package is imported already.
+#: A names must be unique: the shipped package is imported already.
 OPTIONS = Options(package="python/wire")
 TARGETS = {"python": python.generate, "bus": bus.generate, "construct": construct.generate}
 

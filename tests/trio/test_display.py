@@ -20,7 +20,7 @@ def test_it_has_four_rows_of_twenty() -> None:
     assert display.text.endswith("y")
     assert display.place == 0
     display.feed("z")
-    assert display.lines[0][0] == "z", "behind the last place comes the first"
+    assert display.lines[0][0] == "z", "the cursor wraps around"
 
 
 def test_clear_and_home() -> None:

@@ -143,7 +143,7 @@ def test_on_a_paced_line_one_own_message_goes_at_a_time() -> None:
     assert line.sent() == text(9, "a")
     assert line.sent(0.02) == b""
     assert line.node.next_timer() == pytest.approx(0.03)
-    assert line.hear(text(2)[:1]) == text(1)[:1], "goes behind the own message in the transmitter"
+    assert line.hear(text(2)[:1]) == text(1)[:1], "queued after the own message in the transmitter"
     assert line.sent(0.02) == b"", "a message is being sent on"
     assert line.hear(text(2)[1:]) == text(1)[1:]
     assert line.sent(0.02) == b"", "the transmitter is not free before 70 ms"

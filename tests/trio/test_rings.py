@@ -129,12 +129,12 @@ def test_memory_ports_in_a_ring(size: int) -> None:
 
 def test_a_ring_has_15_places() -> None:
     VirtualRing(["coordinator"] * 15)
-    with pytest.raises(SimulationError, match="16 places, the outside's included: a ring has 15 at most"):
+    with pytest.raises(SimulationError, match="16 places, including the outside's; a ring has at most 15"):
         VirtualRing(["coordinator"] * 16)
     with pytest.raises(SimulationError, match="at least one node"):
         VirtualRing([])
     with pytest.raises(
-        SimulationError, match=r"no node of the kind 'plotter'; .* coordinator, keypad, passive"
+        SimulationError, match=r"unknown kind of node 'plotter'; .* coordinator, keypad, passive"
     ):
         VirtualRing("coordinator,plotter")
     with pytest.raises(SimulationError, match="node 0 is no KeypadNode but a CoordinatorNode"):
