@@ -64,8 +64,19 @@ def addresses(message: Message) -> st.SearchStrategy[int]:
     return st.one_of(*(st.integers(low, high) for low, high in message.addresses))
 
 
+#: By identity of protocol and message, which are kept with the strategy: making one takes longer than a draw.
+_known: dict[tuple[int, int], tuple[Protocol, Message, st.SearchStrategy[dict[str, Any]]]] = {}
+
+
 def arguments(protocol: Protocol, message: Message) -> st.SearchStrategy[dict[str, Any]]:
     """Fields and address of a message, as arguments of its generated class."""
+    found = _known.get((id(protocol), id(message)))
+    if found is None:
+        found = _known[id(protocol), id(message)] = protocol, message, _arguments(protocol, message)
+    return found[2]
+
+
+def _arguments(protocol: Protocol, message: Message) -> st.SearchStrategy[dict[str, Any]]:
     if not message.addresses or protocol.address_name is None:
         return fields(message)
     address = st.fixed_dictionaries({protocol.address_name: addresses(message)})
