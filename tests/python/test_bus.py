@@ -23,6 +23,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.plan import plan_of
 from qlinkgen.schema import loads
+from tests.python.protocols import EVERY as EVERY_PROTOCOL
 from tests.python.protocols import build, defaults, module, protocol
 
 ROOT = Path(__file__).parents[2]
@@ -397,11 +398,12 @@ def test_commands_may_have_the_names_of_what_a_class_has_itself() -> None:
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with codecs and bus modules of every bus, and a program that uses them."""
+    """A folder with the codecs of every protocol, bus modules of every bus, and a program that uses them."""
     folder = tmp_path_factory.mktemp("generated")
     outputs: dict[str, str] = {}
-    for name in (*BUSES, "mc1231a"):
+    for name in EVERY_PROTOCOL:
         outputs.update(generate_codec(protocol(name), Options(package=OWN)))
+    for name in (*BUSES, "mc1231a"):
         outputs.update(bus.generate(protocol(name), Options(package=OWN)))
     for path, text in outputs.items():
         file = folder / path
@@ -520,8 +522,8 @@ def run(*command: str, cwd: Path) -> str:
 def test_mypy_strict_is_content(written: Path) -> None:
     config = written / "mypy.ini"
     config.write_text("[mypy]\nstrict = True\nwarn_unreachable = True\n")
-    run(sys.executable, "-m", "mypy", "--config-file", str(config), "-p", "wire", cwd=written)
-    run(sys.executable, "-m", "mypy", "--config-file", str(config), "program.py", cwd=written)
+    checked = ("-p", "wire", "-m", "program")
+    run(sys.executable, "-m", "mypy", "--config-file", str(config), *checked, cwd=written)
 
 
 def test_pyright_strict_is_content(written: Path) -> None:
