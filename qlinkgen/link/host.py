@@ -308,7 +308,11 @@ class HostEngine:
             self.count.count_damaged("frame")
             self.events.append(Damaged(now, None, fault))
             self._out_of_step(now, None, "unsolicited bytes", received=data)
-        self._quiet_at = max(self._quiet_at, now + self.timing.quiet)
+        quiet = self.timing.quiet
+        if self._state is State.GUARD and now - min(self._quiet_at, self._give_up_at) > quiet:
+            # A late caller: its process did not run and reads old bytes. Only what follows tells of the line.
+            self._give_up_at = max(self._give_up_at, now + self.timing.quiet_limit)
+        self._quiet_at = max(self._quiet_at, now + quiet)
 
     def _arrived(self, now: float) -> None:
         """Handle the complete answer, and bytes after it."""

@@ -184,7 +184,7 @@ class MasterEngine:
         self._tries = tries
         self._attempt = 0
         self._trial = trial
-        if self.health and not trial and command.response is not None:  # without response there is no wait
+        if self.health and not trial and command.response is not None:  # otherwise nothing is waited for
             self._look_at_health(now)
         if self._wrong:
             self._wrong = []
@@ -212,7 +212,7 @@ class MasterEngine:
     def receive(self, data: bytes, now: float) -> None:
         """Process received bytes."""
         if self._suspect:
-            self._quiet_at = max(self._quiet_at, now + self._quiet)
+            self._disturbed(now)
         if self._probe_until and self._state is PROBING:
             data = self._without_probe(data, now)
         if self._echo.active:
@@ -302,6 +302,15 @@ class MasterEngine:
 
     def _line_is_quiet(self, now: float) -> bool:
         return now >= self._quiet_at
+
+    def _disturbed(self, now: float) -> None:
+        """Restart the wait for a quiet line; the limit too if the caller is late.
+
+        A process that did not run for some time reads old bytes now; only what follows tells of the line.
+        """
+        if now - max(self._free_at, min(self._quiet_at, self._give_up_at)) > self._quiet:
+            self._give_up_at = max(self._give_up_at, now + self._quiet_limit)
+        self._quiet_at = max(self._quiet_at, now + self._quiet)
 
     def _distrust(self, now: float) -> None:
         """Require a quiet line before the next request, since a late answer may arrive."""

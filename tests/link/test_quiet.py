@@ -40,6 +40,32 @@ def test_but_not_for_ever() -> None:
     assert run.end == pytest.approx(DEADLINE + LIMIT)
 
 
+def test_a_caller_that_is_late_reads_old_bytes_and_listens_on() -> None:
+    """A process that did not run for some time, as on a busy machine, has not seen traffic all that time."""
+    engine = make()
+    drive(engine, ASK, attempts=1)
+    engine.start(ASK, DEADLINE, attempts=1)
+    late = DEADLINE + LIMIT + 1
+    engine.receive(OLD.to_frame(), late)
+    engine.handle_timer(late)
+    assert engine.next_timer() == pytest.approx(late + QUIET)
+    assert engine.bytes_to_send(late + QUIET)
+
+
+def test_a_caller_that_is_late_once_still_gives_up() -> None:
+    engine = make()
+    drive(engine, ASK, attempts=1)
+    engine.start(ASK, DEADLINE, attempts=1)
+    late = now = DEADLINE + LIMIT + 1
+    while engine.next_timer() is not None:
+        now += QUIET / 2
+        engine.receive(b"?", now)
+        engine.handle_timer(now)
+    assert now == pytest.approx(late + LIMIT, abs=QUIET)
+    with pytest.raises(BadReply, match="line never became idle"):
+        engine.take()
+
+
 @pytest.mark.parametrize("delay", [EPSILON, 0.0005, 0.001, QUIET - EPSILON])
 def test_a_late_answer_is_no_answer_to_the_repeat(delay: float) -> None:
     engine = make()

@@ -409,6 +409,17 @@ def test_a_line_that_does_not_get_quiet() -> None:
     assert "line never became idle" in str(error)
 
 
+def test_a_caller_that_is_late_reads_old_bytes_and_listens_on() -> None:
+    engine = make()
+    quiet = engine.timing.quiet
+    engine.receive(b"!", 0.0)
+    engine.start(GET_KP, 0.0)
+    engine.receive(b"?", 10.0)
+    engine.handle_timer(10.0)
+    assert engine.next_timer() == pytest.approx(10.0 + quiet)
+    assert engine.bytes_to_send(10.0 + quiet)
+
+
 @pytest.mark.parametrize("stage", range(6))
 def test_a_transaction_that_is_given_up(stage: int) -> None:
     """At any stage: the answer of what was sent answers nothing later."""
