@@ -25,7 +25,7 @@ from tests.support.planted import Fault
 
 #: Seconds for each target, over all shipped protocols; the schemas of the tests get less.
 SECONDS = int(os.environ.get("QLINKGEN_FUZZ_SECONDS", "20" if os.environ.get("CI") else "5"))
-OTHER_SECONDS = 2
+OTHER_SECONDS = 1
 #: The fuzzers run in parallel with other tests, at lower priority.
 NICE = ("nice", "-n", "15")
 Missing = Callable[..., NoReturn]
