@@ -107,17 +107,6 @@ def test_a_constant_preamble_folds_into_the_start_value(algorithm: Algorithm) ->
     assert algorithm.finish(register) == algorithm.check
 
 
-@every_algorithm
-def test_residue_agrees_with_crccheck(algorithm: Algorithm) -> None:
-    assert algorithm.residue == CRCCHECK[algorithm.name]._residue
-
-
-@given(st.sampled_from([each for each in ALL if each.width % 8 == 0]), st.binary())
-def test_data_with_its_own_crc_leaves_the_residue(algorithm: Algorithm, data: bytes) -> None:
-    own = algorithm.compute(data).to_bytes(algorithm.width // 8, "little" if algorithm.refout else "big")
-    assert algorithm.register(data + own, algorithm.start) == algorithm.residue
-
-
 # The index of an unreflected table needs as many register bits as it takes input.
 @pytest.mark.parametrize("algorithm", [each for each in ALL if each.width >= 4], ids=lambda each: each.name)
 def test_a_table_of_16_entries_gives_the_same_values(algorithm: Algorithm) -> None:
@@ -260,3 +249,9 @@ def test_impossible_parameters_are_refused(changes: dict[str, int], message: str
 def test_importing_the_module_reads_no_catalogue() -> None:
     code = "import qlinkgen.model.checksum as c; assert c._catalogue.cache_info().currsize == 0"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_at_most_three_names_are_meant() -> None:
+    with pytest.raises(UnknownAlgorithm) as caught:
+        find("crc-16/cm")
+    assert caught.value.suggestions == ("crc-16/cms", "crc-16", "crc-16/gsm")

@@ -2,7 +2,7 @@
 
 The parameters of a CRC are those of the RevEng catalogue: `init` and `poly` describe a register that shifts
 towards its high bit, regardless of `refin`. Implementations keep the register of a reflected CRC reflected,
-which saves reflecting each byte. Here this is called the *register form*: `start`, `feedback`, `residue` and
+which saves reflecting each byte. Here this is called the *register form*: `start`, `feedback` and
 the arguments and results of `register` and `before` have it, so that back-ends can print them directly.
 """
 
@@ -99,18 +99,6 @@ class Algorithm:
     def feedback(self) -> int:
         """The polynomial for a bit-by-bit loop, in register form."""
         return _reflect(self.poly, self.width) if self.refin else self.poly
-
-    @property
-    def residue(self) -> int:
-        """The register after any data followed by its own CRC, in register form.
-
-        The CRC must follow in its natural order: low byte first if `refout` is set, else high byte first. A
-        receiver can then run over the whole frame and compare once.
-        """
-        register = _reflect(self.xorout, self.width) if self.refin != self.refout else self.xorout
-        for _ in range(self.width):
-            register = self._clock(register, 0)
-        return register
 
     def compute(self, data: Iterable[int]) -> int:
         """Return the CRC of the bytes."""

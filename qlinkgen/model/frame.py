@@ -106,17 +106,6 @@ class DelimitedFrame:
         return self.parts[0].constant
 
     @cached_property
-    def overhead(self) -> int:
-        """Size of a frame without its payload, before stuffing."""
-        return sum(part.size for part in self.parts)
-
-    @cached_property
-    def header_size(self) -> int:
-        """Size of the parts before the payload."""
-        names = [part.role for part in self.parts]
-        return sum(part.size for part in self.parts[: names.index("payload")])
-
-    @cached_property
     def length_bias(self) -> int:
         """Difference between the length field and the payload size."""
         length = self.part("length")
@@ -126,15 +115,6 @@ class DelimitedFrame:
     def payload(self) -> Part:
         """The payload."""
         return next(part for part in self.parts if part.role == "payload")
-
-    def offset(self, name: str) -> int:
-        """Offset of a part before stuffing; the payload counts as empty."""
-        position = 0
-        for part in self.parts:
-            if part.name == name:
-                return position
-            position += part.size
-        raise KeyError(name)
 
 
 @dataclass(frozen=True)

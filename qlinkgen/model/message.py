@@ -152,14 +152,3 @@ class Message:
             if isinstance(field.type, Bits):
                 found |= {member.name: member.doc for member in field.type.members}
         return found
-
-    def offset(self, name: str) -> int | None:
-        """Offset of a field in the payload, None after a field of variable size."""
-        position = 0
-        for field in self.fields:
-            if field.name == name:
-                return position
-            if not field.fixed:
-                return None
-            position += field.max_size
-        raise KeyError(name)

@@ -117,10 +117,6 @@ class Scaling:
         """The bias of physical = (raw * factor + bias) / divisor."""
         return int(self.offset * self.divisor)
 
-    def physical(self, raw: int) -> Fraction:
-        """The exact value in the field's unit."""
-        return raw * self.scale + self.offset
-
     def raw(self, physical: Fraction) -> int:
         """The nearest raw step (ties to even); the range is not checked."""
         return round((physical - self.offset) / self.scale)
