@@ -40,3 +40,8 @@ def test_order_case_and_number() -> None:
     assert similar("crc-16/ibm-3741", ALGORITHMS) == ("crc-16/ibm-3740",)
     assert similar("positions", ["position_", "position", "motor"], most=3) == ("position", "position_")
     assert similar("positions", ["position_", "position"]) == ("position",)
+
+
+def test_a_swap_is_one_error_anywhere_in_a_word() -> None:
+    assert similar("alexnader", ["aexnadr", "alexander"]) == ("alexander",)
+    assert similar("alexandre", ["aexandr", "alexander"]) == ("alexander",)

@@ -68,3 +68,36 @@ def test_every_wrong_frame_has_the_kind_of_its_vector(name: str) -> None:
         with pytest.raises(BadFrame) as caught:
             Codec(plan).decode(wire, _direction(plan, str(row["message"])), request)
         assert caught.value.kind == row["kind"], row
+
+
+@pytest.mark.parametrize(
+    ("name", "request_", "wire", "kind", "end"),
+    [
+        ("mc1231a", None, "EE", "unknown", 1),
+        ("mc1231a", None, "0B 00", "length", 1),
+        ("mc1231a", "EE", "00 00", "unknown", 0),
+        ("mc1231a", "", "00 0B", "unknown", 0),
+        ("mc1231a", "0B", "00", "truncated", 1),
+        ("mc1231a", "0B", "00 0B 00 00", "length", 2),
+        ("mc1231a", "0B", "00 00", "illegal", 2),
+        ("mc1231a", "0B", "00 0C", "crc", 2),
+        ("qlink", None, "", "truncated", 0),
+        ("qlink", None, "A5 A5 05 05 00 00 D3", "truncated", 7),
+        ("qlink", None, "A4 A5 05 05 00 00 D3 75", "frame", 0),
+        ("qlink", None, "A5 A4 05 05 00 00 D3 75", "frame", 1),
+        ("qlink", None, "A5 A5 03 05 00 00 D3 75", "length", 3),
+        ("qlink", None, "A5 A5 05 05 00 00 D3 00", "crc", 8),
+        ("qlink", None, "A5 A5 05 05 00 00 D3 75 00", "length", 8),
+        ("trio", None, "9C 00", "truncated", 2),
+        ("trio", None, "00 9C 00 98", "frame", 0),
+        ("trio", None, "9C 00 98 00", "frame", 3),
+    ],
+)
+def test_a_wrong_frame_ends_where_that_is_known(
+    name: str, request_: str | None, wire: str, kind: str, end: int
+) -> None:
+    plan = _plan(_ROOT / "schemas" / f"{name}.yaml")
+    direction: Direction = plan.heard[0] if request_ is None else "response"
+    with pytest.raises(BadFrame) as caught:
+        Codec(plan).decode(bytes.fromhex(wire), direction, bytes.fromhex(request_ or ""))
+    assert (caught.value.kind, caught.value.end) == (kind, end)

@@ -3,123 +3,22 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 import pytest
 
 from qlinkgen.model.message import Direction
-from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.content import Unsendable, pack
 from qlinkgen.plan.dissect import dissect
+from qlinkgen.plan.framing import AddressPart, ByLength, CheckPart, ConstantPart, IdPart, LengthPart, MarkPart
 from qlinkgen.plan.payload import Member
 from qlinkgen.plan.reading import BadFrame
-from qlinkgen.plan.spans import Dissection
-from qlinkgen.schema.loader import load, loads
+from qlinkgen.plan.spans import Around, Dissection, Fault, Owner, Rule
+from tests.plan.shapes import cases, frames
+from tests.plan.shapes import plan as plan_at
 
-_ROOT = Path(__file__).resolve().parents[2]
-_SCHEMAS = sorted([*(_ROOT / "schemas").glob("*.yaml"), *(_ROOT / "tests" / "schemas").glob("*.yaml")])
 _MUTANTS = 150
-
-#: Shapes of frames that do not occur in schema files: parts and stuffing.
-_NUMBER, _NODE = "id: {role: message, type: u8}", "node: {role: address, type: u8}"
-_DATA, _SIZE = "data: {role: payload, size: 0..40}", "size: {role: length, type: u8, counts: [data]}"
-_SUM = "check: {role: checksum, type: u8, algorithm: sum8, over: [id, node, data]}"
-_CRC = "check: {role: checksum, type: u16, algorithm: crc-16/xmodem, over: [size, id, node, data]}"
-_DOUBLE = "start: {role: constant, value: 7E 7E}"
-_SHAPES = {
-    "constant_end": (
-        [
-            "start: {role: constant, value: 02}",
-            _SIZE,
-            _NUMBER,
-            _NODE,
-            _DATA,
-            _CRC,
-            "end: {role: constant, value: 03 0D}",
-        ],
-        "",
-    ),
-    "stuffed_between_constants": (
-        [
-            "start: {role: constant, value: 10 02}",
-            _NUMBER,
-            _NODE,
-            "size: {role: length, type: u16, counts: [data, check]}",
-            _DATA,
-            _SUM,
-            "end: {role: constant, value: 10 03}",
-        ],
-        "{after: 0x10, insert: 0x10, exempt: [start, end]}",
-    ),
-    "stuffed_after_two": (
-        [_DOUBLE, _SIZE, _NUMBER, _NODE, _DATA, _CRC],
-        "{after: 7E 7E, insert: 0x00, exempt: [start]}",
-    ),
-    "stuffed_payload": (
-        [_DOUBLE, _SIZE, _NUMBER, _NODE, _DATA, _CRC],
-        "{after: 7E 7E, insert: 0x7E, exempt: [start, size, id, node, check], checksum: after}",
-    ),
-    "neither_length_nor_check": (["start: {role: constant, value: 0x68}", _NUMBER, _NODE, _DATA], ""),
-    "no_length_stuffed": (
-        [_DOUBLE, _NUMBER, _NODE, _DATA, _SUM],
-        "{after: 0x7E, insert: 0x00, exempt: [start]}",
-    ),
-    "bare": ([_NUMBER, _NODE, _DATA, _SUM], ""),
-}
-_SCHEMA = """
-qlinkgen: 1
-protocol: {name: shape, title: Shape, revision: "1", source: Tests, doc: A shape}
-byteorder: big
-frame: {parts: {PARTS}STUFFING}
-bus: {kind: master_slave, nodes: 1..16, response_within: 5 ms}
-defaults: {addressing: node, repeat: safe}
-commands:
-  counted:
-    id: 0x10
-    request: {mark: {type: u8, const: 7}, n: {type: u8, counts: a}, a: "u16[0..9]", b: "u8[2]"}
-    response: {n: {type: u8, counts: t, counts_in: bytes}, t: "text[0..12]", f: {type: u8, bits: FIELDS}}
-  plain:
-    id: 0x7E
-    request: {a: {type: u16, range: 3..900, default: 5}}
-    response: {}
-"""
-_FIELDS = "{low: {at: 0..2, range: 1..5, default: 1}, high: {at: 4..7, signed: true}}"
-
-
-@cache
-def _plan(path: Path | str) -> Plan:
-    if isinstance(path, Path):
-        return plan_of(load(path))
-    parts, stuffing = _SHAPES[path]
-    text = _SCHEMA.replace("PARTS", ", ".join(parts)).replace("FIELDS", _FIELDS)
-    protocol, faults = loads(text.replace("STUFFING", stuffing and f", stuffing: {stuffing}"), f"{path}.yaml")
-    assert protocol is not None, [str(fault) for fault in faults]
-    return plan_of(protocol)
-
-
-def _cases() -> Iterator[tuple[Path | str, Direction]]:
-    paths: list[Path | str] = [*_SCHEMAS, *_SHAPES]
-    for path in paths:
-        yield from ((path, direction) for direction in _plan(path).heard)
-
-
-def _frames(plan: Plan, direction: Direction, chance: random.Random) -> list[tuple[bytes, bytes]]:
-    """Two frames of each message, with default and with random values, and their requests."""
-    codec, frames = Codec(plan), []
-    for message in plan.received(direction):
-        request = bytes((message.id, *chance.randbytes(2)))
-        address = message.message.default_address
-        least, most = message.payload.least, min(message.payload.most, 40)
-        payloads = [chance.randbytes(chance.randint(least, max(least, most)))]
-        try:
-            payloads.append(pack(message.payload, {}))
-        except Unsendable:  # a value without a default
-            payloads.append(bytes(least))
-        frames += [(codec.wrap(message.name, each, address, request), request) for each in payloads]
-    return frames
 
 
 def _mutant(wire: bytes, others: list[tuple[bytes, bytes]], chance: random.Random) -> bytes:
@@ -161,15 +60,71 @@ def _check(found: Dissection, kind: str) -> None:
     for span in found.spans:
         assert span.raw == bytes(found.wire[place] for place in span.places), what
     assert kind or not any(span.fault for span in found.spans), what
+    for fault in found.faults:
+        _check_place(found, fault)
+
+
+def _check_place(found: Dissection, fault: Fault) -> None:
+    """A fault is where its bytes are, and what was seen is what they say."""
+    what, wire, seen = (found.wire.hex(), fault), found.wire, fault.seen
+    own = [place for span in found.spans if span.of is fault.of for place in span.places]
+    rest = {span.of: span.places for span in found.spans if isinstance(span.of, Around)}
+    match fault.rule:
+        case Rule.BEGINNING:
+            assert fault.at == 0, what
+        case Rule.FIRST:
+            assert (fault.at, seen) == (0, len(rest[Around.BEFORE])), what
+        case Rule.WHOLE:
+            assert fault.at == len(wire), what
+            assert seen is not None, what
+            assert seen > 0, what
+        case Rule.LAST:
+            assert (fault.at, seen) == (rest[Around.AFTER][0], len(rest[Around.AFTER])), what
+        case Rule.ALONE:
+            assert fault.at == rest[Around.NEXT][0], what
+        case Rule.STUFFING if seen is not None:
+            assert wire[fault.at] == seen, what
+        case Rule.STUFFING | Rule.SIZE:
+            inside = sorted(place for span in found.spans if _is_payload(span.of) for place in span.places)
+            if inside:
+                assert fault.at == (inside[-1] + 1 if fault.rule is Rule.STUFFING else inside[0]), what
+        case Rule.VALUE:
+            assert fault.at in own, what
+        case _:
+            assert own[:1] == [fault.at] or fault.at in rest[Around.NEXT], what
+
+
+_ENVELOPE = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | CheckPart
+
+
+def _is_payload(of: Owner) -> bool:
+    return of is Around.EXTRA or not isinstance(of, Around | _ENVELOPE)
 
 
 @pytest.mark.parametrize(
-    ("path", "direction"), list(_cases()), ids=lambda value: getattr(value, "stem", value)
+    ("path", "direction"), list(cases()), ids=lambda value: getattr(value, "stem", value)
 )
 def test_dissecting_and_decoding_find_the_same_fault(path: Path | str, direction: Direction) -> None:
-    plan, chance = _plan(path), random.Random(f"{getattr(path, 'stem', path)} {direction}")
-    frames = _frames(plan, direction, chance)
+    plan, chance = plan_at(path), random.Random(f"{getattr(path, 'stem', path)} {direction}")
+    made = frames(plan, direction, chance)
     for index in range(_MUTANTS):
-        wire, request = frames[index % len(frames)]
-        mutant = _mutant(wire, frames, chance)
+        wire, request = made[index % len(made)]
+        mutant = _mutant(wire, made, chance)
         _check(dissect(plan, mutant, direction, request), _kind(plan, mutant, direction, request))
+
+
+@pytest.mark.parametrize(
+    ("path", "direction"),
+    [each for each in cases() if isinstance(plan_at(each[0]).frame.end, ByLength)],
+    ids=lambda value: getattr(value, "stem", value),
+)
+def test_a_frame_that_is_cut_lacks_what_was_cut(path: Path | str, direction: Direction) -> None:
+    plan = plan_at(path)
+    for wire, _ in frames(plan, direction, random.Random(0))[:8]:
+        whole = dissect(plan, wire, direction)
+        added = [span.places[0] for span in whole.spans if span.of is Around.INSERTED]
+        for cut in range(plan.frame.envelope.header_size + len(added), len(wire)):
+            missing = len(wire) - cut - sum(at >= cut for at in added)
+            if missing and not whole.kind:
+                faults = {fault.rule: fault for fault in dissect(plan, wire[:cut], direction).faults}
+                assert (faults[Rule.WHOLE].at, faults[Rule.WHOLE].seen) == (cut, missing)

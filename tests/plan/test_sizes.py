@@ -20,7 +20,7 @@ frame:
     start: {role: constant, value: 7E 7E}
     node: {role: address, type: u8}
     id: {role: message, type: u8}
-    size: {role: length, type: u8, counts: [data, check]}
+    size: {role: length, type: u8, counts: [COUNTS]}
 KIND    data: {role: payload, size: 0..130}
     check: {role: checksum, type: u8, algorithm: sum8, over: [node, id, size, data]}
   stuffing: {after: 0x7E, insert: 0x00, exempt: [start, check]}
@@ -31,8 +31,13 @@ commands:
 """
 
 
-def _plan(nodes: str, number: int, sizes: str, constant: str = "") -> Plan:
-    text = _SCHEMA.replace("NODES", nodes).replace("ID", str(number)).replace("SIZES", sizes)
+def _plan(nodes: str, number: int, sizes: str, constant: str = "", counts: str = "data, check") -> Plan:
+    text = (
+        _SCHEMA.replace("NODES", nodes)
+        .replace("ID", str(number))
+        .replace("SIZES", sizes)
+        .replace("COUNTS", counts)
+    )
     kind = f"    kind: {{role: constant, value: {constant}}}\n" if constant else ""
     protocol, faults = loads(text.replace("KIND", kind), "shape.yaml")
     assert protocol is not None, [str(fault) for fault in faults]
@@ -59,10 +64,11 @@ def test_an_address_and_an_id_may_be_stuffed(nodes: str, number: int) -> None:
     assert plan.message("own").wire_size == _longest(plan)
 
 
-@pytest.mark.parametrize("sizes", ["0..124", "124..124", "125..125", "126..130", "126..126"])
-def test_a_length_may_be_stuffed(sizes: str) -> None:
-    """The length includes the check value; it is stuffed if it always or sometimes equals the byte."""
-    plan = _plan("1..2", 5, sizes)
+@pytest.mark.parametrize("counts", ["data, check", "id, data, check"])
+@pytest.mark.parametrize("sizes", ["0..124", "123..123", "124..124", "125..125", "126..130", "126..126"])
+def test_a_length_may_be_stuffed(sizes: str, counts: str) -> None:
+    """The length includes other parts; it is stuffed if it always or sometimes equals the byte."""
+    plan = _plan("1..2", 5, sizes, counts=counts)
     assert plan.message("own").wire_size == _longest(plan)
 
 
