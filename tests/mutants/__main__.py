@@ -8,12 +8,13 @@ Not drawn, because tests cannot or should not tell them from the original:
 
 - text that is not Python: `*` before keyword-only parameters and `|` of patterns are operators to cosmic-ray;
 - differences in annotations, docstrings or unions of types (`A | B`) alone, which only type checkers read;
+- `frozen`, `slots` and `kw_only` of dataclasses: they forbid what mypy forbids too;
 - `is` in place of `==` or the reverse, `is not` in place of `!=` or the reverse: both sides are enumerations,
   None or small integers, which are the same object exactly where they are equal.
 
 The draw depends on the seed and, for each place, on its function and its line alone, so an edit changes the
-sample only where it changes code. Results are kept in build/mutants.jsonl; with ``--keep`` a mutant that an
-earlier run killed is not tried again, to try only the survivors after a new test.
+sample only where it changes code. Results are kept in build/mutants.jsonl; ``--keep`` goes on from there, and
+tries only new mutants and survivors without a reason, as after a new test.
 """
 
 from __future__ import annotations
@@ -45,16 +46,16 @@ def main(words: Sequence[str] | None = None) -> int:
     mutants = drawing.draw(ROOT, places, given.number, given.seed)
     print(f"{len(mutants)} of {len(places)} places drawn", flush=True)
     given.results.parent.mkdir(parents=True, exist_ok=True)
-    results = {each.id: each for each in _killed(given.results)} if given.keep else {}
+    known = page.reasons()
+    results = settled(given.results, mutants, known) if given.keep else {}
     with given.results.open("a" if given.keep else "w", encoding="utf-8") as file:
-        left = [each for each in mutants if each.id not in results]
+        left = [each for each in mutants if each.place.id not in results]
         for mutant, result in zip(left, _judged(left, given.jobs), strict=True):
             results[result.id] = result
             print(json.dumps(asdict(result)), file=file, flush=True)
             print(_line(mutant, result), flush=True)
     command = shlex.join(["python", "-m", "tests.mutants", *(sys.argv[1:] if words is None else words)])
     run = page.Run(command, given.seed, len(places), mutants, results)
-    known = page.reasons()
     if given.output:
         given.output.write_text(page.text(run, known), "utf-8")
     unexplained = [each for each in run.survivors if page.reason_of(each, known) == page.UNEXPLAINED]
@@ -62,15 +63,18 @@ def main(words: Sequence[str] | None = None) -> int:
     return int(bool(unexplained))
 
 
-def _killed(path: Path) -> Iterator[Result]:
-    for line in path.read_text("utf-8").splitlines() if path.exists() else ():
-        result = Result(**json.loads(line))
-        if result.stage:
-            yield result
+def settled(path: Path, mutants: Sequence[Mutant], known: Sequence[page.Reason]) -> dict[str, Result]:
+    """Results of an earlier run that no new test can change: killed, or survived with a reason."""
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    results = {each.id: each for each in (Result(**json.loads(line)) for line in lines)}
+    explained = {each.place.id for each in mutants if page.reason_of(each, known) != page.UNEXPLAINED}
+    return {name: each for name, each in results.items() if each.stage or name in explained}
 
 
 def _judged(mutants: Sequence[Mutant], jobs: int) -> Iterator[Result]:
     """The results of mutants in their order, each job in a copy of its own."""
+    if not mutants:
+        return
     with tempfile.TemporaryDirectory() as base, ThreadPoolExecutor(jobs) as pool:
         folders: queue.SimpleQueue[Path] = queue.SimpleQueue()
         first, *others = [killing.copied(ROOT, Path(base, str(number))) for number in range(jobs)]
@@ -85,7 +89,10 @@ def _judged(mutants: Sequence[Mutant], jobs: int) -> Iterator[Result]:
             finally:
                 folders.put(folder)
 
-        yield from pool.map(judge, mutants)
+        try:
+            yield from pool.map(judge, mutants)
+        finally:
+            pool.shutdown(cancel_futures=True)
         killing.check(first, stages)
 
 
@@ -102,7 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--number", type=int, default=500, help="mutants to draw (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of the draw (default: %(default)s)")
     parser.add_argument("--jobs", type=int, default=1, help="mutants at a time (default: %(default)s)")
-    parser.add_argument("--keep", action="store_true", help="try only what an earlier run did not kill")
+    parser.add_argument("--keep", action="store_true", help="try again only survivors without a reason")
     parser.add_argument("--results", type=Path, default=ROOT / "build/mutants.jsonl", metavar="FILE")
     parser.add_argument("--output", type=Path, metavar="PAGE", help="page for the figures")
     return parser

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import difflib
 import hashlib
 from collections import Counter
@@ -11,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
-#: Names of types that are not in capitals.
-_TYPES = frozenset({"bool", "bytes", "dict", "int", "list", "str"})
+#: Arguments of `dataclass` that only forbid: to write, to add attributes, to give arguments by place.
+_FORBID = frozenset({"frozen", "slots", "kw_only"})
 
 
 @dataclass(frozen=True)
@@ -29,27 +30,34 @@ class Candidate:
     #: The number of this change among those of its operator in the module, as cosmic-ray counts them.
     occurrence: int = 0
 
+    @property
+    def id(self) -> str:
+        """Identifies the place as long as its line and its function are there, whatever else is edited."""
+        return _digest(self.module, self.definition, self.operator, self.line, self.column, self.number)
+
     def rank(self, seed: int) -> str:
-        """A pseudo-random rank that depends on this place alone, so an edit elsewhere keeps the sample."""
-        place = (self.module, self.definition, self.operator, self.line, self.column, self.number)
-        return hashlib.sha256(repr((seed, *place)).encode()).hexdigest()
+        """A pseudo-random rank."""
+        return _digest(seed, self.id)
+
+
+def _digest(*parts: object) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A changed module: its changed lines before and after, and its whole text after.
+    """A changed module: its changed lines before and after, and its whole text after."""
 
-    Attributes:
-        id: identifies it among the results of a run, also after an edit of comments or docstrings.
-    """
-
-    id: str
-    module: str
-    definition: str
+    place: Candidate
     line: int
     was: str
     now: str
     text: str
+
+    @property
+    def module(self) -> str:
+        """Path of the module."""
+        return self.place.module
 
 
 def candidates(root: Path, modules: Iterable[str]) -> Iterator[Candidate]:
@@ -114,28 +122,25 @@ def draw(
     seed: int,
     change: Callable[[str, Candidate], str] = mutated,
 ) -> list[Mutant]:
-    """A sample of different mutants that are not noise, in the order of their modules and lines."""
-    drawn: dict[str, Mutant] = {}
-    texts: dict[str, str] = {}
+    """A sample of mutants that are not noise, in the order of their modules and lines."""
+    drawn: list[Mutant] = []
     for place in sorted(places, key=lambda each: each.rank(seed)):
         if len(drawn) == number:
             break
-        before = texts.setdefault(place.module, (root / place.module).read_text("utf-8"))
+        before = (root / place.module).read_text("utf-8")
         after = change(before, place)
         if not is_noise(before, after):
-            mutant = mutant_of(place.module, place.definition, before, after)
-            drawn[mutant.id] = mutant
-    return sorted(drawn.values(), key=lambda each: (each.module, each.line, each.id))
+            drawn.append(mutant_of(place, before, after))
+    return sorted(drawn, key=lambda each: (each.module, each.line, each.place.id))
 
 
-def mutant_of(module: str, definition: str, before: str, after: str) -> Mutant:
+def mutant_of(place: Candidate, before: str, after: str) -> Mutant:
     """A mutant by the text of its module before and after."""
     old, new = before.splitlines(), after.splitlines()
     matcher = difflib.SequenceMatcher(None, old, new, autojunk=False)
     changes = [each for each in matcher.get_opcodes() if each[0] != "equal"]
     (_, i, _, k, _), (_, _, j, _, m) = changes[0], changes[-1]
-    name = hashlib.sha256(f"{module} {_essence(after)}".encode()).hexdigest()[:16]
-    return Mutant(name, module, definition, i + 1, _joined(old[i:j]), _joined(new[k:m]), after)
+    return Mutant(place, i + 1, _joined(old[i:j]), _joined(new[k:m]), after)
 
 
 def _joined(lines: Iterable[str]) -> str:
@@ -156,7 +161,7 @@ def _essence(text: str) -> str:
 
 
 class _Essence(ast.NodeTransformer):
-    """Removes annotations and docstrings, and makes all unions of types equal."""
+    """Removes annotations, docstrings and what dataclasses forbid, and makes all unions of types equal."""
 
     def visit(self, node: ast.AST) -> ast.AST:
         match node:
@@ -164,6 +169,8 @@ class _Essence(ast.NodeTransformer):
                 node.annotation = ast.Constant(None)
             case ast.FunctionDef():
                 node.returns = None
+            case ast.Call(func=ast.Name(id="dataclass")):
+                node.keywords = [each for each in node.keywords if each.arg not in _FORBID]
             case ast.Expr(value=ast.Constant()):
                 return ast.Pass()
             case ast.BinOp() if _is_type(node):
@@ -180,7 +187,8 @@ def _is_type(node: ast.expr) -> bool:
         case ast.Subscript(value=value):
             return _is_type(value)
         case ast.Name(id=name):
-            return name in _TYPES or (name[0].isupper() and not name.isupper())
+            is_class = name[0].isupper() and not name.isupper()
+            return is_class or isinstance(getattr(builtins, name, None), type)
         case ast.Constant(value=None):
             return True
         case _:

@@ -20,20 +20,23 @@ _PAGE = """\
 # Mutants
 
 {number} mutants of `qlinkgen/plan` and `qlinkgen/model`, drawn with seed {seed} from {places} places where
-cosmic-ray changes the code, each held against the tests that are named below. {killed} are killed, {share} %.
+cosmic-ray changes the code. Each is tried against the tests below. {killed} are killed, {share} %.
 `tests/mutants/__main__.py` says what is not drawn, and why.
 
-`make mutants` runs it and writes this page; the last time it was
+`make mutants` runs it and writes this page; the last run was
 
 ```
 {command}
 ```
 
-({minutes} minutes of tests). A stage runs only on mutants that the stages before it left. One that takes more
-than five times as long as without a mutant, and 20 seconds, counts as failed: {late} of the killed.
+({minutes} minutes of tests). A stage runs only on mutants that passed the previous stages. It also fails if
+it takes more than five times as long as without a mutant, and 20 seconds: {late} of the killed.
 
 {stages}
 {modules}
+Three changes that no test noticed once have tests of their own now: in `tests/schema/test_numbers.py` the
+lower bound of a default, in `tests/plan/test_sizes.py` the address and the id in the worst-case size.
+
 ## Survivors
 
 {survivors}"""
@@ -53,8 +56,13 @@ class Reason:
 
     def fits(self, mutant: Mutant) -> bool:
         """Whether this is the reason of a mutant, on whatever line it is."""
-        names = ("module", "definition", "was", "now")
-        return all(getattr(self, name) in (None, getattr(mutant, name)) for name in names)
+        pairs = (
+            (self.module, mutant.module),
+            (self.definition, mutant.place.definition),
+            (self.was, mutant.was),
+            (self.now, mutant.now),
+        )
+        return all(wanted in (None, seen) for wanted, seen in pairs)
 
 
 def reasons(path: Path = REASONS) -> list[Reason]:
@@ -80,12 +88,12 @@ class Run:
     @property
     def survivors(self) -> list[Mutant]:
         """Mutants that no stage killed."""
-        return [each for each in self.mutants if self.results[each.id].stage is None]
+        return [each for each in self.mutants if self.results[each.place.id].stage is None]
 
 
 def text(run: Run, known: Sequence[Reason]) -> str:
     """The page."""
-    results = [run.results[each.id] for each in run.mutants]
+    results = [run.results[each.place.id] for each in run.mutants]
     killed = len(results) - len(run.survivors)
     return _PAGE.format(
         number=len(results),
@@ -124,10 +132,10 @@ def _survivors(mutants: Sequence[Mutant], known: Sequence[Reason]) -> str:
 
 
 def _code(line: str) -> str:
-    """A line in a cell; a bar would end the cell."""
-    return f"`` {line} ``".replace("|", "\\|") if line else "(removed)"
+    return f"`` {line} ``" if line else "(removed)"
 
 
 def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of Markdown; a bar would end a cell."""
     lines = [names, ["---"] * len(names), *rows]
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+    return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n" for cells in lines)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
 from tests.mutants import drawing, killing, page
+from tests.mutants.__main__ import settled
 from tests.mutants.drawing import Candidate, is_noise, mutant_of
 
 ROOT = Path(__file__).parents[2]
 _MODULE = "qlinkgen/plan/__init__.py"
+_PLACE = Candidate(_MODULE, "double", "core/NumberReplacer", "return 2 * number", 7)
 _TEXT = """\
 def double(number: int) -> int:
     return 2 * number
@@ -72,6 +75,8 @@ def test_the_draw_depends_on_the_seed_and_on_the_lines_drawn(tmp_path: Path) -> 
         ("def f(*, a): pass", "def f(-, a): pass", True),
         ('def f():\n    """1"""\n    return 1', 'def f():\n    """2"""\n    return 1', True),
         ("a = 1", "a =  1", True),
+        ("@dataclass(frozen=True)\nclass A: pass", "@dataclass(frozen=False)\nclass A: pass", True),
+        ("@dataclass(eq=True)\nclass A: pass", "@dataclass(eq=False)\nclass A: pass", False),
         ("a = b | c", "a = b & c", False),
         ("a = MARK | 1", "a = MARK & 1", False),
         ("a = 1", "a = 2", False),
@@ -92,7 +97,7 @@ def test_identity_is_not_traded_for_equality() -> None:
 
 
 def test_a_mutant_shows_all_its_lines() -> None:
-    mutant = mutant_of("m.py", "f", "a = 1\nb = [\n    2,\n]\nc = 3\n", "a = 1\nb = []\nc = 3\n")
+    mutant = mutant_of(_PLACE, "a = 1\nb = [\n    2,\n]\nc = 3\n", "a = 1\nb = []\nc = 3\n")
     assert (mutant.line, mutant.was, mutant.now) == (2, "b = [ 2, ]", "b = []")
 
 
@@ -102,14 +107,14 @@ def test_a_change_that_a_test_sees_is_killed_and_others_survive(tmp_path: Path) 
     same_value = _TEXT.replace("2 * number", "number * 2")
     wrong_value = _TEXT.replace("2 * number", "3 * number")
     for text, killer in ((_TEXT, None), (same_value, None), (wrong_value, "check")):
-        result = killing.judged(tree, stages, replace(mutant_of(_MODULE, "", "", text)))
+        result = killing.judged(tree, stages, mutant_of(_PLACE, f"{_TEXT}\n", text))
         assert (result.stage, result.late) == (killer, False)
         assert (tree / _MODULE).read_text() == _TEXT
 
 
 def test_an_endless_loop_is_killed(tmp_path: Path) -> None:
     tree = _tree(tmp_path)
-    endless = mutant_of(_MODULE, "count", _TEXT, _TEXT.replace("at += 1", "at += 0"))
+    endless = mutant_of(_PLACE, _TEXT, _TEXT.replace("at += 1", "at += 0"))
     stages = [replace(each, limit=1.0) for each in killing.fit(tree, _CHECK)]
     result = killing.judged(tree, stages, endless)
     assert (result.stage, result.late) == ("check", True)
@@ -137,16 +142,32 @@ def test_no_mutant_hides_behind_bytecode(tmp_path: Path) -> None:
 
 
 def test_a_page_names_every_survivor_with_its_reason() -> None:
-    known, unknown, dead = (mutant_of("m.py", "f", "a = 1\n", f"a = {number}\n") for number in (2, 3, 4))
-    results = {each.id: killing.Result(each.id, None, late=False, seconds=30.0) for each in (known, unknown)}
-    results[dead.id] = killing.Result(dead.id, "plan", late=True, seconds=60.0)
-    run = page.Run("python -m tests.mutants", 1, 99, [known, unknown, dead], results)
-    text = page.text(run, [page.Reason("the same", module="m.py", was="a = 1", now="a = 2")])
+    places = [Candidate("m.py", "", "core/NumberReplacer", "a = 1", 4, number) for number in range(3)]
+    mutants = [mutant_of(place, "a = 1\n", f"a = {5 * place.number}\n") for place in places]
+    results = {each.id: killing.Result(each.id, None, late=False, seconds=30.0) for each in places}
+    results[places[2].id] = killing.Result(places[2].id, "plan", late=True, seconds=60.0)
+    run = page.Run("python -m tests.mutants", 1, 99, mutants, results)
+    text = page.text(run, [page.Reason("the same", module="m.py", was="a = 1", now="a = 0")])
     assert "3 mutants" in text
     assert "1 are killed, 33.3 %" in text
-    assert "| `m.py:1` | `` a = 1 `` | `` a = 2 `` | the same |\n" in text
-    assert f"| `m.py:1` | `` a = 1 `` | `` a = 3 `` | {page.UNEXPLAINED} |\n" in text
-    assert "a = 4" not in text
+    assert "| `m.py:1` | `` a = 1 `` | `` a = 0 `` | the same |\n" in text
+    assert f"| `m.py:1` | `` a = 1 `` | `` a = 5 `` | {page.UNEXPLAINED} |\n" in text
+    assert "a = 10" not in text
+
+
+def test_a_run_goes_on_where_nothing_can_have_changed(tmp_path: Path) -> None:
+    places = [Candidate("m.py", "", "core/NumberReplacer", "a = 1", 4, number) for number in range(4)]
+    mutants = [mutant_of(place, "a = 1\n", f"a = {5 + place.number}\n") for place in places]
+    stages = ("plan", None, None)
+    results = [
+        killing.Result(place.id, stage, late=False, seconds=1.0)
+        for place, stage in zip(places, stages, strict=False)
+    ]
+    path = tmp_path / "results.jsonl"
+    assert settled(path, mutants, []) == {}
+    path.write_text("".join(f"{json.dumps(asdict(each))}\n" for each in results))
+    explained = settled(path, mutants, [page.Reason("the same", now="a = 6")])
+    assert explained == {each.id: each for each in results[:2]}
 
 
 def test_every_reason_is_of_code_that_there_is() -> None:
