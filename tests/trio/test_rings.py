@@ -137,7 +137,7 @@ def test_a_ring_has_15_places() -> None:
         SimulationError, match=r"unknown kind of node 'plotter'; .* coordinator, keypad, passive"
     ):
         VirtualRing("coordinator,plotter")
-    with pytest.raises(SimulationError, match="node 0 is no KeypadNode but a CoordinatorNode"):
+    with pytest.raises(SimulationError, match="node 0 is a CoordinatorNode, not a KeypadNode"):
         VirtualRing("coordinator").keypad(0)
 
 
