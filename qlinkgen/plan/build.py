@@ -42,7 +42,7 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
         commands=tuple(command for command in protocol.commands if command.request.name in names),
         enums=tuple(each for each in protocol.enums if not options.only or each.name in used),
         flags=tuple(each for each in protocol.flags if not options.only or each.name in used),
-        heard=select.heard(protocol, options.role),
+        received_directions=select.received_directions(protocol, options.role),
     )
 
 

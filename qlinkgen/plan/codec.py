@@ -41,7 +41,7 @@ from qlinkgen.plan.framing import (
     PayloadPart,
     Rescan,
 )
-from qlinkgen.plan.reading import Astray, BadFrame, FrameReader, Missing, Taken, read_marked
+from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, read_marked
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -80,10 +80,11 @@ class Codec:
     ) -> bytes:
         """The frame of a message; ``request`` is the packet that it answers. Raises Unsendable."""
         message = self.plan.message(name)
-        whom = message.message.default_address if address is None else address
-        if message.allowed is not None and not message.allowed.holds(whom):
-            raise Unsendable(self.plan.frame.address, whom)
-        return self.wrap(name, content.pack(message.payload, values), whom, request)
+        if address is None:
+            address = message.message.default_address
+        if message.allowed is not None and not message.allowed.holds(address):
+            raise Unsendable(self.plan.frame.address, address)
+        return self.wrap(name, content.pack(message.payload, values), address, request)
 
     def wrap(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
         """A valid frame around a payload, which is not checked."""
@@ -133,10 +134,10 @@ class Codec:
             raise BadFrame("truncated", 0)
         try:
             return self._decode(wire, direction, request)
-        except Missing:
+        except Incomplete:
             raise BadFrame("truncated", len(wire)) from None
-        except Astray as astray:
-            raise BadFrame(astray.kind, astray.at) from None
+        except NoFrame as no_frame:
+            raise BadFrame(no_frame.kind, no_frame.at) from None
 
     def _decode(self, wire: bytes, direction: Direction, request: bytes) -> Decoded:
         frame, known = self.plan.frame, self.plan.known(direction)

@@ -32,7 +32,7 @@ from qlinkgen.plan.framing import (
     PayloadPart,
 )
 from qlinkgen.plan.payload import Member, Step
-from qlinkgen.plan.reading import BadFrame, Cursor, Missing
+from qlinkgen.plan.reading import BadFrame, Cursor, Incomplete
 from qlinkgen.plan.spans import Around, Cell, Dissection, Fault, Rule, Span
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -78,14 +78,14 @@ class _Cursor(Cursor):
     def some(self, size: int, *, stuffed: bool) -> None:
         """Take ``size`` bytes, or all that are left."""
         if self.next is None:
-            with suppress(Missing):
+            with suppress(Incomplete):
                 self.take(size, stuffed=stuffed)
 
     def misplaced(self, *, again: bool) -> None:
         """Record the offset."""
         if again:
             self.at = self.next = self.at - 2
-            raise Missing
+            raise Incomplete
         self.at -= 1
         self.wrong.append(self.at)
 
@@ -112,7 +112,7 @@ class _Walk:
         self.spans: list[Span] = []
         self.faults: list[Fault] = []
         #: The preamble is missing, so the length may be any byte.
-        self.astray = False
+        self.no_preamble = False
         #: A count is out of range; the payload is assumed to be the rest.
         self.miscounted = False
 
@@ -165,7 +165,7 @@ class _Walk:
 
     def _lost(self, first: ConstantPart) -> None:
         """Handle a missing preamble: the first bytes may be its end, and a check value may cover it."""
-        self.astray = True
+        self.no_preamble = True
         self._fault("frame", Rule.BEGINNING, 0, first)
         ends = (first.data[at:] for at in range(1, first.size))
         rest = next((end for end in ends if self.wire.startswith(end)), b"")
@@ -178,7 +178,7 @@ class _Walk:
         """Take the parts in wire order."""
         for part in front:
             self._take(part, part.size)
-            if isinstance(part, LengthPart) and not self.astray:
+            if isinstance(part, LengthPart) and not self.no_preamble:
                 self._bound(part)
         self._identify()
         if self.message is not None:
@@ -305,7 +305,7 @@ class _Walk:
             cursor.at += 1
         self._after()
         short = [part for part in self.envelope.parts if self._short(part)]
-        if short and not self.astray:
+        if short and not self.no_preamble:
             self._fault("truncated", Rule.WHOLE, size, short[0], sum(map(self._short, short)))
 
     def _close_cells(self) -> None:
@@ -426,7 +426,9 @@ class _Walk:
             self._span(part, received)
             return expected
         # Wrong stuffing or a wrong length shifts the bytes, so the check value is meaningless.
-        if self.astray or any(each.rule in (Rule.STUFFING, Rule.LENGTH, Rule.WHOLE) for each in self.faults):
+        if self.no_preamble or any(
+            each.rule in (Rule.STUFFING, Rule.LENGTH, Rule.WHOLE) for each in self.faults
+        ):
             self._span(part, received)
             return None
         refused = check.rejected is not None and data == check.pack(check.rejected)

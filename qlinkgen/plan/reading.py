@@ -48,7 +48,7 @@ class BadFrame(ValueError):
         self.field = field
 
 
-class Astray(Exception):
+class NoFrame(Exception):
     """No frame begins here.
 
     Attributes:
@@ -57,29 +57,29 @@ class Astray(Exception):
     """
 
     def __init__(self, kind: str, at: int) -> None:
-        """Note kind and place."""
+        """Set the attributes."""
         super().__init__(kind, at)
         self.kind = kind
         self.at = at
 
 
-class Missing(Exception):
-    """The bytes so far may be the beginning of a frame.
+class Incomplete(Exception):
+    """The bytes may be the beginning of a frame.
 
     Attributes:
-        size: at least so many bytes are needed to decide,
-        telling: or fewer that end with this byte, as an inserted byte may have to follow it.
+        size: the number of bytes needed to decide.
+        ending: fewer bytes decide if this is the last of them, as an inserted byte may have to follow it.
     """
 
-    def __init__(self, size: int = 0, telling: bytes = b"") -> None:
-        """Note both."""
-        super().__init__(size, telling)
+    def __init__(self, size: int = 0, ending: bytes = b"") -> None:
+        """Set the attributes."""
+        super().__init__(size, ending)
         self.size = size
-        self.telling = telling
+        self.ending = ending
 
-    def still(self, wire: bytes) -> bool:
-        """Return whether one more byte than before decides nothing either."""
-        return len(wire) < self.size and wire[-1:] != self.telling
+    def is_undecided(self, wire: bytes) -> bool:
+        """Whether these bytes, one more than before, do not decide either."""
+        return len(wire) < self.size and wire[-1:] != self.ending
 
 
 @dataclass
@@ -120,7 +120,7 @@ class Cursor:
         self.inserted: list[int] = []
 
     def take(self, size: int, *, stuffed: bool) -> bytes:
-        """Bytes of a part. Raises Missing, or BadFrame for a wrong inserted byte."""
+        """Bytes of a part. Raises Incomplete, or BadFrame for a wrong inserted byte."""
         taken = b""
         rule = self._rule if stuffed else None
         while len(taken) < size:
@@ -138,13 +138,13 @@ class Cursor:
         """The bytes up to the next inserted one."""
         start, left = self.at, len(self._wire) - self.at
         if left == 0:
-            raise Missing(start + most, rule.after[-1:] if rule is not None else b"")
+            raise Incomplete(start + most, rule.after[-1:] if rule is not None else b"")
         last = -1 if rule is None else self._wire.find(rule.after[-1:], start, start + most)
         size = min(most, left) if last < 0 else last + 1 - start
         self.at += size
         self.places += range(start, self.at)
         if size < most and rule is None:
-            raise Missing(start + most)
+            raise Incomplete(start + most)
         return self._wire[start : self.at]
 
     def _pass_inserted(self) -> None:
@@ -163,7 +163,7 @@ class Cursor:
 
     def _byte(self) -> int:
         if self.at == len(self._wire):
-            raise Missing(self.at + 1)
+            raise Incomplete(self.at + 1)
         self.at += 1
         return self._wire[self.at - 1]
 
@@ -186,7 +186,7 @@ class FrameReader:
     def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
         """The frame that begins at ``start``; check value and contents are not checked.
 
-        Raises Astray, Missing or BadFrame.
+        Raises NoFrame, Incomplete or BadFrame.
         """
         rule = self._whole.rule if self._whole else None
         cursor, taken = Cursor(wire, start, rule, hunting=hunting), Taken()
@@ -212,7 +212,7 @@ class FrameReader:
                 for byte in part.data:
                     taken.cells[part.name] += self._take(cursor, part, 1)
                     if taken.cells[part.name][-1] != byte:
-                        raise Astray("frame", cursor.at - 1)
+                        raise NoFrame("frame", cursor.at - 1)
                 return 0
             case LengthPart() | IdPart() | AddressPart():
                 data = self._take(cursor, part, part.size)
@@ -247,9 +247,9 @@ class FrameReader:
             return
         message = self._known.get(taken.number)
         if message is None:
-            raise Astray("unknown", cursor.at)
+            raise NoFrame("unknown", cursor.at)
         if taken.address is not None and message.allowed and not message.allowed.holds(taken.address):
-            raise Astray("range", cursor.at)
+            raise NoFrame("range", cursor.at)
 
     def _payload(self, cursor: Cursor, taken: Taken, length: int) -> bytes:
         part, end = self._envelope.payload, self._plan.end
@@ -296,14 +296,14 @@ class FrameReader:
 
 
 def read_marked(plan: FramePlan, known: Mapping[int, MessagePlan], wire: bytes) -> Taken:
-    """The frame from a header to the next end, which must be the whole data. Raises Missing or BadFrame."""
+    """The frame from a header to the next end, which must be all the data. Raises Incomplete or BadFrame."""
     assert isinstance(plan.end, ByMark)
     header, end = plan.end.header, plan.end.end
     marks = [at for at, byte in enumerate(wire) if byte & header.marker]
     if not marks or marks[0] != 0 or header.id_of(wire[0]) == end.end_id:
         raise BadFrame("frame", 0)
     if len(marks) == 1:
-        raise Missing
+        raise Incomplete
     last = marks[1]
     if header.id_of(wire[last]) != end.end_id:
         raise BadFrame("frame", last)

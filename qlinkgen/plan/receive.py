@@ -14,7 +14,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec, Decoded, take_packet
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.framing import ByMark, Hunt, InStep, Marks, Rescan
-from qlinkgen.plan.reading import Astray, BadFrame, FrameReader, Missing, Taken, take_marked
+from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, take_marked
 from qlinkgen.plan.tree import Plan
 
 
@@ -120,7 +120,7 @@ class HuntingReceiver(Receiver):
         self._marks = 0
         self._raw = b""
         #: Why the frame is not complete.
-        self._missing = Missing()
+        self._incomplete = Incomplete()
 
     def take(self, byte: int) -> Iterator[Event]:
         """Search for a preamble, or collect a frame."""
@@ -136,16 +136,16 @@ class HuntingReceiver(Receiver):
             return
         marks, self._marks = self._marks, 0
         if marks >= 2:
-            self._raw, self._missing = bytes((self._mark, self._mark, byte)), Missing()
+            self._raw, self._incomplete = bytes((self._mark, self._mark, byte)), Incomplete()
             yield from self._inside()
 
     def _inside(self) -> Iterator[Event]:
-        if self._missing.still(self._raw):
+        if self._incomplete.is_undecided(self._raw):
             return
         try:
             taken = self._reader.read(self._raw, hunting=True)
-        except Missing as missing:
-            self._missing = missing.with_traceback(None)
+        except Incomplete as incomplete:
+            self._incomplete = incomplete.with_traceback(None)
             return
         except BadFrame as bad:
             aborted = bad.kind == "truncated"
@@ -177,34 +177,34 @@ class RescanningReceiver(Receiver):
         self._first, self._longest = envelope.preamble[:1], envelope.max_frame
         self._buffer, self._skipped, self._due = b"", b"", b""
         #: Why the frame that may begin the buffer is not complete.
-        self._missing = Missing()
+        self._incomplete = Incomplete()
 
     def take(self, byte: int) -> Iterator[Event]:
         """Buffer the byte and search for frames."""
         self._buffer += bytes((byte,))
-        if not self._missing.still(self._buffer):
+        if not self._incomplete.is_undecided(self._buffer):
             yield from self._scan()
 
     def _scan(self) -> Iterator[Event]:
         while self._buffer:
-            self._missing = Missing()
+            self._incomplete = Incomplete()
             due, self._due = self._due, b""
             if due and self._buffer[:1] == due:
                 self._buffer = self._buffer[1:]
                 continue
             if self._first and self._buffer[:1] != self._first:
-                # As for Astray below, for a run of bytes at once: most of what is searched begins no frame.
+                # As for NoFrame below, but for several bytes at once: most bytes do not begin a frame.
                 at = self._buffer.find(self._first)
                 self._buffer = self._buffer[at:] if at > 0 else b""
                 continue
             try:
                 taken = self._reader.read(self._buffer)
-            except Missing as missing:
+            except Incomplete as incomplete:
                 if not self.ended:
-                    self._missing = missing.with_traceback(None)
+                    self._incomplete = incomplete.with_traceback(None)
                     return
                 yield from self._drop("", b"")
-            except Astray:
+            except NoFrame:
                 yield from self._drop("", b"")
             except BadFrame as bad:
                 yield from self._drop(bad.kind, self._buffer[: bad.end])
@@ -253,7 +253,7 @@ class RescanningReceiver(Receiver):
             self._buffer = self._buffer[1:]
         yield from self._scan()
         yield from self._report(self.taken)
-        self._buffer, self._due, self._missing = b"", b"", Missing()
+        self._buffer, self._due, self._incomplete = b"", b"", Incomplete()
 
 
 class MarkReceiver(Receiver):

@@ -46,16 +46,16 @@ def decoded(message: Message, role: Role) -> bool:
     return role != _SENDERS[message.direction]
 
 
-def heard(protocol: Protocol, role: Role) -> tuple[Direction, ...]:
+def received_directions(protocol: Protocol, role: Role) -> tuple[Direction, ...]:
     """The directions that the role receives."""
     if protocol.directions == ("message",):
         return ("message",)
-    heard: dict[Role, tuple[Direction, ...]] = {
+    by_role: dict[Role, tuple[Direction, ...]] = {
         "both": ("request", "response"),
         "master": ("response",),
         "slave": ("request",),
     }
-    return heard[role]
+    return by_role[role]
 
 
 def named(messages: tuple[Message, ...]) -> frozenset[str]:

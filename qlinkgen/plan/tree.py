@@ -74,7 +74,7 @@ class Plan:
         commands: transactions whose request is selected; the response may not be in ``messages``.
         enums: enums used by selected messages; all enums if no message is left out.
         flags: likewise for flags.
-        heard: directions that the role receives.
+        received_directions: directions that the role receives.
     """
 
     protocol: Protocol
@@ -84,7 +84,7 @@ class Plan:
     commands: tuple[Command, ...]
     enums: tuple[Enum, ...]
     flags: tuple[Flags, ...]
-    heard: tuple[Direction, ...]
+    received_directions: tuple[Direction, ...]
 
     @cached_property
     def by_name(self) -> Mapping[str, MessagePlan]:
@@ -109,9 +109,9 @@ class Plan:
         directions: tuple[Direction, ...] = get_args(Direction)
         return {each: {message.id: message for message in self.received(each)} for each in directions}
 
-    def hears(self, message: MessagePlan) -> Direction:
+    def direction_of(self, message: MessagePlan) -> Direction:
         """The direction that a decoder of the message has to be set to."""
-        return self.heard[0] if message.direction == "message" else message.direction
+        return self.received_directions[0] if message.direction == "message" else message.direction
 
     @property
     def max_wire_size(self) -> int:

@@ -107,7 +107,7 @@ def test_roles(
         ) == sent
 
 
-def test_only_what_is_asked_for(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+def test_only_selected_messages(tmp_path: Path, require_tool: Callable[..., str]) -> None:
     program = require_tool("gcc", package="gcc")
     text = header("qlink", tmp_path, Options(role="slave", only=("motion", "node_start")))
     compile_only(program, "-std=c99", "-O1", includes("qlink", tmp_path))

@@ -26,7 +26,7 @@ def test_dispatch(name: str, tmp_path: Path, require_tool: Callable[..., str]) -
     run(tmp_path / "test")
 
 
-def test_transactions_are_told_in_full(tmp_path: Path) -> None:
+def test_transactions_have_all_constants(tmp_path: Path) -> None:
     """Each command has the constants that apply to it, and no others."""
     for name in PROTOCOLS:
         text, protocol = header(name, tmp_path), protocol_of(name)

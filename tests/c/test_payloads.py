@@ -201,7 +201,7 @@ def test_the_same_bytes(name: str, plan: Plan, driver: Driver) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES, ids=NAMES.values())
-def test_a_size_that_no_count_tells_is_refused(name: str, plan: Plan, driver: Driver) -> None:
+def test_a_size_that_matches_no_count_is_refused(name: str, plan: Plan, driver: Driver) -> None:
     message, chance = plan.message(name), random.Random(name)
     for run in message.payload.runs:
         bounds = message.payload.sendable(run)

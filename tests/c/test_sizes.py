@@ -84,7 +84,7 @@ def test_the_longest_frame_is_delivered(longest: Driver, most: int) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_target_whose_int_is_too_narrow_is_told_so(
+def test_a_target_with_too_narrow_an_int_is_an_error(
     kind: str, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
     """Functions return sizes as an int, which with 16 bits holds 32,767 bytes."""

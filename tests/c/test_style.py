@@ -16,7 +16,7 @@ WIDTH = 120
 
 
 @pytest.mark.parametrize("name", PROTOCOLS)
-def test_no_line_has_to_be_scrolled(name: str, tmp_path: Path) -> None:
+def test_lines_fit_the_page(name: str, tmp_path: Path) -> None:
     for role in ROLES:
         lines = header(name, tmp_path, Options(role=role)).splitlines()
         assert not [line for line in lines if len(line) > WIDTH or line != line.rstrip() or "\t" in line]

@@ -154,7 +154,7 @@ SOURCES = {
 
 @pytest.mark.parametrize("target", [CORTEX_M0, AVR], ids=lambda target: target.name)
 @pytest.mark.parametrize("reason", SOURCES)
-def test_a_stack_without_bound_is_no_figure(
+def test_an_unbounded_stack_has_no_figure(
     reason: str, target: Target, tmp_path: Path, require_tool: Tool
 ) -> None:
     require_tool(f"{target.prefix}-gcc", package=target.package)

@@ -113,7 +113,7 @@ def test_every_name_is_clean(compiler: str, tmp_path: Path, require_tool: Callab
     assert done.returncode == 0, done.stderr[:3000]
 
 
-def test_what_is_alike_is_there_once() -> None:
+def test_equal_messages_share_code() -> None:
     """Equal messages share a struct and its code, but not with other member types; all texts are kept."""
     text = header("speed")
     assert "/* p: Said.; in V; 0..9 */\ntypedef host_get_request_t host_get_response_t;" in text

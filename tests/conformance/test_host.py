@@ -35,9 +35,9 @@ RUNS = [
 ]
 
 
-def hears(plan: Plan, message: Message) -> Direction:
+def direction_of(plan: Plan, message: Message) -> Direction:
     """The direction in which a message is received."""
-    return plan.hears(plan.message(message.name))
+    return plan.direction_of(plan.message(message.name))
 
 
 def vectors_of(name: str) -> Counter[str]:
@@ -50,7 +50,9 @@ def vectors_of(name: str) -> Counter[str]:
     counts["decode"] = len(good) + len(wrong)
     plan = plan_of(protocol)
     heard = [case.message for case in good]
-    heard += [each.message for each in wrong if streams.fed(plan, hears(plan, each.message), each.wire)]
+    heard += [
+        each.message for each in wrong if streams.fed(plan, direction_of(plan, each.message), each.wire)
+    ]
     counts["receive"] = sum(not (packets and message.direction == "response") for message in heard)
     out_of_range = [row.message for row in wrong if row.kind == "range"]
     asked = [case.message for case in good if case.kinds] + out_of_range
@@ -124,7 +126,7 @@ def test_dispatching_can_be_left_out(kit: Write, tmp_path: Path, require_tool: C
     assert not {"ask", "tell"} & set(report.by_verb)
 
 
-def test_a_part_that_is_none_is_refused(kit: Write, require_tool: Callable[..., str]) -> None:
+def test_an_unknown_part_is_refused(kit: Write, require_tool: Callable[..., str]) -> None:
     with pytest.raises(AssertionError, match=r"must be messages of 0\.\.34"):
         kits.compiled(
             Path("/dev/null"), require_tool("gcc", package="gcc"), "-DCONFORMANCE_LAST=35", kit("qlink")
@@ -150,7 +152,7 @@ def test_a_role_has_the_vectors_of_its_side(
     assert ("tell" in report.by_verb) == (role == "master" and name != "mc1231a")
 
 
-def test_what_is_left_out_has_no_vectors(tmp_path: Path, require_tool: Callable[..., str]) -> None:
+def test_messages_left_out_have_no_vectors(tmp_path: Path, require_tool: Callable[..., str]) -> None:
     file = kits.write("qlink", tmp_path, Options(role="slave", only=("motion", "node_start")))
     program = require_tool("gcc", package="gcc")
     report = kits.ran(kits.compiled(tmp_path / "kit", program, "-std=c99", kits.STDIO, file))

@@ -68,7 +68,7 @@ def test_values_out_of_range_are_not_to_be_sent(kit: Write) -> None:
     assert "/* a_u64 is" not in sink
 
 
-def test_vectors_by_hand_say_where_they_come_from(kit: Write) -> None:
+def test_vectors_by_hand_have_their_source(kit: Write) -> None:
     text = " ".join(kit("qlink").read_text().replace("\n     * ", " ").split())
     for row in [*cases.by_hand("qlink")["vectors"], *cases.by_hand("qlink")["faults"]]:
         assert f"by hand, {row['source']}" in text
@@ -151,7 +151,7 @@ commands:
 
 
 def test_a_constant_after_the_checksum(tmp_path: Path, require_tool: Callable[..., str]) -> None:
-    """The check value and the constant are wrong in turn, and each fault has its kind."""
+    """First the check value is wrong, then the constant, and each fault has its kind."""
     (tmp_path / "ended.yaml").write_text(ENDED)
     report = run(load(tmp_path / "ended.yaml"), tmp_path, require_tool("gcc", package="gcc"))
     assert len(report.names) == report.planned

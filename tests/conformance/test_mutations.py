@@ -108,7 +108,7 @@ def test_another_polynomial_is_found_first(
     assert {each.split(" ")[0] for each in report.failed} == {"check", "direct_variable_transfer"}
 
 
-def test_a_diagnosis_says_what_was_expected_and_what_came(
+def test_a_diagnosis_has_the_expected_and_the_actual_result(
     kit: Write, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
     report = run_with(MISTAKES["an offset"], kit, tmp_path, require_tool("clang", package="clang"))

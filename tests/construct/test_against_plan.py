@@ -105,7 +105,7 @@ def both(name: str) -> Both | None:
 
 
 @every_schema
-def test_payloads_and_frames_are_read_as_the_plan_says(name: str) -> None:
+def test_payloads_and_frames_are_decoded_as_by_the_plan(name: str) -> None:
     one = both(name)
     if one is None:
         return
@@ -142,7 +142,7 @@ def test_payloads_and_frames_are_read_as_the_plan_says(name: str) -> None:
 
 
 @every_schema
-def test_what_cannot_be_sent_is_refused_as_the_plan_says(name: str) -> None:
+def test_illegal_values_are_refused_as_by_the_plan(name: str) -> None:
     one = both(name)
     for message in one.protocol.messages if one else ():
         assert one is not None

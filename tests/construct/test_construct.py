@@ -27,7 +27,7 @@ def source(name: str, options: Options | None = None) -> str:
 
 
 @every_protocol
-def test_source_says_what_is_imported_and_is_valid(name: str) -> None:
+def test_source_is_valid_and_has_its_imports(name: str) -> None:
     text = source(name)
     compile(text, name, "exec")
     for line in text.splitlines():
@@ -79,7 +79,7 @@ def test_a_whole_frame_is_a_container() -> None:
     assert frame.parse(wire) == {"message": "write_read.request", "node": 1, "fields": {"outputs": 0xA5FFA5}}
 
 
-def test_only_keeps_what_is_named() -> None:
+def test_only_keeps_the_named_messages() -> None:
     text = source("qlink", Options(only=("motion", "read.request")))
     assert "MOTION_REQUEST = " in text
     assert "MOTION_RESPONSE = " in text
@@ -117,12 +117,12 @@ def build(fields: dict[str, Any], message: str = "node_setup.request", node: Any
         {"unknown": 1},
     ],
 )
-def test_what_cannot_be_sent_is_refused(fields: dict[str, Any]) -> None:
+def test_illegal_values_are_refused(fields: dict[str, Any]) -> None:
     with pytest.raises(ConstructError):
         build(fields)
 
 
-def test_who_cannot_be_addressed_is_refused() -> None:
+def test_illegal_addresses_are_refused() -> None:
     with pytest.raises(ConstructError):
         build({}, node=17)
     with pytest.raises(ConstructError):

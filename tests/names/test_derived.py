@@ -1,7 +1,7 @@
-"""Names that look like those a target makes of another name, such as `a_count`, `a_1` and `a_t` beside `a`.
+"""Names equal to those that a target derives from another one, such as `a_count`, `a_1` and `a_t` beside `a`.
 
-The words are what the targets make of the neutral names. Lint may refuse a schema for a clash; what it takes
-compiles, and means the same.
+The words are derived by the targets from neutral names. Lint may refuse a schema for a clash; accepted
+schemas compile, and all targets agree on them.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def fields(types: Sequence[str], rng: random.Random) -> dict[str, Json]:
 
 
 @pytest.mark.parametrize("seed", [1, None])
-def test_what_lint_takes_compiles_and_agrees(
+def test_schemas_accepted_by_lint_compile_and_agree(
     seed: int | None, tmp_path: Path, require_tool: Callable[..., str]
 ) -> None:
     seed = random.SystemRandom().randrange(1 << 32) if seed is None else seed
@@ -82,8 +82,8 @@ def test_what_lint_takes_compiles_and_agrees(
 
 
 @pytest.mark.parametrize("group", ["commands", "messages"])
-def test_a_command_and_a_message_are_not_called_the_same(group: str) -> None:
-    """Both would be the same member of a table of handlers."""
+def test_a_command_and_a_message_have_different_names(group: str) -> None:
+    """Both would become the same member of the table of handlers."""
     document = Document(commands={"zz": ({}, {})}, messages={"zz" if group == "messages" else "ww": {}})
     _, faults = loads(document.text(), "x.yaml")
     assert [fault.rule for fault in faults] == (["name-clash"] if group == "messages" else [])

@@ -1,7 +1,7 @@
-"""Every word, in every slot for a name: lint takes it, and each target says the same with it.
+"""Every word as every kind of name: lint accepts it, and all targets agree on it.
 
-Slots of which a schema has many hold all words at once. The parts of a frame and the protocol have one name
-each, so there is a schema for each word, and all their headers are compiled as one file.
+Where a schema has many names of a kind, one schema has all words. The parts of a frame and the protocol have
+one name each, so each word gets a schema, and all their headers are compiled as one file.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from tests.python.test_bus import loaded
 from tests.support.cdriver import WARNINGS
 from tests.support.sharing import made_once
 
-#: Types of the schema language, which no name can hide.
+#: Types of the schema language, which names must not hide.
 BUILT_IN = ("bool", "bytes", "text")
 INTEGER = re.compile(r"[ui][0-9]+")
 STRICT = (*WARNINGS, "-Wshadow", "-fsyntax-only")
@@ -63,21 +63,21 @@ NEUTRAL = (
 
 @cache
 def c_words() -> list[str]:
-    """What a compiler, its library or a header knows."""
+    """Words used by C, its library or a header."""
     known = {*words.C_KEYWORDS, *words.USUAL, *words.macros("gcc")}
     return words.names(known | words.of_generated(NEUTRAL, ["c"]))
 
 
 @cache
 def python_words() -> list[str]:
-    """What Python or a generated module knows."""
+    """Words used by Python or a generated module."""
     known = words.of_python() | words.of_generated(NEUTRAL, ["python", "bus", "construct"])
     return words.names(known | set(words.USUAL))
 
 
 @cache
 def kit_words() -> list[str]:
-    """What a conformance kit knows beside its header."""
+    """Words used by a conformance kit in addition to its header."""
     known = words.of_generated(NEUTRAL, ["conformance"]) - words.of_generated(NEUTRAL, ["c"])
     return words.names(known | set(words.USUAL))
 
@@ -88,18 +88,18 @@ def every_word() -> list[str]:
 
 
 def types_of(known: Sequence[str]) -> list[str]:
-    """Those that are not types of the language itself."""
+    """The words that are not types of the schema language."""
     return [word for word in known if word not in BUILT_IN and not INTEGER.fullmatch(word)]
 
 
 def dealt(known: Sequence[str], size: int) -> list[Sequence[str]]:
-    """The words in groups of at most so many; those that begin alike come into different ones."""
+    """The words in groups of at most so many; words with the same beginning are in different groups."""
     groups = -(-len(known) // size)
     return [known[index::groups] for index in range(groups)]
 
 
 def runs(names: Sequence[str]) -> Mapping[str, Json]:
-    """Fields of variable size: a byte string or an array each, with its count."""
+    """Fields of variable size, each a byte string or an array with its count."""
     counts = {f"zz{index}": {"type": "u8", "counts": name} for index, name in enumerate(names)}
     return {
         **counts,
@@ -155,7 +155,7 @@ def used(types: Sequence[str]) -> Commands:
 
 
 def alone(known: Sequence[str], shapes: int) -> Iterator[Document]:
-    """Every word as the name of each part of a frame, in so many shapes of frames."""
+    """Every word as the name of each part of a frame, in several shapes of frames."""
     for index in range(len(known)):
         six = [known[(index + 97 * step) % len(known)] for step in range(6)]
         for shape in range(index, index + shapes):
@@ -187,7 +187,7 @@ def test_there_are_many_words() -> None:
 def test_headers_are_clean(
     compiler: str, tmp_path: Path, shared: Path, require_tool: Callable[..., str]
 ) -> None:
-    """As many as there are, in one file: names of one protocol do not touch those of another either."""
+    """All headers in one file: names of different protocols do not clash."""
     program = require_tool(compiler, package=compiler)
     folder = shared / "headers of words"
     with made_once(folder) as first:
@@ -218,7 +218,7 @@ def test_kits_compile(name: str, tmp_path: Path, require_tool: Callable[..., str
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MANY)
-def test_python_and_construct_say_what_the_plan_says(name: str) -> None:
+def test_python_and_construct_agree_with_the_plan(name: str) -> None:
     agree(many(name, python_words()).protocol())
 
 
@@ -229,7 +229,7 @@ def test_python_and_construct_take_every_name_of_a_part() -> None:
 
 
 def test_modules_can_be_called_so(tmp_path: Path) -> None:
-    """Modules have the names of protocols, in a package: keywords and names of other modules are taken."""
+    """Modules of a package are named like protocols, even if the name is a keyword or that of a module."""
     taken = [*keyword.kwlist, *words.names(sys.stdlib_module_names)]
     known = [word for word in words.names([*taken, *words.USUAL]) if len(word) <= 20]
     modules = []
@@ -244,7 +244,7 @@ def test_modules_can_be_called_so(tmp_path: Path) -> None:
 
 
 def written(document: Document, target: str, folder: Path) -> list[str]:
-    """Write what a target makes into one folder; the names of its files."""
+    """Write the files of a target to one folder; returns their names."""
     folder.mkdir(exist_ok=True)
     made = TARGETS[target].load()(document.protocol(), Options())
     for path, text in made.items():
@@ -253,7 +253,7 @@ def written(document: Document, target: str, folder: Path) -> list[str]:
 
 
 def agree(protocol: Protocol) -> None:
-    """Random values of every message are the same frame in Python and construct; calls can be made."""
+    """Random values of every message give the same frame in Python and construct, and calls accept them."""
     module, live, codec = python.load(protocol), construct.live(protocol), Codec(plan_of(protocol))
     loaded(protocol, module)
     for text in construct.generate(protocol, Options()).values():
@@ -270,7 +270,7 @@ def agree(protocol: Protocol) -> None:
             **{naming.attribute(name): value for name, value in values.items()},
             **{naming.address_attribute(name): value for name, value in place.items()},
         )
-        direction = codec.plan.hears(message)
+        direction = codec.plan.direction_of(message)
         asked = [module.decode_request(request)] if request else []
         assert made.to_frame(*asked) == wire
         assert getattr(module, f"decode_{direction}")(wire, *asked) == made
@@ -284,12 +284,12 @@ def agree(protocol: Protocol) -> None:
 
 @cache
 def compiles(text: str) -> None:
-    """Compile a module, once where it is the same for all protocols."""
+    """Compile a module; one that is the same for all protocols is compiled once."""
     compile(text, "<generated>", "exec")
 
 
 def native_of(value: Value, raw: Raw) -> object:
-    """A value on the wire as Python holds it."""
+    """The Python value of a raw value."""
     if isinstance(value.type, Scalar):
         assert isinstance(raw, int)
         return native_from_raw(value.type, raw)

@@ -98,7 +98,7 @@ def cases() -> Iterator[tuple[Path | str, Direction]]:
     """Every schema file and shape in every direction that is heard."""
     paths: list[Path | str] = [*_SCHEMAS, *_SHAPES]
     for path in paths:
-        yield from ((path, direction) for direction in plan(path).heard)
+        yield from ((path, direction) for direction in plan(path).received_directions)
 
 
 def frames(of: Plan, direction: Direction, chance: random.Random) -> list[tuple[bytes, bytes]]:

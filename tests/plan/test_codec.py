@@ -46,7 +46,7 @@ def _direction(plan: Plan, name: str) -> Direction:
 
 
 @pytest.mark.parametrize("name", _SHIPPED)
-def test_every_vector_goes_both_ways(name: str) -> None:
+def test_every_vector_is_encoded_and_decoded(name: str) -> None:
     plan = _plan(_ROOT / "schemas" / f"{name}.yaml")
     codec = Codec(plan)
     for row in _vectors(name, "vectors"):
@@ -97,7 +97,7 @@ def test_a_wrong_frame_ends_where_that_is_known(
     name: str, request_: str | None, wire: str, kind: str, end: int
 ) -> None:
     plan = _plan(_ROOT / "schemas" / f"{name}.yaml")
-    direction: Direction = plan.heard[0] if request_ is None else "response"
+    direction: Direction = plan.received_directions[0] if request_ is None else "response"
     with pytest.raises(BadFrame) as caught:
         Codec(plan).decode(bytes.fromhex(wire), direction, bytes.fromhex(request_ or ""))
     assert (caught.value.kind, caught.value.end) == (kind, end)

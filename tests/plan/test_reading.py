@@ -10,7 +10,7 @@ import pytest
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.framing import Hunt, Rescan
-from qlinkgen.plan.reading import BadFrame, FrameReader, Missing
+from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete
 from tests.plan import shapes
 
 
@@ -36,6 +36,6 @@ def test_a_frame_that_is_cut_needs_more_and_no_more_than_it_has(
         hunting = isinstance(plan.frame.receiver, Hunt)
         end = reader.read(wire, hunting=hunting).end
         for cut in range(end):
-            with pytest.raises(Missing) as caught:
+            with pytest.raises(Incomplete) as caught:
                 reader.read(wire[:cut], hunting=hunting)
             assert cut < caught.value.size <= end

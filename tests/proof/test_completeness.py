@@ -41,7 +41,7 @@ def test_every_entry_worked_by_hand_names_its_source(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", cases.PROTOCOLS)
-def test_bounds_and_pattern_are_what_they_are_called(name: str) -> None:
+def test_bounds_and_pattern_match_their_names(name: str) -> None:
     for case in cases.cases(name):
         smallest, largest = case.message.min_size, case.message.max_size
         if "minimum" in case.kinds:

@@ -46,7 +46,7 @@ def test_bytes_become_the_values(name: str, output: str, make: Make) -> None:
 
 @everywhere
 @every_protocol
-def test_what_is_wrong_is_refused_for_the_same_reason(name: str, output: str, make: Make) -> None:
+def test_faults_are_refused_for_the_same_reason(name: str, output: str, make: Make) -> None:
     made = make(name, output)
     disagreements = []
     for refusal in cases.refusals(name):

@@ -109,9 +109,7 @@ def wrapped(value: Any, kind: Callable[[int], Any]) -> Any:
 
 @pytest.mark.parametrize("frame", FRAMES)
 @pytest.mark.parametrize("kind", [Bare, Narrow])
-def test_integers_of_other_libraries_are_sent_as_what_they_are(
-    frame: str, kind: Callable[[int], Any]
-) -> None:
+def test_integers_of_other_libraries_are_sent_unchanged(frame: str, kind: Callable[[int], Any]) -> None:
     for name, layout, values, payload in drawn():
         plain = {name: wrapped(value, kind) for name, value in values.items()}
         address = {name: kind(number) for name, number in FRAMES[frame][1].items()}
@@ -158,7 +156,7 @@ WRONG: tuple[Any, ...] = (
 
 
 @pytest.mark.parametrize("frame", FRAMES)
-def test_any_value_is_sent_as_what_it_is_or_refused_by_name(frame: str) -> None:
+def test_any_value_is_sent_unchanged_or_refused_with_its_field(frame: str) -> None:
     codec = module(frame)
     rng = random.Random(7)
     for number, kind in enumerate(KINDS):

@@ -97,7 +97,7 @@ def test_every_command_can_be_called(name: str, command: Command, caller: str) -
 
 @pytest.mark.parametrize("caller", CALLERS)
 @pytest.mark.parametrize("name", BUSES)
-def test_a_method_takes_what_its_request_takes(name: str, caller: str) -> None:
+def test_a_method_has_the_arguments_of_its_request(name: str, caller: str) -> None:
     made, address = bus_of(name), protocol(name).address_name
     for command in protocol(name).commands:
         method = getattr(getattr(made, caller), command.name, None)
@@ -113,7 +113,7 @@ def test_a_method_takes_what_its_request_takes(name: str, caller: str) -> None:
         assert inspect.iscoroutinefunction(method) == caller.startswith("Async")
 
 
-def test_docstrings_say_unit_range_section_and_broadcast() -> None:
+def test_docstrings_have_unit_range_section_and_broadcast() -> None:
     made = bus_of("qlink")
     text = " ".join(made.MasterCalls.node_setup.__doc__.split())
     assert "section" in text
@@ -127,7 +127,7 @@ def test_docstrings_say_unit_range_section_and_broadcast() -> None:
         assert all(method.__doc__ for name, method in methods if name != "__init__")
 
 
-def test_nobody_answers_a_broadcast() -> None:
+def test_a_broadcast_is_not_answered() -> None:
     modbus, codec = bus_of("modbus_rtu"), module("modbus_rtu")
     for caller in ("MasterCalls", "AsyncMasterCalls"):
         calls, notes = recorder(getattr(modbus, caller), 1)
@@ -140,7 +140,7 @@ def test_nobody_answers_a_broadcast() -> None:
 
 
 @pytest.mark.parametrize("caller", CALLERS)
-def test_a_runtime_has_to_say_how_requests_are_sent(caller: str) -> None:
+def test_a_runtime_must_define_how_requests_are_sent(caller: str) -> None:
     calls = getattr(bus_of("qlink"), caller)()
     codec = module("qlink")
     with pytest.raises(NotImplementedError):
@@ -193,7 +193,7 @@ def test_every_command_of_a_host_can_be_called(name: str, caller: str) -> None:
 
 
 @pytest.mark.parametrize("caller", HOST_CALLERS)
-def test_a_host_has_to_say_how_packets_are_sent(caller: str) -> None:
+def test_a_host_must_define_how_packets_are_sent(caller: str) -> None:
     calls = getattr(bus_of("mc1231a"), caller)()
     codec = module("mc1231a")
     axis = () if "Axis" in caller else (2,)
@@ -203,7 +203,7 @@ def test_a_host_has_to_say_how_packets_are_sent(caller: str) -> None:
         result(calls.tell(codec.GetKpRequest(), *axis))
 
 
-def test_docstrings_of_a_host_say_what_the_schema_says() -> None:
+def test_docstrings_of_a_host_match_the_schema() -> None:
     calls = bus_of("mc1231a").HostCalls
     assert "Double buffered." in calls.set_pos.__doc__
     assert "axis: Axis to act on, from 1." in calls.set_pos.__doc__
@@ -267,7 +267,7 @@ def test_a_field_may_be_called_axis_too_and_not_everything_is_answered() -> None
 
 
 @pytest.mark.parametrize("name", BUSES)
-def test_what_is_not_overridden_is_not_answered(name: str) -> None:
+def test_methods_not_overridden_do_not_answer(name: str) -> None:
     slave = bus_of(name).SlaveHandlers(5)
     assert slave.number == 5
     for message in protocol(name).messages:
@@ -275,7 +275,7 @@ def test_what_is_not_overridden_is_not_answered(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BUSES)
-def test_each_request_comes_to_the_method_of_its_command(name: str) -> None:
+def test_each_request_calls_the_method_of_its_command(name: str) -> None:
     seen: list[tuple[str, Any, float]] = []
 
     def handler(command: str) -> Callable[..., Any]:
@@ -379,7 +379,7 @@ def test_without_addresses_there_is_one_slave() -> None:
     assert notes == [(codec.GoRequest(speed=3), codec.GoResponse)]
 
 
-def test_commands_may_have_the_names_of_what_a_class_has_itself() -> None:
+def test_commands_may_have_the_names_of_members_of_a_class() -> None:
     words = ("ask", "tell", "handle", "number", "bytes", "list", "str")
     rows = [
         f"  {word}: {{id: {at}, request: {{x: 'bytes[0..2]'}}, response: {{}}}}"

@@ -86,7 +86,7 @@ def test_other_protocols_leave_nothing_to_do(path: Path, tmp_path: Path) -> None
     assert ruff("format", "--check", folder=tmp_path) == ""
 
 
-def test_ruff_would_say_so(tmp_path: Path) -> None:
+def test_ruff_detects_unformatted_code(tmp_path: Path) -> None:
     (tmp_path / "long.py").write_text("import os\n\n\nx = [\n  1]\n", "utf-8")
     assert "F401" in ruff("check", folder=tmp_path)
     assert "reformatted" in ruff("format", "--check", folder=tmp_path)

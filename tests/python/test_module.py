@@ -72,7 +72,7 @@ def test_lines_are_not_too_long_and_nothing_trails(written: Path) -> None:
             assert len(line) <= 140, f"{name}:{number}: {line}"
 
 
-def test_what_a_reader_looks_for_is_in_the_docstrings() -> None:
+def test_docstrings_have_the_facts_of_the_schema() -> None:
     text = qlink.NodeSetupRequest.__doc__ or ""
     assert "section 7.1" in text
     assert "0.0..25.5 s" in text
@@ -80,7 +80,7 @@ def test_what_a_reader_looks_for_is_in_the_docstrings() -> None:
     assert "UNCONFIRMED" in (mc1231a.SetPosRequest.__doc__ or "")
 
 
-def test_the_transaction_table_says_what_the_schema_says() -> None:
+def test_the_transaction_table_matches_the_schema() -> None:
     for command in protocol("qlink").commands:
         row = qlink.COMMANDS[command.name]
         assert (row.name, row.id, row.addressing) == (command.name, command.id, command.addressing)
@@ -99,7 +99,7 @@ def test_the_transaction_table_says_what_the_schema_says() -> None:
 
 
 @pytest.mark.parametrize("name", EVERY)
-def test_the_bus_is_what_the_schema_says(name: str) -> None:
+def test_the_bus_matches_the_schema(name: str) -> None:
     bus, line = module(name).BUS, protocol(name).bus
     assert (bus.kind, bus.broadcast, bus.baud, bus.bits_per_byte) == (
         line.kind,
@@ -111,7 +111,7 @@ def test_the_bus_is_what_the_schema_says(name: str) -> None:
     assert repr(bus) == repr(eval(repr(bus), {"Bus": module(name).Bus}))
 
 
-def test_only_keeps_what_is_asked_for() -> None:
+def test_only_keeps_the_selected_messages() -> None:
     small = load(protocol("qlink"), Options(only=("motion", "node_info.response")))
     assert set(small.MESSAGES) == {"motion.request", "motion.response", "node_info.response"}
     assert set(small.COMMANDS) == {"motion"}

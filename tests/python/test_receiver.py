@@ -72,10 +72,8 @@ def plan(name: str) -> Plan:
 @pytest.mark.parametrize(("name", "direction"), STREAMS)
 @settings(max_examples=80)
 @given(data=st.data())
-def test_the_pieces_do_not_matter_and_the_reference_sees_the_same(
-    name: str, direction: Any, data: st.DataObject
-) -> None:
-    """One test, as drawing a stream takes longer than decoding it."""
+def test_split_streams_agree_with_the_reference(name: str, direction: Any, data: st.DataObject) -> None:
+    """One test, because drawing a stream takes longer than decoding it."""
     wire = data.draw(streams(name, direction))
     expected = by_the_byte(name, direction, wire)
     whole = stream(name, direction)
@@ -95,7 +93,7 @@ def test_the_pieces_do_not_matter_and_the_reference_sees_the_same(
 
 
 def by_the_byte(name: str, direction: Any, wire: bytes) -> list[tuple[Any, ...]]:
-    """The summary of a stream fed byte by byte, each of whose events comes when the reference has it."""
+    """The summary of a stream fed byte by byte; each event occurs at the same byte as in the reference."""
     decoder, machine = stream(name, direction), receiver(plan(name), direction)
     found: list[Any] = []
     for at, byte in enumerate(wire):
@@ -109,7 +107,7 @@ def by_the_byte(name: str, direction: Any, wire: bytes) -> list[tuple[Any, ...]]
     return summary([*found, *last])
 
 
-def test_skipped_bytes_are_told_of_by_the_longest_frame_that_there_can_be() -> None:
+def test_skipped_bytes_are_reported_in_runs_of_the_longest_frame() -> None:
     """The maximum follows from the frame, not from the messages, as in C and in the plan."""
     machine = receiver(plan_of(protocol("modbus_rtu")), "request")
     decoder = module("modbus_rtu").StreamDecoder("request")
@@ -118,7 +116,7 @@ def test_skipped_bytes_are_told_of_by_the_longest_frame_that_there_can_be() -> N
     assert described(decoder.feed(noise)) == expected == [("fault", "frame", 0), ("fault", "frame", 256)]
 
 
-def test_a_frame_behind_what_may_be_a_longer_one_comes_out_at_its_last_byte() -> None:
+def test_a_frame_after_an_apparent_longer_one_is_delivered_at_its_last_byte() -> None:
     """The leading 00 10 begins a candidate with a wrong count; the frame inside it must not be delayed."""
     codec = module("modbus_rtu")
     frame = bytes.fromhex("010300000001840a")

@@ -157,7 +157,7 @@ def test_ranges_are_checked_both_ways(name: str) -> None:
                 assert caught.value.value == raw
 
 
-def test_an_error_says_what_was_seen_the_rule_and_the_unit() -> None:
+def test_an_error_has_the_value_the_rule_and_the_unit() -> None:
     qlink = module("qlink")
     with pytest.raises(
         qlink.EncodeError, match=r"t1_delay: 30 cannot be sent; give a number, 0\.0\.\.25\.5 s"

@@ -40,7 +40,7 @@ def frame_with_crc_ending_in_a5(qlink: Any) -> Any:
     return next(m for m in found if m.to_frame().endswith(b"\xa5\x00"))
 
 
-def test_the_inserted_byte_behind_the_last_one_is_swallowed_or_missing() -> None:
+def test_an_inserted_byte_after_the_last_one_is_consumed_or_missing() -> None:
     qlink = module("qlink")
     message = frame_with_crc_ending_in_a5(qlink)
     wire = message.to_frame()
@@ -203,7 +203,7 @@ def test_a_checksum_of_0_refuses_the_command_unless_it_is_the_right_one() -> Non
     assert chip.decode_response(b"\0\0", both) == chip.SetPosResponse()
 
 
-def test_answers_are_split_by_what_is_expected() -> None:
+def test_responses_are_split_by_the_expected_request() -> None:
     chip = module("mc1231a")
     requests = [chip.GetActlPosRequest(), chip.SetVelRequest(value=2.5), chip.Set1Request()]
     answers = [chip.GetActlPosResponse(value=-5), chip.SetVelResponse(), chip.Set1Response(status=3)]
@@ -221,7 +221,7 @@ def test_answers_are_split_by_what_is_expected() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in EVERY if name != "mc1231a"])
-def test_behind_any_corruption_every_intact_frame_is_delivered(name: str) -> None:
+def test_every_intact_frame_after_corruption_is_delivered(name: str) -> None:
     """Packets are omitted, because they have no delimiter."""
     random_source, lost = random.Random(name), 0
     for direction in directions(name):

@@ -40,7 +40,7 @@ def test_message(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_message_says_what_and_how_to_mend_it(path: Path) -> None:
+def test_message_has_the_error_and_the_fix(path: Path) -> None:
     for line in path.with_suffix(".txt").read_text(encoding="utf-8").splitlines():
         match = LINE.fullmatch(line)
         assert match, line
@@ -52,5 +52,5 @@ def test_every_rule_has_a_file() -> None:
     assert {rule_of(path) for path in FILES} == set(RULES) - WITHOUT_FILE
 
 
-def test_no_expected_text_is_left_over() -> None:
+def test_every_expected_text_has_a_schema() -> None:
     assert {path.stem for path in FOLDER.glob("*.txt")} == {path.stem for path in FILES}

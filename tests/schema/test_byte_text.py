@@ -65,7 +65,7 @@ READ: dict[str, Callable[[Protocol], bytes]] = {
 every_key = pytest.mark.parametrize("key", READ)
 
 
-def test_every_key_that_takes_bytes_is_here() -> None:
+def test_every_key_of_type_bytes_is_listed() -> None:
     mappings = [
         each for each in vars(file_model).values() if isinstance(each, type) and issubclass(each, BaseModel)
     ]
@@ -126,7 +126,7 @@ def test_pairs(tmp_path: Path, key: str, text: str) -> None:
 @pytest.mark.parametrize(
     "text", ["256", "1010", "-10", "-1", "1.5", "true", "[16]", "0xA5A5", "1_0_0_0", "ABC", "'x'", "A5A"]
 )
-def test_what_is_no_byte_string(tmp_path: Path, key: str, text: str) -> None:
+def test_invalid_byte_strings(tmp_path: Path, key: str, text: str) -> None:
     with pytest.raises(SchemaError, match="is not a byte string; write one number like 0xA5, or hex pairs"):
         loaded(tmp_path, key, text)
 

@@ -83,7 +83,7 @@ def test_json_schema_is_one() -> None:
 @pytest.mark.parametrize(
     "text", ["{type: 5}", "{type: u8, scal: 1}", "5", "{range: 0..1}", "{type: u8, byteorder: middle}"]
 )
-def test_json_schema_refuses_what_the_front_end_refuses(text: str) -> None:
+def test_json_schema_refuses_the_same_as_the_front_end(text: str) -> None:
     source = find("qlink").read_text("utf-8").replace("{type: u8, doc: Returned as it is}", text, 1)
     protocol, _ = loads(source, "x.yaml")
     assert protocol is None

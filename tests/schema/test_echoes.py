@@ -88,7 +88,7 @@ def test_of_another_type(request_type: str, response_type: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["const: 3", "reserved: true"])
-def test_of_what_the_codec_fills(key: str) -> None:
+def test_of_fields_that_the_codec_fills(key: str) -> None:
     assert faults("x: u8", f"x: {{type: u8, {key}, echo: true}}") == [
         "x cannot be an echo: the codec fills it"
     ]
@@ -96,7 +96,7 @@ def test_of_what_the_codec_fills(key: str) -> None:
     assert said == "the request has no field 'x' to repeat"
 
 
-def test_the_values_of_bit_fields_are_what_is_repeated() -> None:
+def test_values_of_bit_fields_are_repeated() -> None:
     text = f"{FRAME}commands: {{go: {{id: 1, request: {{x: {{{BITS}}}}}, repeat: safe,"
     protocol, _ = loads(f"{text} response: {{x: {{{BITS}, echo: true}}}}}}}}", "x.yaml")
     assert protocol

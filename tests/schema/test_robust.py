@@ -195,7 +195,7 @@ def test_any_tree(data: object) -> None:
     check(yaml.dump(data, Dumper=DUMPER))
 
 
-def test_deep_nesting_is_a_fault_and_no_crash() -> None:
+def test_deep_nesting_is_an_error_not_a_crash() -> None:
     for text in ("[" * 200_000 + "]" * 200_000, "- " * 200_000, "{a: " * 100_000 + "}" * 100_000):
         assert [fault.rule for fault in check(text)] == ["yaml-syntax"]
 
@@ -206,13 +206,13 @@ def test_aliases_cannot_multiply() -> None:
     assert any("aliases" in fault.message for fault in check("\n".join(lines)))
 
 
-def test_alias_to_what_contains_it() -> None:
+def test_alias_of_an_enclosing_node() -> None:
     faults = check("a: &a\n  b: *a\n")
     assert faults[0].rule == "yaml-syntax"
     assert "alias" in faults[0].message
 
 
-def test_file_that_is_not_text(tmp_path: Path) -> None:
+def test_binary_file(tmp_path: Path) -> None:
     path = tmp_path / "x.yaml"
     path.write_bytes(b"\xff\xfe\x00")
     assert [fault.rule for fault in lint(path)] == ["file-unreadable"]

@@ -95,7 +95,7 @@ def decoded(target: Target | Reference, message: Message, wire: bytes, request: 
     """The message that an output decodes, or the kind of fault."""
     try:
         if isinstance(target, Reference):
-            return target.decode(target.hears(message), wire, request)
+            return target.decode(target.direction_of(message), wire, request)
         return target.decode(message, wire, request)
     except Wrong as wrong:
         return wrong.kind

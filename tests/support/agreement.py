@@ -59,7 +59,7 @@ def streams(plan: Plan, direction: Direction, rng: random.Random, number: int) -
         yield damaged(stream, rng, alphabet) if each % 8 else stream
 
 
-def told(event: Event) -> str:
+def event_text(event: Event) -> str:
     """An event in the format of the program."""
     if event.decoded is None:
         return f"{event.at}:{event.kind}"
@@ -71,9 +71,9 @@ def told(event: Event) -> str:
 def events(plan: Plan, direction: Direction, stream: bytes) -> list[str]:
     """The events of a receiver; one without a buffer reports nothing at the end."""
     machine = receiver(plan, direction)
-    found = [told(event) for byte in stream for event in machine.feed(byte)]
+    found = [event_text(event) for byte in stream for event in machine.feed(byte)]
     ends = machine.finish() if isinstance(plan.frame.receiver, Rescan) else ()
-    return found + [told(event) for event in ends]
+    return found + [event_text(event) for event in ends]
 
 
 def kind(plan: Plan, direction: Direction, frame: bytes, request: bytes = b"") -> str:

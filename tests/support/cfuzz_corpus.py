@@ -111,8 +111,8 @@ def _seeds(target: str, protocol: Protocol, message: Message, vector: dict[str, 
             *(b"\0" + answer + own + other + payload for other in (b"\0", b"\xff") if place),
         ]
     asked = bytes([0, 0, 0, min(len(payload), 255), 0]) + own + payload
-    told = b"\1\0" + own + place + payload
-    return [told, told + b"\0", asked + bytes(60), asked + noise]
+    received = b"\1\0" + own + place + payload
+    return [received, received + b"\0", asked + bytes(60), asked + noise]
 
 
 def _values(head: bytes, whom: bytes, noise: bytes) -> list[bytes]:

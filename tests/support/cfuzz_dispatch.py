@@ -13,8 +13,8 @@ def dispatch(h: Harness) -> str:
         "dispatch",
         slave=_slave(h) if slave else "",
         master=_master(h) if master else "",
-        call_slave="@p@_ask_(input);" if slave else "@p@_tell_(input);",
-        call_master="@p@_tell_(input);" if master else "@p@_ask_(input);",
+        call_slave="@p@_ask_(input);" if slave else "@p@_listen_(input);",
+        call_master="@p@_listen_(input);" if master else "@p@_ask_(input);",
     )
 
 
@@ -126,17 +126,17 @@ def _answer_of_packet(h: Harness) -> list[str]:
 
 
 def _master(h: Harness) -> str:
-    told = [message for message in h.protocol.messages if message.direction != "request"]
-    members = [f"        listener.{h.c.told_member(m)} = {h.c.function(m)}_told_;" for m in told]
+    received = [message for message in h.protocol.messages if message.direction != "request"]
+    members = [f"        listener.{h.c.callback_member(m)} = {h.c.function(m)}_callback_;" for m in received]
     return h.part(
-        "told",
-        tellers="\n".join(line for message in told for line in _teller(h, message)),
+        "listener",
+        callbacks="\n".join(line for message in received for line in _callback(h, message)),
         members="\n".join(members),
         set_address=h.address("take_number(input, @address_size@u)"),
     )
 
 
-def _teller(h: Harness, message: Message) -> list[str]:
+def _callback(h: Harness, message: Message) -> list[str]:
     """A function of a listener's table: its message can be encoded."""
     function, takes = h.c.function(message), bool(message.values)
     parameters = f"@p@_{h.c.listener}_t *listener"
@@ -144,7 +144,7 @@ def _teller(h: Harness, message: Message) -> list[str]:
     parameters += f", const {function}_t *message" if takes else ""
     encoded = h.put(message, "message", "bytes", "sizeof bytes")
     return [
-        f"static void {function}_told_({parameters})",
+        f"static void {function}_callback_({parameters})",
         "{",
         "    uint8_t bytes[@P@_MAX_PAYLOAD_SIZE + 1u];",
         "    (void)bytes;",

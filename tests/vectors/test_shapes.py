@@ -98,7 +98,7 @@ def test_every_right_vector_decodes_in_python_and_construct() -> None:
             found = decoded(module, plan, message, row)
             assert message.name == found.NAME
             assert {name: getattr(found, name) for name in fields} == fields, row
-            parsed = live.parse(plan.hears(message), wire(row), wire(row, "request"))
+            parsed = live.parse(plan.direction_of(message), wire(row), wire(row, "request"))
             assert parsed["message"] == message.name
             parsed_fields = plain_numbers(parsed["fields"])
             assert {name: parsed_fields[name] for name in fields} == fields, row
@@ -109,12 +109,12 @@ def test_every_right_vector_decodes_in_python_and_construct() -> None:
 
 def decoded(module: Any, plan: Plan, message: MessagePlan, row: Row) -> Any:
     """The result of generated Python for a vector."""
-    direction = plan.hears(message)
+    direction = plan.direction_of(message)
     decode = getattr(module, "decode" if direction == "message" else f"decode_{direction}")
     return decode(wire(row), *([module.decode_request(wire(row, "request"))] if row.get("request") else []))
 
 
-def test_every_fault_has_its_kind_in_python_and_is_none_of_constructs_frames() -> None:
+def test_every_fault_has_its_kind_in_python_and_is_refused_by_construct() -> None:
     for plan, document in written():
         module, live = module_of(plan), live_of(plan)
         for row in document["faults"]:
@@ -123,7 +123,7 @@ def test_every_fault_has_its_kind_in_python_and_is_none_of_constructs_frames() -
                 decoded(module, plan, message, row)
             assert caught.value.kind == row["kind"], (plan.protocol.schema_file, row)
             with pytest.raises(ConstructError):
-                live.parse(plan.hears(message), wire(row), wire(row, "request"))
+                live.parse(plan.direction_of(message), wire(row), wire(row, "request"))
 
 
 #: The fault of each kind of part, if it does not depend on the rest of the frame.

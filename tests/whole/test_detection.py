@@ -116,7 +116,7 @@ PLANTED = {
     "a wrong constant at the end is passed over": Planted(
         _schema(_BY_LENGTH, "v: u8"),
         r'return "frame", end, b""',
-        'return "astray", start, b""',
+        'return "no_frame", start, b""',
         (("stream", "python"), ("decode", "python")),
     ),
     "a frame waits for the byte after it": Planted(

@@ -28,7 +28,7 @@ def test_the_reference_agrees_with_every_vector(name: str) -> None:
     made = reference(name)
     for case in cases.cases(name):
         message = made.by_name[case.message.name]
-        seen = made.decode(made.hears(message), case.wire, case.request)
+        seen = made.decode(made.direction_of(message), case.wire, case.request)
         assert seen.name == message.name
         assert (seen.address or 0) == case.address
         if not case.decode_only:
@@ -44,7 +44,7 @@ def test_the_reference_refuses_every_wrong_frame(name: str) -> None:
     for refusal in cases.refusals(name):
         message = made.by_name[refusal.message.name]
         with pytest.raises(Wrong):
-            made.decode(made.hears(message), refusal.wire, refusal.request)
+            made.decode(made.direction_of(message), refusal.wire, refusal.request)
 
 
 @pytest.mark.parametrize("name", sorted(checks.catalogue()))
@@ -60,7 +60,7 @@ def test_a_seed_gives_one_schema() -> None:
     assert len(set(texts)) == len(texts)
 
 
-def test_few_schemas_are_refused_and_every_shape_comes() -> None:
+def test_few_schemas_are_refused_and_every_shape_occurs() -> None:
     refused: Counter[str] = Counter()
     shapes: Counter[str] = Counter()
     for seed in range(MANY):

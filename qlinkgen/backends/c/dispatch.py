@@ -14,7 +14,7 @@ from qlinkgen.model.transaction import Allowance, Bus, Command, Repeat
 from qlinkgen.plan.tree import MessagePlan
 
 
-def told_name(names: Names, message: Message) -> str:
+def callback_name(names: Names, message: Message) -> str:
     """The member for a message that a master or a listener receives."""
     stem = names.stem(message)
     return handler(stem.removesuffix("_response") if message.direction == "response" else stem, names.address)
@@ -64,7 +64,7 @@ class SlaveGroup:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Callback:
     """A message for a master or a listener."""
 
     name: str
@@ -141,10 +141,10 @@ def slave_groups(entries: list[SlaveEntry], prefix: str) -> list[SlaveGroup]:
     ]
 
 
-def told(names: Names, address: Address, kept: Sequence[MessagePlan]) -> list[Told]:
+def callbacks(names: Names, address: Address, kept: Sequence[MessagePlan]) -> list[Callback]:
     """Messages for a master or a listener, in schema order."""
     return [
-        Told(told_name(names, message.message), expected(names, address, message))
+        Callback(callback_name(names, message.message), expected(names, address, message))
         for message in kept
         if message.direction != "request"
     ]

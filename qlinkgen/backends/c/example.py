@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from qlinkgen.backends.c.crc import CheckView, CrcView
-from qlinkgen.backends.c.dispatch import told_name
+from qlinkgen.backends.c.dispatch import callback_name
 from qlinkgen.backends.c.names import Names
 from qlinkgen.model.naming import file_stem, handler, member, snake
 from qlinkgen.model.transaction import Command
@@ -100,7 +100,7 @@ def _slave(
 
 def _listener(names: Names, section: FrameSection, message: MessagePlan, role: str) -> list[str]:
     p, address = names.prefix, section.view.address
-    entry = told_name(names, message.message)
+    entry = callback_name(names, message.message)
     whose = [f"{section.view.address_type} {address}"] if address else []
     taken = [f"const {names.function(message.message)}_t *message"] if message.payload.settable else []
     parameters = [f"{p}_{role}_t *own", *whose, *taken]

@@ -35,7 +35,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
-Heard = Sequence[tuple[Direction, Sequence[MessagePlan]]]
+ReceivedMessages = Sequence[tuple[Direction, Sequence[MessagePlan]]]
 
 #: Views of the templates of one kind of frame, in addition to `FrameView`.
 View = (
@@ -93,27 +93,27 @@ class FrameSection:
         check = self.plan.frame.check
         return f"{self.plan.protocol.name}_reject_" if check and check.rejected is not None else ""
 
-    def heard(self) -> Heard:
+    def received(self) -> ReceivedMessages:
         """Decoded messages for each direction of a receiver."""
-        directions = (d for d in self.plan.protocol.directions if d in self.plan.heard)
+        directions = (d for d in self.plan.protocol.directions if d in self.plan.received_directions)
         found = [(direction, self.plan.received(direction)) for direction in directions]
         return [(direction, messages) for direction, messages in found if messages]
 
     @property
     def judgement(self) -> str:
         """The expression that checks the contents of a received frame."""
-        return judgement(self.plan, [direction for direction, _ in self.heard()])
+        return judgement(self.plan, [direction for direction, _ in self.received()])
 
     def shapes(self, names: Names) -> list[Shapes]:
         """Message sizes for a receiver of marked frames."""
         return [
             Shapes(f"{names.upper}_{direction.upper()}", [shape(names, message) for message in messages])
-            for direction, messages in self.heard()
+            for direction, messages in self.received()
         ]
 
     def sizes(self, names: Names) -> list[Sized]:
         """Request sizes for a receiver of packets."""
-        requests = [message for d, messages in self.heard() if d == "request" for message in messages]
+        requests = [message for d, messages in self.received() if d == "request" for message in messages]
         return sizes_by_value(names, requests)
 
     def to_frame(self, names: Names, address: framing.Address, message: MessagePlan) -> framing.Function:
@@ -151,9 +151,9 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
             views = parts_views(plan, layouts)
             frame = "frame_stuffed" if views.stuffed else "frame_plain"
             templates = ("place", frame, "wrap", "frame_public")
-            hears = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
+            kind = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
             value = crc.render(check.algorithm) if check else None
-            return FrameSection(plan, views.f, views.others, value, templates, hears)
+            return FrameSection(plan, views.f, views.others, value, templates, kind)
         case Marks():
             value = crc.render(check.algorithm) if check else None
             marked: Mapping[str, View] = {"place": PLACE, "marked": marked_view(plan)}

@@ -100,7 +100,7 @@ class Header:
             template,
             f=section.view,
             crc=section.check,
-            unused=self._unheard(),
+            unused=self._unused_arguments(),
             wide=self._wide,
             address_groups=self._address_groups(),
             shapes=section.shapes(self._names),
@@ -125,31 +125,31 @@ class Header:
         if not self._section.needs_ids:
             return []
         names, view = self._names, self._section.view
-        received = [(f"{names.upper}_{direction.upper()}", m) for direction, m in self._section.heard()]
+        received = [(f"{names.upper}_{direction.upper()}", m) for direction, m in self._section.received()]
         texts = ["\n", *(self._id_constant(message) for message in self._kept)]
-        unheard = self._unheard()
+        unused = self._unused_arguments()
         if view.bare:
             header_checks = [Group(d, self._expected(messages)) for d, messages in received]
             limited = any(
                 each.address_allowed for _, messages in received for each in self._expected(messages)
             )
-            unused = [*unheard, *([view.address] if view.address and not limited else [])]
+            unused = [*unused, *([view.address] if view.address and not limited else [])]
             texts.append(self._place("header_check", f=view, header_checks=header_checks, unused=unused))
         if view.sized_by_message:
             size_groups = [
-                Group(d, [size_view(names, message, self._layouts) for message in heard])
-                for d, heard in received
+                Group(d, [size_view(names, message, self._layouts) for message in messages])
+                for d, messages in received
             ]
-            texts.append(self._place("payload_size", f=view, size_groups=size_groups, unused=unheard))
+            texts.append(self._place("payload_size", f=view, size_groups=size_groups, unused=unused))
         return texts
 
     def _expected(self, messages: Sequence[MessagePlan]) -> list[framing.Expected]:
         return [framing.expected(self._names, self._address, message) for message in messages]
 
-    def _unheard(self) -> list[str]:
+    def _unused_arguments(self) -> list[str]:
         """Parameters that are unused if no message is received."""
         view = self._section.view
-        return [] if self._section.heard() else [*(["direction"] if view.needs_direction else []), view.id]
+        return [] if self._section.received() else [*(["direction"] if view.needs_direction else []), view.id]
 
     def _id_constant(self, message: Message) -> str:
         return f"#define {self._names.constant(message)}_ID 0x{message.id:02X}\n"
@@ -165,7 +165,9 @@ class Header:
         )
 
     def _checks(self) -> list[str]:
-        checks = [Group(direction, self._expected(messages)) for direction, messages in self._section.heard()]
+        checks = [
+            Group(direction, self._expected(messages)) for direction, messages in self._section.received()
+        ]
         return [self._place("checks", checks=checks, f=self._section.view)]
 
     def _receiver(self) -> list[str]:
@@ -187,7 +189,7 @@ class Header:
             example_command=snake(answered.name).upper() if answered else "",
             slave=slave,
             slave_groups=dispatch.slave_groups(slave, self._names.prefix),
-            master=dispatch.told(self._names, self._address, self._plan.messages) if listens else [],
+            master=dispatch.callbacks(self._names, self._address, self._plan.messages) if listens else [],
             transactions=dispatch.transactions(self._protocol, self._names.upper, commands),
         )
 

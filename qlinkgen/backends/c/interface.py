@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.backends.c.dispatch import handler_name, told_name
+from qlinkgen.backends.c.dispatch import callback_name, handler_name
 from qlinkgen.backends.c.frames import frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_type, storage, unsigned_type
@@ -85,9 +85,9 @@ class Interface:
         """The member of the slave struct that handles a request."""
         return handler_name(self.names, message)
 
-    def told_member(self, message: Message) -> str:
+    def callback_member(self, message: Message) -> str:
         """The member of the listener struct that handles a message."""
-        return told_name(self.names, message)
+        return callback_name(self.names, message)
 
     def width(self, scalar: Scalar) -> int:
         """Size of the struct member of an integer."""

@@ -358,14 +358,14 @@ def _plus(value: str, constant: int) -> str:
     return f"({value} + {constant}U)" if constant > 0 else f"({value} - {-constant}U)"
 
 
-def judgement(plan: Plan, heard: Sequence[str]) -> str:
+def judgement(plan: Plan, directions: Sequence[str]) -> str:
     """The expression that checks the contents of ``receiver->frame``."""
     prefix, upper = plan.protocol.name, plan.protocol.name.upper()
-    calls = [f"{prefix}_{direction}_check(&receiver->frame)" for direction in heard]
+    calls = [f"{prefix}_{direction}_check(&receiver->frame)" for direction in directions]
     if len(calls) == len(plan.protocol.directions) == 1:
         return calls[0]
     found = f"{upper}_ERROR_UNKNOWN"
-    for direction, call in zip(heard, calls, strict=True):
+    for direction, call in zip(directions, calls, strict=True):
         other = calls[-1] if len(calls) > 1 else found
         return f"(receiver->direction == {upper}_{direction.upper()}) ? {call} : {other}"
     return found

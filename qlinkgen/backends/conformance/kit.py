@@ -90,8 +90,8 @@ class KitView:
     encodes: bool
     decodes: bool
     receives: bool
-    asks: bool
-    tells: bool
+    has_handlers: bool
+    has_callbacks: bool
     checks: list[str]
 
 
@@ -110,7 +110,7 @@ class Kit:
         """The variables of the templates."""
         header, entries = self._header, self._entries.views()
         check, kinds, noise = self._check(), self._kinds(), streams.noise(self._plan)
-        tests = bool(check) + sum(each.tests + each.asked_tests + each.told_tests for each in entries)
+        tests = bool(check) + sum(each.tests + each.handler_tests + each.callback_tests for each in entries)
         most_wire = max(len(row.wire) for row in self._every)
         members = max(len(each.members) for each in entries)
         values = max(most_values(header, each) for each in self._plan.messages)
@@ -160,9 +160,9 @@ class Kit:
             encodes=any(each.encoded for each in entries),
             decodes=any(each.decoded for each in entries),
             receives=any(each.received for each in entries),
-            asks=any(each.slave_member for each in entries),
-            tells=any(each.told_member for each in entries),
-            checks=sorted({each.taken_as for each in entries if each.framed}),
+            has_handlers=any(each.slave_member for each in entries),
+            has_callbacks=any(each.callback_member for each in entries),
+            checks=sorted({each.received_as for each in entries if each.framed}),
         )
 
     def _kinds(self) -> tuple[str, ...]:

@@ -42,13 +42,13 @@ class Entry:
     Attributes:
         members: members of its struct, in the order of values in vectors.
         framed: its frame identifies the message.
-        taken_as: the direction in which it is received.
+        received_as: the direction in which it is received.
         received: whether it has a stream, which may be ``noisy``.
         lines: its rows.
         unsent_lines: rows that an encoder refuses.
-        tests: their number; ``asked_tests`` and ``told_tests`` are those of slave and listener.
-        slave_member: the member of the slave's struct that handles it, "" where none does.
-        told_member: the member of the listener's struct that is told of it, "" where none is.
+        tests: their number; ``handler_tests`` and ``callback_tests`` are those of slave and listener.
+        slave_member: the member of the slave's struct that handles it, "" if none does.
+        callback_member: the member of the listener's struct that receives it, "" if none does.
     """
 
     number: int
@@ -63,25 +63,25 @@ class Entry:
     encoded: bool
     decoded: bool
     framed: bool
-    taken_as: str
+    received_as: str
     received: bool
     noisy: bool
     lines: list[str]
     unsent_lines: list[str]
     tests: int
-    asked_tests: int
-    told_tests: int
+    handler_tests: int
+    callback_tests: int
     encode_lines: list[str]
     decode_lines: list[str]
     slave_member: str
-    told_member: str
+    callback_member: str
     answer: Answer | None
 
     @property
     def entry_lines(self) -> list[str]:
         """The row of the table of messages."""
         stem, answer = self.stem, self.answer or self
-        numbers_of = (answer.number, self.tests, self.asked_tests, self.told_tests, len(self.members))
+        numbers_of = (answer.number, self.tests, self.handler_tests, self.callback_tests, len(self.members))
         facts = (self.is_response, self.received, self.noisy)
         groups = (
             [f"{stem}_name", f"{stem}_members" if self.members else "NULL"],
@@ -124,13 +124,13 @@ class Entries:
 
     # Roles
 
-    def _asked(self, message: MessagePlan) -> bool:
+    def _has_handler(self, message: MessagePlan) -> bool:
         """Whether a slave has a function for it."""
-        return "request" in self._plan.heard and message.direction != "response"
+        return "request" in self._plan.received_directions and message.direction != "response"
 
-    def _told(self, message: MessagePlan) -> bool:
+    def _has_callback(self, message: MessagePlan) -> bool:
         """Whether a listener has a function for it."""
-        listens = self._plan.heard != ("request",)
+        listens = self._plan.received_directions != ("request",)
         return bool(self._header.listener) and listens and message.direction != "request"
 
     def _answer(self, message: MessagePlan) -> Answer | None:
@@ -153,7 +153,7 @@ class Entries:
         address = "address, " if header.address else ""
         part = "request_sum, " if header.sum_bits and plan.direction == "response" else ""
         decode = f"decode({store}" if framed else f"from_frame({store}{part}"
-        asked, told = self._asked(plan), self._told(plan)
+        handled, called = self._has_handler(plan), self._has_callback(plan)
         ranges = sum(isinstance(row, Wrong) and row.kind == _RANGE for row in rows)
         right = [row for row in rows if isinstance(row, Right)]
         return Entry(
@@ -169,19 +169,19 @@ class Entries:
             encoded=plan.encoded,
             decoded=plan.decoded,
             framed=framed,
-            taken_as=self._plan.hears(plan),
+            received_as=self._plan.direction_of(plan),
             received=found is not None,
             noisy=found is not None and found.noisy,
             lines=[line for index, row in enumerate(rows) for line in self._lines(row, found, index)],
             unsent_lines=[line for row in refused for line in self._unsent_lines(row)],
             tests=len(refused) + self._tests(plan, rows, found),
-            asked_tests=ranges + sum(bool(row.kinds) for row in right) if asked else 0,
-            told_tests=ranges + len(right) if told else 0,
+            handler_tests=ranges + sum(bool(row.kinds) for row in right) if handled else 0,
+            callback_tests=ranges + len(right) if called else 0,
             encode_lines=call(f"return {function}_to_frame({store}{address}{part}bytes, capacity);"),
             decode_lines=call(f"return {function}_{decode}bytes, size);"),
-            slave_member=header.slave_member(message) if asked else "",
-            told_member=header.told_member(message) if told else "",
-            answer=self._answer(plan) if asked else None,
+            slave_member=header.slave_member(message) if handled else "",
+            callback_member=header.callback_member(message) if called else "",
+            answer=self._answer(plan) if handled else None,
         )
 
     def _tests(self, plan: MessagePlan, rows: Sequence[Row], found: Stream | None) -> int:

@@ -92,7 +92,7 @@ class Header(typing.Protocol):
         """The member of the slave struct that handles a request."""
         ...
 
-    def told_member(self, message: Message) -> str:
+    def callback_member(self, message: Message) -> str:
         """The member of the listener struct that handles a message."""
         ...
 

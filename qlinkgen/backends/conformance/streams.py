@@ -38,7 +38,7 @@ class Stream:
 
 def noise(plan: Plan) -> tuple[bytes, ...]:
     """Noise between frames: bytes that do not begin a frame, or begin one without completing it."""
-    envelope, strategy = plan.frame.envelopes[plan.heard[0]], plan.frame.receiver
+    envelope, strategy = plan.frame.envelopes[plan.received_directions[0]], plan.frame.receiver
     match strategy:
         case Hunt() | Rescan():
             preamble = envelope.preamble
@@ -64,7 +64,7 @@ def stream(plan: Plan, message: MessagePlan, rows: Sequence[Row]) -> Stream | No
     if not message.decoded or (plan.frame.needs_request and message.direction == "response"):
         return None
     for noisy, everything in ((True, True), (False, True), (False, False)):
-        found = _heard(plan, plan.hears(message), rows, noisy=noisy, everything=everything)
+        found = _heard(plan, plan.direction_of(message), rows, noisy=noisy, everything=everything)
         if found is not None:
             return Stream(noisy, found)
     return None

@@ -54,11 +54,11 @@ def load(protocol: Protocol, options: Options | None = None) -> ModuleType:
     name = f"<{protocol.name}.py generated from {plain.schema_file}>"
     linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)  # for tracebacks
     exec(compile(text, name, "exec"), module.__dict__)  # our own text
-    _tell_units(protocol, module.MESSAGES)
+    _set_units(protocol, module.MESSAGES)
     return module
 
 
-def _tell_units(protocol: Protocol, classes: Mapping[str, type[BaseMessage]]) -> None:
+def _set_units(protocol: Protocol, classes: Mapping[str, type[BaseMessage]]) -> None:
     """Add the units of values to the rules of each message."""
     for name, each in classes.items():
         units = {value.name: value.unit for value in protocol.by_name[name].values}

@@ -36,7 +36,7 @@ from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 @dataclass(frozen=True)
-class Heard:
+class DecodedDirection:
     """A decoded direction: its function, its word in texts, and the names of its tables."""
 
     direction: Direction
@@ -194,7 +194,7 @@ class PartsView:
         return self.placed.view if self.placed else None
 
     @property
-    def astray(self) -> Sequence[HeadCheck]:
+    def no_frame(self) -> Sequence[HeadCheck]:
         """The conditions for bytes that do not begin a frame."""
         return [each for each in self.head_checks if each.fault]
 
@@ -257,16 +257,16 @@ def view_of(plan: Plan, title: str, sizes: Sequence[int]) -> FrameView:
 # Directions
 
 
-def heard(plan: Plan) -> list[Heard]:
+def decoded_directions(plan: Plan) -> list[DecodedDirection]:
     """Functions and tables for each decoded direction."""
-    return [_heard(plan, direction) for direction in plan.heard]
+    return [_decoded_direction(plan, direction) for direction in plan.received_directions]
 
 
-def _heard(plan: Plan, direction: Direction) -> Heard:
+def _decoded_direction(plan: Plan, direction: Direction) -> DecodedDirection:
     messages = plan.received(direction)
     whole = direction == "message"
     upper = "" if whole else f"_{direction.upper()}"
-    return Heard(
+    return DecodedDirection(
         direction=direction,
         function="decode" if whole else f"decode_{direction}",
         words="" if whole else f"{direction} ",
@@ -485,13 +485,13 @@ def _stuffing(plan: Plan) -> StuffingView | None:
 
 def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[HeadCheck]:
     """The checks of a header, part by part, as far as received."""
-    astray = '"astray", start, b""'
+    no_frame = '"no_frame", start, b""'
     for part in envelope.front:
         start, end = envelope.offset(part), envelope.offset(part) + part.size
         match part:
             case ConstantPart():
                 yield HeadCheck(
-                    f"not {literal(part.data)}.startswith(head[{start}:{end}])", astray, "constant"
+                    f"not {literal(part.data)}.startswith(head[{start}:{end}])", no_frame, "constant"
                 )
             case LengthPart():
                 whole = isinstance(plan.frame.transparency, FrameStuffing)
@@ -502,9 +502,9 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 needed = [each for each in (envelope.id, envelope.address) if each is not None]
                 known = all(envelope.offset(each) < end for each in needed)
                 if isinstance(part, IdPart):
-                    yield HeadCheck(f"len(head) >= {end} and _number(head) not in known", astray, "number")
+                    yield HeadCheck(f"len(head) >= {end} and _number(head) not in known", no_frame, "number")
                 if known and envelope.address is not None:
-                    yield HeadCheck(f"len(head) >= {end} and not _allowed(head, known)", astray, "address")
+                    yield HeadCheck(f"len(head) >= {end} and not _allowed(head, known)", no_frame, "address")
             case IdPart() | AddressPart():
                 pass
             case MarkPart() | PayloadPart() | CheckPart():

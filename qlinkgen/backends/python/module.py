@@ -69,7 +69,7 @@ class ModuleView:
     """The variables of the templates of a module; `f` is its frame."""
 
     f: FrameView
-    heard: Sequence[frames.Heard]
+    decoded_directions: Sequence[frames.DecodedDirection]
     direction_type: str
     direction_default: str
     stream_decoder: Sequence[str]
@@ -99,11 +99,11 @@ class Module:
         plan, models = self.plan, self.builder.build()
         sizes = sorted({each.body_size for each in models if each.body_size is not None})
         view = frames.view_of(plan, one_line(plan.protocol.title), sizes)
-        heard = frames.heard(plan)
-        quoted = [f'"{each.direction}"' for each in heard]
+        decoded_directions = frames.decoded_directions(plan)
+        quoted = [f'"{each.direction}"' for each in decoded_directions]
         module = ModuleView(
             f=view,
-            heard=heard,
+            decoded_directions=decoded_directions,
             direction_type=f"Literal[{', '.join(quoted)}]",
             direction_default=f" = {quoted[0]}" if len(quoted) == 1 else "",
             stream_decoder=_stream_decoder(quoted),
@@ -115,7 +115,7 @@ class Module:
             commands=tables.command_rows(plan),
             scales=self.builder.scales,
             classes=self._classes(models, view),
-            public=self._public(view, heard),
+            public=self._public(view, decoded_directions),
             imports=self._imports(view, models),
         )
         frame = _placed(f"{view.template}.j2", module).strip()
@@ -194,12 +194,12 @@ class Module:
             typing=sorted(typing),
         )
 
-    def _public(self, view: FrameView, heard: Sequence[frames.Heard]) -> list[str]:
+    def _public(self, view: FrameView, decoded_directions: Sequence[frames.DecodedDirection]) -> list[str]:
         names = [class_name(message) for message in self.plan.messages]
         constants: list[Enum | Flags] = [*self.plan.enums, *self.plan.flags]
         names += [self.place.classes[each.name] for each in constants]
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
-        names += [each.function for each in heard]
+        names += [each.function for each in decoded_directions]
         match view:
             case PacketView():
                 names += ["Request", "Response", "decode_request", "decode_response"]

@@ -105,7 +105,7 @@ class Faults:
 
     def _kind(self, good: Good, wire: bytes) -> str:
         try:
-            self._codec.decode(wire, self._codec.plan.hears(good.message), good.request)
+            self._codec.decode(wire, self._codec.plan.direction_of(good.message), good.request)
         except BadFrame as bad:
             return bad.kind
         return ""

@@ -140,7 +140,7 @@ class PythonTarget(Target):
 
     def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
         """See Target."""
-        direction = self.reference.hears(message)
+        direction = self.reference.direction_of(message)
         function = getattr(self.module, "decode" if direction == "message" else f"decode_{direction}")
         try:
             return self._seen(function(wire, *self._context(request)))
@@ -202,7 +202,7 @@ class InterpreterTarget(Target):
             raise Wrong(error.kind, str(error)) from None
 
     def _direction(self, message: Message) -> Direction:
-        return self._plan.hears(self._plan.message(message.name))
+        return self._plan.direction_of(self._plan.message(message.name))
 
     def _seen(self, decoded: Decoded) -> Seen:
         found = decoded.values
@@ -242,7 +242,7 @@ class ConstructTarget(Target):
         if self.reference.address_name:
             whole[naming.record_key(self.reference.address_name)] = address
         try:
-            frame = self._live.frames[self.reference.hears(message)]
+            frame = self._live.frames[self.reference.direction_of(message)]
             return self._live.payload(message.name, natives), frame.build(whole, request=request)
         except ConstructError as error:
             raise Wrong("encode", str(error)) from None
@@ -250,7 +250,7 @@ class ConstructTarget(Target):
     def decode(self, message: Message, wire: bytes, request: bytes) -> Seen:
         """See Target."""
         try:
-            found = self._live.parse(self.reference.hears(message), wire, request)
+            found = self._live.parse(self.reference.direction_of(message), wire, request)
         except ConstructError as error:
             raise Wrong(getattr(error, "kind", ""), str(error)) from None
         fields = found["fields"]

@@ -303,7 +303,8 @@ class _Trial:
     def _decoded(self, message: Message, wire: bytes, request: bytes) -> None:
         self.outcome.frames += 1
         try:
-            expected: Seen | Wrong = self.reference.decode(self.reference.hears(message), wire, request)
+            direction = self.reference.direction_of(message)
+            expected: Seen | Wrong = self.reference.decode(direction, wire, request)
         except Wrong as wrong:
             expected = wrong
         asked = self.reference.by_name[expected.name] if isinstance(expected, Seen) else message
@@ -472,8 +473,8 @@ def _shown(result: object) -> str:
 
 def _manner(expected: object, found: object) -> str:
     if not isinstance(found, str):
-        return "takes what is wrong" if isinstance(expected, str) else "other values"
-    return f"{found} instead of {expected}" if isinstance(expected, str) else "refuses what is right"
+        return "accepts invalid input" if isinstance(expected, str) else "other values"
+    return f"{found} instead of {expected}" if isinstance(expected, str) else "refuses valid input"
 
 
 # Consecutive comparisons of a stream need these two.

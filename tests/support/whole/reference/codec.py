@@ -55,7 +55,7 @@ class Reference:
         """The messages of a direction."""
         return {each.number: each for each in self.messages if each.direction in (direction, "message")}
 
-    def hears(self, message: Message) -> Direction:
+    def direction_of(self, message: Message) -> Direction:
         """A direction of a message."""
         return message.direction if message.direction in self.directions else "request"
 

@@ -1,14 +1,14 @@
-@tellers@
-static void @p@_tell_(input_t *input)
+@callbacks@
+static void @p@_listen_(input_t *input)
 {
     @p@_@listener@_t listener;
     @p@_frame_t frame;
-    unsigned told = 0u;
+    unsigned calls = 0u;
     const bool interested = (take(input) & 7u) != 7u;
     uint8_t *bytes;
     int status;
     memset(&listener, 0, sizeof listener);
-    listener.context = &told;
+    listener.context = &calls;
     if (interested) {
 @members@
     }
@@ -19,6 +19,6 @@ static void @p@_tell_(input_t *input)
     frame.payload = bytes;
     status = @p@_@listener@_dispatch(&listener, &frame);
     REQUIRE(status == @p@_@second@_check(&frame));
-    REQUIRE(told == ((status == @P@_OK && interested) ? 1u : 0u));
+    REQUIRE(calls == ((status == @P@_OK && interested) ? 1u : 0u));
     release(bytes);
 }
