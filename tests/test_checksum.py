@@ -1,4 +1,4 @@
-"""The catalogue against two independent libraries, and the algebra that generated code relies on."""
+"""The catalogue compared with two independent libraries, and the algebra that generated code uses."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def bitwise(algorithm: Algorithm, data: bytes) -> int:
 
 
 def test_the_catalogue_is_complete() -> None:
-    # crccheck has one more, 82 bits wide, which anycrc and 64-bit registers leave out.
+    # crccheck has one more, of 82 bits, which neither anycrc nor 64-bit registers support.
     assert {each.name for each in ALL} == set(CRCCHECK) - {"crc-82/darc"}
     assert set(ANYCRC.values()) == set(anycrc.models)
     assert [len(catalogue(width)) for width in (8, 16, 32, 64)] == [20, 31, 12, 7]
@@ -78,7 +78,7 @@ def test_values_agree_with_crccheck_and_anycrc(algorithm: Algorithm) -> None:
     assert algorithm.compute(CHECK_DATA) == algorithm.check
     for data in SAMPLES:
         assert algorithm.compute(data) == CRCCHECK[algorithm.name].calc(data) == bitwise(algorithm, data)
-        if data:  # for no data at all anycrc returns the unreflected init
+        if data:  # without data anycrc returns the unreflected init
             assert algorithm.compute(data) == anycrc.Model(ANYCRC[algorithm.name]).calc(data)
 
 
@@ -107,7 +107,7 @@ def test_a_constant_preamble_folds_into_the_start_value(algorithm: Algorithm) ->
     assert algorithm.finish(register) == algorithm.check
 
 
-# The index of an unreflected table needs as many register bits as it takes input.
+# The index of an unreflected table needs as many register bits as input bits.
 @pytest.mark.parametrize("algorithm", [each for each in ALL if each.width >= 4], ids=lambda each: each.name)
 def test_a_table_of_16_entries_gives_the_same_values(algorithm: Algorithm) -> None:
     small, register = algorithm.table(4), algorithm.start
@@ -178,7 +178,7 @@ def test_all_other_names_are_clear() -> None:
     for each in ALL:
         for name in each.names:
             assert bool(checksum.candidates(name)) is (checksum._key(name) in keys), name
-        assert not checksum.candidates(each.name)  # what the warning proposes is not warned of again
+        assert not checksum.candidates(each.name)  # the proposed name gives no warning
 
 
 def test_every_name_finds_its_own_algorithm() -> None:

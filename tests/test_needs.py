@@ -1,4 +1,4 @@
-"""Tests are marked by what their code can reach, and one that uses what it has no marker for fails."""
+"""Tests are marked by the resources that their code can reach; a test that uses another resource fails."""
 
 from __future__ import annotations
 

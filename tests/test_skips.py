@@ -1,4 +1,4 @@
-"""A skip is a failure where nothing may be skipped, but for that of a tool which is marked as optional."""
+"""If skips are forbidden, a skipped test fails, except for a missing tool that its test marks as optional."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which word was meant: typing errors are recognised, other words are not taken for them."""
+"""Suggestions for unknown words: typing errors are recognised, and other words give no suggestion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Schemas as data, with words in the slots for names."""
+"""Schemas as data, with chosen words as names."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from qlinkgen.schema import loads
 Json = str | int | Sequence["Json"] | Mapping[str, "Json"]
 Fields = Mapping[str, Json]
 
-#: Names of the parts of a frame where they do not matter.
+#: Default names of the parts of a frame.
 PLAIN_PARTS = ("zz_start", "zz_length", "zz_id", "zz_to", "zz_data", "zz_check")
 
 
 def frame(
     parts: Sequence[str], *, stuffed: bool = False, length: bool = True, check: str = "crc-16/modbus"
 ) -> Json:
-    """A frame of six parts that are called so: start, length, id, address, payload, check."""
+    """A frame of six parts with these names: start, length, id, address, payload, check."""
     start, size, number, to, data, total = parts
     counted: Mapping[str, Json] = (
         {size: {"role": "length", "type": "u16", "counts": [data]}} if length else {}
@@ -64,7 +64,7 @@ def numbered(words: Sequence[str]) -> Json:
 
 @dataclass
 class Document:
-    """A schema with as much in it as one wants; what is not given is the least that is needed."""
+    """A schema; sections that are not given have the minimum that is required."""
 
     name: str = "plain"
     frame: Json = field(default_factory=lambda: frame(PLAIN_PARTS))
@@ -125,7 +125,7 @@ class Document:
         return json.dumps(made)
 
     def protocol(self) -> Protocol:
-        """What lint makes of it: it must have nothing to say."""
+        """The protocol; fails if lint reports anything."""
         made, faults = loads(self.text(), f"{self.name}.yaml")
         assert not faults, "\n".join(map(str, faults[:20]))
         assert made is not None

@@ -1,7 +1,7 @@
-"""Words that mean something to a compiler, a library, or the generated code itself.
+"""Words with a meaning in a language, a library, or the generated code itself.
 
-The lists of the product are not used: keywords come from the languages, macros from the headers of the C
-library, and the rest from the identifiers of generated files in which no name of a schema is special.
+The lists of the product are not used: keywords are those of the languages, macros those of the headers of the
+C library, and the others are identifiers of generated files whose schemas have neutral names.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ C_KEYWORDS = """alignas alignof and and_eq asm auto bitand bitor bool break case
     thread_local throw true try typedef typeid typename typeof typeof_unqual union unsigned using
     virtual void volatile wchar_t while xor xor_eq final override interrupt near far huge small
     cdecl""".split()  # noqa: SIM905 - reads better than quoted words
-#: Names that a user of any protocol wants.
+#: Usual names in protocols.
 USUAL = """a b c i j k m n p s t x y z address axis buffer bus check checksum code command count crc data
     device end error event file flags frame handle head header id index init length level list main
     master max message min mode name node number object offset parity payload port position power raw
     read receive request reset response result role send sent set signal size slave speed start state
     status stop string sum sync text time timer to type unit user value version wire word write x1 y2
     con nul aux prn com1 lpt9 u8 i16 fixed bytes u8_t i_""".split()  # noqa: SIM905 - reads better than quoted words
-#: What a name of a schema looks like.
+#: The pattern of a name.
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
-#: Names that the neutral schemas have.
+#: Names in the neutral schemas.
 _MADE = re.compile(r"(plain|([a-z])\2)(_|\Z)")
 #: Comments, texts and numbers of C.
 _NO_CODE = re.compile(r'/\*.*?\*/|"(?:[^"\\]|\\.)*"|\b[0-9][0-9A-Za-z]*', re.DOTALL)
@@ -56,14 +56,14 @@ def macros(compiler: str) -> set[str]:
 
 
 def of_python() -> set[str]:
-    """Keywords, built-in names, and what classes of buses have."""
+    """Keywords, built-in names, and members of bus classes."""
     public = {name for module in (aio, blocking) for _, each in inspect.getmembers(module, inspect.isclass)
               for name in dir(each)}  # fmt: skip
     return {*keyword.kwlist, *keyword.softkwlist, *dir(builtins), *public}
 
 
 def of_generated(documents: Iterable[Document], targets: Iterable[str]) -> set[str]:
-    """Identifiers in the code of these targets, with and without the protocol's name before them."""
+    """Identifiers in the code of these targets, with and without the prefix of the protocol's name."""
     found: set[str] = set()
     for document in documents:
         protocol = document.protocol()
@@ -86,7 +86,7 @@ def _of_python(text: str) -> Iterator[str]:
 
 
 def names(words: Iterable[str]) -> list[str]:
-    """Those that a schema may use as a name, in order; a word with "_" after it is that of another."""
+    """The words that a schema may use as names, sorted; a final "_" marks the variant of another word."""
     return sorted(
         {word for word in words if NAME.fullmatch(word) and not _MADE.match(word) and word[-1] != "_"}
     )

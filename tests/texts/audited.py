@@ -1,8 +1,8 @@
-"""Runs commands of the command line under an audit hook, and prints what they must not do.
+"""Runs commands of the command line under an audit hook, and prints forbidden events.
 
     python audited.py MODULE,MODULE... WORD COMMANDS.json
 
-The modules must not be imported, and the word must not be in code that is compiled.
+The modules must not be imported, and compiled code must not contain the word.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 
 def main() -> None:
-    """Run the commands one after the other, each with its exit code."""
+    """Run the commands one after the other; returns their exit codes."""
     from qlinkgen.cli import cli
     from qlinkgen.cli.boundary import run
 

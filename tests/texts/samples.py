@@ -1,6 +1,6 @@
-"""Texts that a schema may hold: ordinary ones that code has other uses for, and some that try to be code.
+"""Texts that a schema may contain: ordinary ones with characters special in code, and some that imitate code.
 
-The hostile ones leave a file called `canary` in the current folder if they are executed, or do not compile.
+If these are executed, they create a file named `canary` in the current folder, or do not compile.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ TEXTS = (*ORDINARY, *HOSTILE)
 
 
 def turned(step: int) -> list[tuple[str, ...]]:
-    """All texts, beginning with another one each time: to be put into slots in turn."""
+    """Rotations of all texts, to be assigned to slots one after the other."""
     return [(*TEXTS[first:], *TEXTS[:first]) for first in range(0, len(TEXTS), step)]
 
 
@@ -76,5 +76,5 @@ CASES = (
 
 
 def harmless(texts: tuple[str, ...]) -> tuple[str, ...]:
-    """As many texts that mean nothing to any language; equal units, say, are one in the output."""
+    """As many texts without a meaning in any language; they differ, because equal units, say, are merged."""
     return tuple(f"{HARMLESS} {number}" for number in range(len(texts)))

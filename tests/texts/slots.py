@@ -1,7 +1,7 @@
-"""Every place of a schema that takes free text, found by walking the classes of the file model.
+"""The slots of a schema: every place for free text, found in the classes of the file model.
 
-A new key that is declared as `Text` or `Label` has slots here without a change, and fails
-`test_every_text_of_the_file_model_has_a_slot` until a schema beside this file has the mapping that holds it.
+A new key declared as `Text` or `Label` has slots without a change here. It fails
+`test_every_text_of_the_file_model_has_a_slot` until a schema in this folder contains its mapping.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from qlinkgen.schema.source import parse
 
 FOLDER = Path(__file__).parent
 SCHEMAS = ("delimited", "marked", "packet")
-#: Mapping and key that a text belongs to, such as ("FieldSpec", "unit").
+#: Mapping and key of a text, such as ("FieldSpec", "unit").
 Kind = tuple[str, str]
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A place for a text: its path in the file, and the mapping and key that it is declared in."""
+    """A place for a text: its path in the file, and the mapping and key that declare it."""
 
     path: tuple[str | int, ...]
     kind: Kind
@@ -57,7 +57,7 @@ def kinds_of_slots() -> set[Kind]:
 
 
 def _parts(hint: Any) -> Iterator[Any]:
-    """An annotation and everything in it."""
+    """An annotation and all annotations inside it."""
     yield hint
     for part in typing.get_args(hint):
         yield from _parts(part)
@@ -77,7 +77,7 @@ def _is_text(hint: Any) -> bool:
 
 @functools.cache
 def document(name: str) -> Any:
-    """A schema's data, with short forms written out."""
+    """A schema's data, with short forms expanded."""
     data = yaml.safe_load((FOLDER / f"{name}.yaml").read_text("utf-8"))
     _write_out(data, SchemaFile)
     return data
@@ -95,7 +95,7 @@ def _write_out(data: Any, hint: Any) -> Any:
 
 
 def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
-    """Keys of a mapping with the annotation of what they hold."""
+    """Keys of a mapping with the annotations of their values."""
     model = _first(hint, _is_model, through_dicts=False)
     if model is not None:
         hints = typing.get_type_hints(model, include_extras=True)
@@ -117,7 +117,7 @@ def _first(hint: Any, wanted: Any, *, through_dicts: bool = True) -> Any:
 
 @functools.cache
 def slots(name: str) -> tuple[Slot, ...]:
-    """The slots of a schema that it may use: a unit, say, means nothing for a constant."""
+    """The slots that a schema may use; a constant, for example, cannot have a unit."""
     found = list(_slots(document(name), SchemaFile, (), ("", "")))
     for _ in found:
         text = text_of(put(name, found, "x"))
@@ -158,9 +158,9 @@ def _may_be_text(hint: Any) -> bool:
 
 
 def put(name: str, places: Iterable[Slot], texts: str | Sequence[str]) -> Any:
-    """A schema's data with texts in some of its slots, in turn where there are several.
+    """A schema's data with texts in some of its slots, several texts cyclically.
 
-    A label is the same everywhere, as it is declared once.
+    A label is the same in all its slots, because it is declared once.
     """
     data = copy.deepcopy(document(name))
     turn = [texts] if isinstance(texts, str) else texts
@@ -173,13 +173,13 @@ def put(name: str, places: Iterable[Slot], texts: str | Sequence[str]) -> Any:
 
 
 def is_label(slot: Slot) -> bool:
-    """Its text is a label: declared in one slot, used in others."""
+    """Whether its text is a label: declared in one slot, used in others."""
     return slot.kind[1] in {"values", "attributes"}
 
 
 def text_of(data: Any) -> str:
     """The YAML of plain data."""
-    # The dumper in C takes a twentieth of the time; the wheels of PyYAML have it, other builds may not.
+    # The C dumper takes a twentieth of the time; wheels of PyYAML have it, other builds may not.
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     text: str = yaml.dump(data, Dumper=dumper, allow_unicode=True, sort_keys=False, width=1000)
     return text
@@ -197,9 +197,9 @@ def protocol_of(
 
     Args:
         name: One of `SCHEMAS`.
-        texts: One text, or several in turn.
-        places: Slots that get one, or all.
-        default: Default of the field that is text on the wire, where the schema has one.
+        texts: One text, or several, used cyclically.
+        places: Slots that get a text, None for all.
+        default: Default of the field that is text on the wire, if the schema has one.
         file: Name of the schema's file.
     """
     data = put(name, slots(name) if places is None else places, texts)

@@ -1,4 +1,4 @@
-"""Every text of the file model has a slot, takes ordinary texts, and refuses control characters."""
+"""Every text of the file model has a slot, accepts ordinary texts, and refuses control characters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.texts.samples import TEXTS
 from tests.texts.slots import SCHEMAS, kinds_of_slots, put, slots, text_of
 
 CHARACTERS = [chr(number) for number in range(0x10000) if CONTROL.match(chr(number))]
-#: Of these a parser of YAML is the first to say that they are not characters.
+#: Code points that the YAML parser refuses.
 SURROGATES = [character for character in CHARACTERS if "\ud800" <= character <= "\udfff"]
 OTHERS = [character for character in CHARACTERS if character not in SURROGATES]
 

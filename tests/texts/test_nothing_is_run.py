@@ -1,4 +1,4 @@
-"""Reading a schema and using its protocol runs nothing that the schema says: proven by an audit hook."""
+"""Reading a schema and using its protocol executes no text of the schema, as an audit hook shows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.texts.samples import HARMLESS, HOSTILE
 from tests.texts.slots import SCHEMAS, put, slots, text_of
 
 AUDITED = Path(__file__).with_name("audited.py")
-#: Modules of the standard library that nothing here has a use for; they print, or open a browser.
+#: Modules of the standard library that qlinkgen does not need; they print, or open a browser.
 NAMES = ("antigravity", "this", "__hello__", "turtledemo")
 FRAMES = {
     "delimited": "a5a50e01030000000700000000000000000000400c",
@@ -30,7 +30,7 @@ MESSAGES = {
 
 
 def audited(word: str, commands: list[list[str]], folder: Path) -> dict[str, Any]:
-    """What the commands did that they must not do, and their exit codes."""
+    """The forbidden events of the commands, and their exit codes."""
     (folder / "commands.json").write_text(json.dumps(commands), "utf-8")
     done = subprocess.run(
         [sys.executable, AUDITED, ",".join(NAMES), word, "commands.json"],
@@ -83,7 +83,7 @@ def test_names_of_a_schema_are_not_imported(tmp_path: Path) -> None:
     assert not (tmp_path / "canary").exists()
 
 
-def test_the_hook_notices_what_it_is_for(tmp_path: Path) -> None:
+def test_the_hook_detects_execution(tmp_path: Path) -> None:
     found = audited(
         "PREAMBLE",
         [["generate", "qlink", "--target", "c", "-o", "made"], ["decode", "qlink", "a5"]],

@@ -1,4 +1,4 @@
-"""Texts of a schema are comments in everything that is C, and strings in JSON."""
+"""Texts of a schema are comments in C files, and strings in JSON."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _COMMENT_OR_STRING = re.compile(r'/\*.*?\*/|"(?:[^"\\\n]|\\.)*"', re.DOTALL)
 
 
 def tokens(source: str) -> Sequence[str]:
-    """What a compiler is left with: trigraphs replaced, lines spliced, comments gone."""
+    """The code as compiled: trigraphs replaced, lines spliced, comments removed."""
     text = re.sub(r"\?\?([=/'()!<>-])", lambda found: _TRIGRAPHS[found[1]], source)
     text = text.replace("\\\n", "")
     text = _COMMENT_OR_STRING.sub(lambda found: found[0] if found[0].startswith('"') else " ", text)

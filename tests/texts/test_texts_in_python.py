@@ -1,4 +1,4 @@
-"""Texts of a schema are data in everything that is Python: codecs, bus modules, construct structures."""
+"""Texts of a schema are data in Python files: codecs, bus modules, construct structures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from qlinkgen.model.protocol import Protocol
 from tests.texts.samples import CASES, HARMLESS, HOSTILE, TEXTS, harmless, turned
 from tests.texts.slots import SCHEMAS, Slot, is_label, protocol_of, slots
 
-#: A names must be unique: the shipped package is imported already.
+#: Differs from the name of the shipped package, which is already imported.
 OPTIONS = Options(package="python/wire")
 TARGETS = {"python": python.generate, "bus": bus.generate, "construct": construct.generate}
 
@@ -38,14 +38,14 @@ def sources(protocol: Protocol) -> dict[str, str]:
 
 
 class _Bare(ast.NodeTransformer):
-    """Leaves the structure of a module: every string is empty."""
+    """Empties every string of a module, which leaves its structure."""
 
     def visit_Constant(self, node: ast.Constant) -> ast.Constant:
         return ast.Constant("") if isinstance(node.value, str) else node
 
 
 def structure(tree: ast.Module) -> str:
-    """A module without its strings; the tree is used up."""
+    """The text of a module without its strings; changes the tree."""
     return ast.dump(_Bare().visit(tree))
 
 
@@ -59,16 +59,14 @@ def structures(
 
 
 def docstrings(tree: ast.Module) -> list[str]:
-    """Docstrings of a module without blanks: they are wrapped, words that are longer than a line too."""
+    """Docstrings of a module without blanks, because lines and even long words are wrapped."""
     owners = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
     found = (ast.get_docstring(node, clean=False) for node in ast.walk(tree) if isinstance(node, owners))
     return [re.sub(r"\s", "", doc) for doc in found if doc]
 
 
 @pytest.mark.parametrize(("name", "texts"), CASES)
-def test_the_code_is_that_of_harmless_texts_and_docstrings_say_the_text(
-    name: str, texts: tuple[str, ...]
-) -> None:
+def test_texts_change_only_docstrings(name: str, texts: tuple[str, ...]) -> None:
     protocol = protocol_of(name, texts)
     wanted = re.sub(r"\s", "", protocol.title).rstrip(".")
     for target, source in sources(protocol).items():
@@ -93,7 +91,7 @@ def test_the_code_is_that_of_harmless_texts_in_each_kind_of_slot_alone() -> None
 
 
 def modules(folder: Path, protocol: Protocol) -> Iterator[ModuleType]:
-    """The generated modules, written and imported as users have them."""
+    """The generated modules, written to a package and imported."""
     files = {path: text for make in TARGETS.values() for path, text in make(protocol, OPTIONS).items()}
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
@@ -105,7 +103,7 @@ def modules(folder: Path, protocol: Protocol) -> Iterator[ModuleType]:
 
 @pytest.fixture
 def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder from which generated packages are imported, and nothing of them afterwards."""
+    """A folder for generated packages; they are removed from sys.modules afterwards."""
     packages = ["wire", Path(construct.FOLDER).name]
     kept = {name: module for name, module in sys.modules.items() if name.split(".")[0] in packages}
     for name in kept:

@@ -1,4 +1,4 @@
-"""Control characters of files do not reach a terminal, and ordinary texts reach it as they are."""
+"""Control characters of files are not printed to a terminal; ordinary texts are printed unchanged."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Run = Callable[..., str]
 
 @pytest.fixture
 def said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Return a function that runs the command line and returns all that it says."""
+    """Return a function that runs the command line and returns its output."""
     monkeypatch.delenv("FORCE_COLOR", raising=False)
     monkeypatch.setenv("NO_COLOR", "1")
 
@@ -41,7 +41,7 @@ def said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
 
 
 def with_evil(node: Any) -> Any:
-    """A model in which every text has control characters, as no schema can bring them there."""
+    """A model whose texts all have control characters, which cannot be created by a schema."""
     if isinstance(node, str):
         return node.replace("MARK", f"MARK{EVIL}")
     if isinstance(node, tuple):

@@ -23,7 +23,7 @@ class Unsent:
 
 
 def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsent]:
-    """A valid vector with each number, and the address, out of range by one in turn."""
+    """A valid vector once with each number, and the address, out of range by one."""
     at = 0
     for step, size in zip(message.payload.settable, value_sizes(header, message, right), strict=True):
         if isinstance(step, ValueStep | Member):

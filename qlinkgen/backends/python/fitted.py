@@ -1,7 +1,7 @@
 """Splits the statements of generated Python that are too long for a line, as ``ruff format`` does.
 
 Printers write a statement on one line where they know no better. This pass reads it as brackets and operators
-and splits it at the outermost ones first. It changes nothing but blanks and line ends, parentheses around an
+and splits it at the outermost ones first. It changes only blanks and line ends, parentheses around an
 expression, and the comma after the last of several items.
 """
 
