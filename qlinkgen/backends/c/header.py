@@ -133,8 +133,10 @@ class Header:
             limited = any(
                 each.address_allowed for _, messages in received for each in self._expected(messages)
             )
-            unused = [*unused, *([view.address] if view.address and not limited else [])]
-            texts.append(self._place("header_check", f=view, header_checks=header_checks, unused=unused))
+            address = [] if limited or not view.address else [view.address]
+            texts.append(
+                self._place("header_check", f=view, header_checks=header_checks, unused=[*unused, *address])
+            )
         if view.sized_by_message:
             size_groups = [
                 Group(d, [size_view(names, message, self._layouts) for message in messages])
