@@ -1,7 +1,7 @@
 """A Q.link bus without hardware: nodes on a pty, a master that moves them, and every frame on the wire.
 
-Run it with ``make demo``, or alone with ``python examples/bus.py``. The master opens the pty by its name, as
-it would open /dev/ttyUSB0; everything it does works the same on a real bus.
+Run it with ``make demo``, or separately with ``python examples/bus.py``. The master opens the pty by its
+name, like /dev/ttyUSB0, and works in the same way on a real bus.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from qlinkgen.sim import Wire
 from qlinkgen.sim.pty_bus import PtyBus
 
 BAUD = 115200
-#: Far more than a pty needs: the demo has to work on a machine that is busy with something else.
+#: Far more than a pty needs, so that the demo works on a busy machine.
 SLACK = 0.5
 #: A ramp up and down: each word is a displacement in encoder counts.
 PATH = [*range(0, 60, 5), *range(60, 0, -5)]
 
 
 def main() -> int:
-    """Scan the bus, move a motor, and show what went over the wire."""
+    """Scan the bus, move a motor, and show the frames on the wire."""
     nodes = {
         number: VirtualNode(
             number, position_type=qlink.PositionType.JVL_MACTALK, rate=400, serial_number=1000 + number
@@ -57,7 +57,7 @@ def main() -> int:
 
 
 def simulated(nodes: Mapping[int, VirtualNode], recorder: Recorder) -> PtyBus:
-    """Nodes on a line that takes its time, behind a pty."""
+    """Nodes on a paced line with a pty."""
     wire = Wire(baud=BAUD, chunks="byte")
     for node in nodes.values():
         wire.attach(SlaveEngine(qlink, node))
@@ -66,13 +66,13 @@ def simulated(nodes: Mapping[int, VirtualNode], recorder: Recorder) -> PtyBus:
 
 
 class Recorder:
-    """What a listener on the line has heard."""
+    """Records the frames on the line."""
 
     def __init__(self) -> None:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Discard the recorded frames."""
         self.monitor = Monitor(qlink, Timing.of(qlink, host_slack=SLACK))
 
     def lines(self) -> list[str]:

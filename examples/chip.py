@@ -1,7 +1,7 @@
 """An MC1231A chip set without hardware: a pty, a host that moves an axis, and every packet on the wire.
 
-Run it with ``make demo``, or alone with ``python examples/chip.py``. The host opens the pty by its name, as
-it would open /dev/ttyUSB0.
+Run it with ``make demo``, or separately with ``python examples/chip.py``. The host opens the pty by its name,
+like /dev/ttyUSB0.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from qlinkgen.sim.chip_bus import chip_wire
 from qlinkgen.sim.pty_bus import PtyBus
 
 BAUD = 57600
-#: Far more than a pty needs: the demo has to work on a machine that is busy with something else.
+#: Far more than a pty needs, so that the demo works on a busy machine.
 SLACK = 0.5
 TARGET = 3000
 #: Commands by the first byte of a packet.
@@ -25,7 +25,7 @@ NAMES = {command.id: name for name, command in mc1231a.COMMANDS.items()}
 
 
 def main() -> int:
-    """Move axis 2, be refused a change, and show what went over the wire."""
+    """Move axis 2, try an invalid change, and show the packets on the wire."""
     wire = chip_wire(ChipSet(), baud=BAUD)
     recorder = Recorder()
     wire.taps.append(recorder.hear)
@@ -37,8 +37,8 @@ def main() -> int:
         axis.set_vel(value=2.75)
         axis.set_acc(value=0.01)
         axis.update()
-        print(f"moving axis 2 to {TARGET} counts, at most 2.75 a sample")
-        axis.set_acc(value=0.02)  # not while the axis moves: the update drops it, and the status word tells
+        print(f"moving axis 2 to {TARGET} counts, at most 2.75 per sample")
+        axis.set_acc(value=0.02)  # invalid while the axis moves: dropped, with a bit in the status word
         try:
             axis.update()
         except CommandError as error:
@@ -55,14 +55,14 @@ def main() -> int:
 
 
 class Recorder:
-    """What a listener on both lines has heard: one line of text for each packet and each answer."""
+    """Records both lines: one line of text for each packet and each answer."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self._start: float | None = None
 
     def hear(self, at: float, source: str, data: bytes) -> None:
-        """Take what has arrived; the host sends a packet in one piece, the chip set its answer."""
+        """Record received bytes; each packet and each answer is sent in one piece."""
         if self._start is None:
             self._start = at
         who = f"host  {NAMES.get(data[0], '?'):16}" if source == OUTSIDE else f"chip  {'':16}"

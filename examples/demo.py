@@ -2,7 +2,7 @@
 
 Run it with ``make demo``. It generates all three protocols into a temporary folder, compiles a small C
 program against each header, and checks that the three make the same bytes and read the same values. Needs
-gcc, or the compiler that CC names.
+gcc, or the compiler in the environment variable CC.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FLAGS = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
 
 @dataclass(frozen=True)
 class Case:
-    """A message with its values; ``request`` is what a packet's response answers."""
+    """A message with its values; ``request`` is the request of a packet's response."""
 
     protocol: str
     message: str
@@ -46,7 +46,7 @@ CASES = (
     Case(
         "qlink",
         "motion.response",
-        # 0xA5 in the data, so that the stuffing shows: a 00 follows it on the wire.
+        # 0xA5 in the data shows the stuffing: a 00 follows it on the wire.
         {"counter": 7, "inputs": 0xA5, "position": -123456, "motor_status": 3, "fifo_space": 24},
         {"node": 3},
     ),
@@ -57,7 +57,7 @@ CASES = (
 
 @dataclass(frozen=True)
 class Shown:
-    """What one output made of a message: its bytes, and its values read back from them."""
+    """The result of one output: the bytes of a message, and the values read back from them."""
 
     wire: bytes
     values: Mapping[str, Any]
@@ -81,7 +81,7 @@ def main() -> int:
 
 
 def _generate(folder: Path) -> None:
-    """What `qlinkgen generate` does, as a user would run it."""
+    """Run `qlinkgen generate`."""
     command = [sys.executable, "-m", "qlinkgen", "generate", "--output", str(folder)]
     print("$ qlinkgen generate --output DIR")
     print(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
@@ -166,7 +166,7 @@ FRAME = """\
         }
     }"""
 
-#: A packet's response: its check value covers the request, whose command byte is all that get_pos sends.
+#: A packet's response: its check value covers the request, which for get_pos is only the command byte.
 PACKET = """\
     uint8_t wire[@PROTOCOL@_MAX_WIRE_SIZE];
     int size = @name@_to_frame(&sent, @request@_ID, wire, sizeof wire);
@@ -188,7 +188,7 @@ def _by_c(case: Case, protocol: Protocol, message: Message, folder: Path, compil
 
 
 def _scalar(kind: object) -> Scalar:
-    assert isinstance(kind, Scalar), "the demo's messages hold numbers alone"
+    assert isinstance(kind, Scalar), "the demo's messages contain only numbers"
     return kind
 
 

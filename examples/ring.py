@@ -1,8 +1,9 @@
 """A Trio ring without hardware: keypad, coordinator, a program at a pty, and every message on the wire.
 
-Run it with ``make demo``, or alone with ``python examples/ring.py``. The program is a Motion Coordinator of
-its own: it opens the pty by its name, as it would open /dev/ttyUSB0, and has its place between the last node
-and the first. So the keypad is 10, the other coordinator 11, and the program itself 12.
+Run it with ``make demo``, or separately with ``python examples/ring.py``. The program is another Motion
+Coordinator: it opens the pty by its name, like /dev/ttyUSB0, and is between the last node and the first. So
+    the
+keypad is 10, the other coordinator 11, and the program itself 12.
 """
 
 from __future__ import annotations
@@ -15,29 +16,29 @@ from qlinkgen.sim.port_ring import RingBus, ring_bus
 
 BAUD = 38400
 KEYPAD, OTHER, SELF = 10, 11, 12
-#: SEND's types, and the channel of GET for characters as they come.
+#: SEND's types, and the channel of GET for unchanged characters.
 VARIABLE, OFFSET, CHARACTERS = 1, 2, 4
-#: Seconds; far more than a pty needs: the demo has to work on a machine that is busy with something else.
+#: Seconds; far more than a pty needs, so that the demo works on a busy machine.
 PATIENCE = 30
 
 
 def main() -> int:
-    """Write on the display, read a key, set a variable, and show what went over the wire."""
+    """Write on the display, read a key, set a variable, and show the messages on the wire."""
     keypad, other = KeypadNode(baud=BAUD), CoordinatorNode(baud=BAUD)
     ring = ring_bus([keypad, other], baud=BAUD)
     recorder = Recorder(ring)
     with ring, MotionCoordinator.open(ring.path, BAUD) as mc:
         print(f"a simulated ring at {ring.path}, {BAUD} baud: keypad, coordinator, and this program")
-        mc.send(KEYPAD, OFFSET, 11)  # its keys go two nodes on: from the keypad, that is this program
+        mc.send(KEYPAD, OFFSET, 11)  # the receiver of its keys is two nodes after it: this program
         mc.print_(KEYPAD, CHR(12), "SPEED:", VALUE(150, 6, 0), end="")
         mc.send(OTHER, VARIABLE, 7, -0.25)
-        mc.send(SELF, VARIABLE, 0, 42)  # once round: when it is here, all before it has arrived as well
+        mc.send(SELF, VARIABLE, 0, 42)  # once around: when it returns, all earlier messages have arrived
         mc.wait_until(lambda: mc.vr[0] == 42, PATIENCE)
         ring.call(lambda: press(ring, keypad, "5"))
         key = mc.get(CHARACTERS, PATIENCE)
         status = int(mc.netstat)
-    print(f"  the keypad shows {keypad.display.lines[0]!r}, its key {chr(key)!r} came")
-    print(f"  VR(7) of the coordinator is {other.vr[7]}, the own VR(0) {mc.vr[0]:g}, NETSTAT {status}")
+    print(f"  the keypad shows {keypad.display.lines[0]!r}, its key {chr(key)!r} was received")
+    print(f"  VR(7) of the coordinator is {other.vr[7]}, VR(0) of the program {mc.vr[0]:g}, NETSTAT {status}")
     print("on the wire, each message on each fibre:")
     print("\n".join(recorder.lines))
     right = keypad.display.lines[0] == "SPEED:   150" and other.vr[7] == -0.25
@@ -51,7 +52,7 @@ def press(ring: RingBus, keypad: KeypadNode, key: str) -> None:
 
 
 class Recorder:
-    """What a listener on each fibre of the ring has heard."""
+    """Records the messages on each fibre of the ring."""
 
     def __init__(self, ring: RingBus) -> None:
         self.lines: list[str] = []

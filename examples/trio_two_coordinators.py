@@ -1,12 +1,12 @@
-"""Two Motion Coordinators and a keypad on a simulated ring: one asks the operator, and commands the other.
+"""Two Motion Coordinators and a keypad on a simulated ring: one prompts the operator, and commands the other.
 
-This is Example 2 of the Trio fibre-optic network document, written afresh. The ring is the master with three
-axes, the slave with two, and the keypad. The slave must send nothing by way of the keypad before that has its
-offset: it waits for an "I", which the master sends after the offset. Run it with
-``python examples/trio_two_coordinators.py``: time is simulated, so it takes none.
+This is Example 2 of the Trio fibre-optic network document, rewritten. The ring is the master with three axes,
+the slave with two, and the keypad. The slave must not send through the keypad before the keypad has its
+offset: it waits for an "I", which the master sends after the offset. Run it with ``python
+examples/trio_two_coordinators.py``; time is simulated, so it does not wait.
 
-The document's listing leaves the cursor where the feed length ends; here the speed gets a row of its own by
-`CURSOR(40)`, from which follows the place 46 that the listing updates.
+The document's listing leaves the cursor after the feed length; here `CURSOR(40)` puts the speed on a separate
+row, which gives the place 46 that the listing updates.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from qlinkgen.sim.virtual_ring import VirtualRing
 SLAVE, KEYPAD = 10, 11
 #: Seen from the slave; the keypad is between.
 MASTER = 11
-#: Variables: feed length and speed on both, the latest key, and what the slave reports to the master.
+#: Variables: feed length and speed on both, the latest key, and the slave's report to the master.
 FEED, SPEED, KEY, REPORT = 0, 1, 100, 200
 READY, STARTED = 99, 999
 MORE, LESS, ENTER, START = 10, 11, 13, 20
@@ -77,7 +77,7 @@ def slave(mc: MotionCoordinator) -> float:
 
 
 def wait_for(mc: MotionCoordinator, character: str) -> None:
-    """Drop characters until a certain one comes."""
+    """Drop characters until a given one is received."""
     while True:
         mc.vr[KEY] = mc.get(4)
         if mc.vr[KEY] == ord(character):
@@ -85,7 +85,7 @@ def wait_for(mc: MotionCoordinator, character: str) -> None:
 
 
 def operator(keypad: MembraneKeypad) -> list[list[str]]:
-    """Set both values and start the machine; returns what the display has shown on the way."""
+    """Set both values and start the machine; return the displayed screens."""
     shown = []
     keypad.wait_until(lambda: "FEED LENGTH" in keypad.lines[1])
     shown.append(keypad.lines)
@@ -95,19 +95,19 @@ def operator(keypad: MembraneKeypad) -> list[list[str]]:
     shown.append(keypad.lines)
     press(keypad, ENTER)
     keypad.wait_until(lambda: keypad.lines[0] == "PRESS START TO RUN")
-    press(keypad, ENTER, START)  # the first is not the key that it waits for
+    press(keypad, ENTER, START)  # it ignores the first key
     return shown
 
 
 def press(keypad: MembraneKeypad, *keys: int) -> None:
-    """Press keys at the pace of a quick finger."""
+    """Press keys at a realistic speed."""
     for key in keys:
         keypad.press(key)
         keypad.sleep(0.1)
 
 
 def main() -> int:
-    """Run the ring, and look at what is on it at the end."""
+    """Run the ring, and check its final state."""
     ring = VirtualRing("coordinator,coordinator,keypad", baud=38400)
     three_axes, two_axes, keypad = ring.coordinator(0), ring.coordinator(1), ring.keypad(2)
     speeds: list[float] = []

@@ -1,11 +1,11 @@
 """One Motion Coordinator and two keypads on a simulated ring: both operators set the same speed and length.
 
-This is Example 1 of the Trio fibre-optic network document, written afresh. The ring is coordinator, first
-keypad, second keypad; key presses of the first pass through the second on their way. Run it with
-``python examples/trio_two_keypads.py``: time is simulated, so it takes none.
+This is Example 1 of the Trio fibre-optic network document, rewritten. The ring is coordinator, first keypad,
+second keypad; keys of the first pass through the second. Run it with ``python examples/trio_two_keypads.py``;
+time is simulated, so it does not wait.
 
 Two lines differ from the document's. The display is cleared without a line end (a semicolon in BASIC), since
-the numbers go to the first two rows; and key 11 makes the length smaller, where the listing has a plus.
+the numbers go to the first two rows; and key 11 decreases the length, where the listing has a plus.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FIRST, SECOND = 10, 11
 KEYPADS = (FIRST, SECOND)
 #: VR(2) holds the length.
 LENGTH = 2
-#: What the keys "0" to "9", "+" and "-" mean to the program, by the DEFKEY table.
+#: Values of the keys "0" to "9", "+" and "-" in the DEFKEY table.
 MORE, LESS = 10, 11
 
 
@@ -33,9 +33,9 @@ class Machine:
         self.turns = 0
 
     def start(self) -> None:
-        """Put the keypads into network mode, then draw what stays on their displays."""
+        """Put the keypads into network mode, then draw the fixed text of their displays."""
         mc = self.mc
-        mc.send(FIRST, 2, 11)  # its keys go two nodes on, past the second keypad
+        mc.send(FIRST, 2, 11)  # the receiver of its keys is two nodes after it, past the second keypad
         mc.send(SECOND, 2, 10)
         mc.defkey("0", *range(10))
         mc.defkey("+", MORE)
@@ -46,7 +46,7 @@ class Machine:
             mc.print_(keypad, "LENGTH:")
 
     def run(self, ended: Callable[[], bool]) -> None:
-        """Read keys while there are any, and move the machine in between."""
+        """Read keys, and move the machine in between."""
         while not ended():
             if self.mc.key(3):
                 self.read_key()
@@ -54,7 +54,7 @@ class Machine:
                 self.turns += 1  # the main motion routine
 
     def read_key(self) -> None:
-        """A digit is put behind the speed, the other keys change the length by a step."""
+        """Append a digit to the speed, or change the length by a step."""
         mc = self.mc
         key = mc.get(3)
         if key <= 9:
@@ -87,7 +87,7 @@ def operators(first: MembraneKeypad, second: MembraneKeypad) -> None:
 
 
 def main() -> int:
-    """Run the ring, and look at what is on it at the end."""
+    """Run the ring, and check its final state."""
     ring = VirtualRing("coordinator,keypad,keypad", baud=38400)
     mc, first, second = ring.coordinator(0), ring.keypad(1), ring.keypad(2)
     machine = Machine(mc)

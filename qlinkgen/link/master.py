@@ -184,7 +184,7 @@ class MasterEngine:
         self._tries = tries
         self._attempt = 0
         self._trial = trial
-        if self.health and not trial and command.response is not None:  # otherwise nothing is waited for
+        if self.health and not trial and command.response is not None:  # otherwise it does not wait
             self._look_at_health(now)
         if self._wrong:
             self._wrong = []

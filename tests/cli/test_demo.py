@@ -42,7 +42,7 @@ def test_the_bus() -> None:
 def test_the_ring() -> None:
     done = demo(ENVIRONMENT, "ring.py")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "the keypad shows 'SPEED:   150', its key '5' came" in done.stdout
+    assert "the keypad shows 'SPEED:   150', its key '5' was received" in done.stdout
     assert "8a 00 00 2a 00 00 00 00 00 00 00 00 00 35 29 88" in done.stdout, "the message around the ring"
 
 

@@ -115,7 +115,7 @@ def test_invalid_plans(text: str, reason: str) -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [{"drop": 1.1}, {"drop": float("nan")}, {"late": (0.1, 2, 1)}, {"late": (0.1, 2)}, {"to": "nobody"}],
+    [{"drop": 1.1}, {"drop": float("nan")}, {"late": (0.1, 2, 1)}, {"late": (0.1, 2)}, {"to": "nodes"}],
 )
 def test_wrong_arguments(arguments: dict[str, Any]) -> None:
     with pytest.raises(FaultPlanError):

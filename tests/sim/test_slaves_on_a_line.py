@@ -92,7 +92,7 @@ def test_endless_garbage_ends_when_the_time_is_over() -> None:
     port = VirtualPort(wire)
     for _ in range(20):
         begin = port.now()
-        loop(port, 1, b"anybody?", within=0.05)
+        loop(port, 1, b"hello?", within=0.05)
         # A read takes available bytes within its timeout, so a deadline holds under any traffic.
         assert port.now() - begin == pytest.approx(0.05)
     assert wire.collisions >= 20

@@ -31,7 +31,7 @@ def test_a_timeout_takes_exactly_its_time() -> None:
         port = VirtualPort(Wire(baud=baud), start=7.0)
         assert port.read(0.25) == b""
         assert port.now() == 7.25
-        port.write(b"nobody answers this")
+        port.write(b"no answer")
         assert port.read(0.5) == b""
         assert port.now() == 7.75
 
