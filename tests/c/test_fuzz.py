@@ -22,6 +22,7 @@ from tests.support import cfuzz_corpus
 from tests.support.ccoverage import Refuted, replay
 from tests.support.cfuzz import FUZZER, TARGETS, compiled, program
 from tests.support.planted import Fault
+from tests.support.sharing import made_once
 
 #: Seconds for each target, over all shipped protocols; the schemas of the tests get less.
 SECONDS = int(os.environ.get("QLINKGEN_FUZZ_SECONDS", "20" if os.environ.get("CI") else "5"))
@@ -101,17 +102,21 @@ FAULTS = [
 
 @pytest.mark.parametrize(("target", "fault"), FAULTS)
 def test_the_corpus_finds_a_planted_fault(
-    target: str, fault: Fault, tmp_path: Path, require_tool: Callable[..., str]
+    target: str, fault: Fault, tmp_path: Path, shared: Path, require_tool: Callable[..., str]
 ) -> None:
     compiler = require_tool("gcc", package="gcc")
-    text = header("qlink", tmp_path)
-    (tmp_path / f"{target}.c").write_text(program([protocol_of("qlink")], (target,)))
     flags = ("-std=gnu99", "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-DREPLAY")
     # The first byte selects the protocol if there are several.
     inputs = [each for each in cfuzz_corpus.read(target) if each[0] % len(cfuzz_corpus.SHIPPED) == 0]
-    assert compiled(compiler, tmp_path, target, *flags).returncode == 0
-    replay(tmp_path / target, inputs)
-    (tmp_path / "qlink.h").write_text(fault.planted(text))
+    right = shared / f"corpus of {target}"
+    with made_once(right) as first:
+        if first:
+            header("qlink", right)
+            (right / f"{target}.c").write_text(program([protocol_of("qlink")], (target,)))
+            assert compiled(compiler, right, target, *flags).returncode == 0
+            replay(right / target, inputs)
+    (tmp_path / f"{target}.c").write_text((right / f"{target}.c").read_text())
+    (tmp_path / "qlink.h").write_text(fault.planted((right / "qlink.h").read_text("utf-8")))
     assert compiled(compiler, tmp_path, target, *flags).returncode == 0
     with pytest.raises(Refuted):
         replay(tmp_path / target, inputs)

@@ -13,6 +13,7 @@ import pytest
 
 from qlinkgen.protocols.qlink import Bus
 from tests.firmware.firmware import ROOT, SOURCES, Firmware
+from tests.support.sharing import made_once
 
 Tool = Callable[..., str]
 GENERATED = ROOT / "generated" / "c"
@@ -62,30 +63,29 @@ def copied(tmp_path: Path) -> Path:
 
 
 def path_without(folder: Path, *beginnings: str) -> str:
-    """A PATH on which there is all that there was, but for programs whose names begin so."""
-    folder.mkdir()
-    for place in ENVIRONMENT["PATH"].split(os.pathsep):
-        for program in Path(place).glob("*"):
-            if not program.name.startswith(beginnings):
-                link = folder / program.name
-                if not link.is_symlink():
-                    link.symlink_to(program)
+    """A PATH with every program of the present one but those whose names start with a beginning."""
+    with made_once(folder) as first:
+        programs = [path for place in ENVIRONMENT["PATH"].split(os.pathsep) for path in Path(place).glob("*")]
+        for program in programs if first else ():
+            link = folder / program.name
+            if not program.name.startswith(beginnings) and not link.is_symlink():
+                link.symlink_to(program)
     assert shutil.which("make", path=str(folder))
     return str(folder)
 
 
 @pytest.fixture
-def without_python(tmp_path: Path) -> str:
-    """A PATH on which there is all that there was, but for Python and qlinkgen."""
-    path = path_without(tmp_path / "bin", "python", "pip", "qlinkgen", "pypy")
+def without_python(shared: Path) -> str:
+    """A PATH with every program but Python and qlinkgen."""
+    path = path_without(shared / "without-python", "python", "pip", "qlinkgen", "pypy")
     assert not shutil.which("python3", path=path)
     return path
 
 
 @pytest.fixture
-def only_the_host(tmp_path: Path) -> str:
+def only_the_host(shared: Path) -> str:
     """A PATH without compilers for other processors."""
-    return path_without(tmp_path / "host", "avr-", "arm-none-eabi-")
+    return path_without(shared / "host-alone", "avr-", "arm-none-eabi-")
 
 
 def programs(folder: Path) -> set[str]:
