@@ -235,7 +235,7 @@ def test_a_header_for_slaves_is_enough(copied: Path, tmp_path: Path, require_too
 
 
 WRONG = {
-    "port": ("", "PORT=moon is no folder with a port.mk; there are: atmega328p ", ("PORT=moon",)),
+    "port": ("", "PORT=moon is not a folder with a port.mk; there are: atmega328p ", ("PORT=moon",)),
     "app": ("", "APP=radio does not run on posix; there: qlink_node trio_keypad", ("APP=radio",)),
     "app of another port": ("", "does not run on microbit", ("PORT=microbit", "APP=trio_keypad")),
     "header": ("", "no qlink.h: copy it beside this Makefile, or say HEADERS=folder", ("HEADERS=/nowhere",)),
@@ -282,7 +282,7 @@ def test_make_says_what_is_wrong(case: str, copied: Path, require_tool: Tool) ->
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (("-DPORT=moon",), "PORT=moon is no folder with a port.mk; there are:"),
+        (("-DPORT=moon",), "PORT=moon is not a folder with a port.mk; there are:"),
         (("-DHEADERS=/nowhere",), "copy qlink.h beside CMakeLists.txt, or say -DHEADERS=folder"),
     ],
 )
