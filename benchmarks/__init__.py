@@ -1,4 +1,4 @@
-"""How fast the generated code is, as ratios taken in one run beside other ways to do the same."""
+"""Speed of the generated code, as ratios to other implementations, all taken in one run."""
 
 from pathlib import Path
 

@@ -1,6 +1,7 @@
-"""A receiver as firmware would have it, carried over to Python: one state, one byte, one step.
+"""A receiver as in firmware, ported to Python: one state, one byte, one step.
 
-It is the yardstick for the generated stream decoder, and shows why that one looks for whole frames instead.
+It is the reference for the generated stream decoder, and shows why that one searches for whole frames
+instead.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ Response = tuple[int, ...]
 
 
 class BytewiseReceiver:
-    """Finds Q.link's frames byte by byte; hands out motion.response as a tuple, a bad frame as None."""
+    """Finds Q.link's frames byte by byte; returns motion.response as a tuple, a bad frame as None."""
 
     __slots__ = ("_body", "_escaped", "_left", "_state")
 

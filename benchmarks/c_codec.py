@@ -1,4 +1,4 @@
-"""The generated C header beside hand-written C, compiled here and timed in one process."""
+"""The generated C header and hand-written C, compiled here and timed in one process."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ LIMIT = 1.2
 
 INTRO = """\
 motion.response with a CRC table of 256 entries on both sides, `-O2`, each frame one call that the
-compiler does not inline. `benchmarks/c/hand.h` is what one writes for this message alone; the generated
-header knows all of them."""
+compiler does not inline. `benchmarks/c/hand.h` is written by hand for this message only; the generated
+header has all of them."""
 
 
 def section(rounds: int) -> Section:
-    """Each compiler that is here; gcc's figures are held to the goal."""
+    """Each installed compiler; the goals apply to gcc."""
     result = Section("C, generated header over hand-written", INTRO, ["", "ratio", "generated", "by hand"])
     for compiler in COMPILERS:
         if shutil.which(compiler) is None:

@@ -1,4 +1,4 @@
-"""How fast the AVR slave of examples/firmware answers in simavr, with its motor at rest and moving."""
+"""Response times of the AVR slave of examples/firmware in simavr, with its motor at rest and moving."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from qlinkgen.codecs import qlink
 BAUD = cast(int, qlink.BUS.baud)  # the schema has one
 TICK = 1000  # interrupts of the slave's clock in a second
 PHASES = 64  # parts of a tick in which each request ends once
-RATE = 1000  # path words that the motor takes in a second unless a build says otherwise
+RATE = 1000  # path words per second, the default of a build
 
 _LINE = re.compile(r"(\d+) (\d+) ([0-9a-f]+|-)")
 _A5 = 0xA5  # costs two bytes on the line
-_WORDS = [_A5 << 8 | _A5] * 12  # as many as go into a motion
+_WORDS = [_A5 << 8 | _A5] * 12  # the most in a motion
 
 
 class Unexpected(Exception):
-    """What the slave answered, or when, is not what its answers can be measured by."""
+    """An answer, or its time, makes the measurement invalid."""
 
 
 def requests() -> dict[str, qlink.Message]:
-    """The longest request of each answered command, with bytes to be stuffed where that costs something.
+    """The longest request of each answered command, with bytes to be stuffed if that takes time.
 
-    In the order in which they are asked: the motor has its request done when it is polled.
+    In the order of sending: the motor has completed its request when it is polled.
     """
     return {
         "node_setup": qlink.NodeSetupRequest(
@@ -54,7 +54,7 @@ def requests() -> dict[str, qlink.Message]:
     }
 
 
-# What is asked in front of each request: the motor at rest, or moving with words for longer than that takes.
+# The requests before each request: the motor at rest, or moving with words for longer than the request takes.
 REST: Sequence[qlink.Message] = (qlink.NodeStopRequest(node=1), qlink.ClearFifoRequest(node=1))
 PATH = qlink.MotionRequest(node=1, counter=_A5 - 1, segments=[1] * len(_WORDS))
 MOVING: Sequence[qlink.Message] = (qlink.NodeStartRequest(node=1), qlink.ClearFifoRequest(node=1), PATH)
@@ -63,11 +63,11 @@ REFUSED_MOVING = "preset_motor_position"
 
 @dataclass(frozen=True)
 class Reply:
-    """Time from a request's last byte to the first byte of the answer at its slowest, and how long it may be.
+    """Longest time from a request's last byte to the first byte of the answer, and its limit.
 
     Attributes:
         rest: cycles with the motor at rest.
-        moving: cycles with the motor moving; None where the slave does not answer then.
+        moving: cycles with the motor moving; None if the slave does not answer then.
         allowed_us: microseconds, from the schema.
     """
 
@@ -77,25 +77,25 @@ class Reply:
 
     @property
     def us(self) -> float:
-        """The slower of both in microseconds."""
+        """The longer of both in microseconds."""
         return 1e6 * max(self.rest, self.moving or 0) / clock()
 
 
 @dataclass(frozen=True)
 class Run:
-    """What simavr has seen of the AVR slave: its slowest replies, and the bytes of stack that were in use."""
+    """Result of a run of the AVR slave in simavr: its slowest replies, and the bytes of stack in use."""
 
     replies: Mapping[str, Reply]
     stack: int
 
     @property
     def slowest(self) -> str:
-        """The command whose answer is nearest to what it may take, or furthest behind it."""
+        """The command whose answer takes the largest share of its limit."""
         return max(self.replies, key=lambda name: self.replies[name].us / self.replies[name].allowed_us)
 
     @property
     def late(self) -> list[str]:
-        """The commands that take longer than they may."""
+        """The commands whose answer exceeds its limit."""
         return [name for name, reply in self.replies.items() if reply.us > reply.allowed_us]
 
 
@@ -109,15 +109,15 @@ class Heard:
 
 
 def replies(shop: Workshop, asked: Mapping[str, qlink.Message] | None = None, options: str = "") -> Run:
-    """How fast the AVR slave answers at its slowest, interrupts and main loop included.
+    """Slowest answers of the AVR slave, interrupts and main loop included.
 
-    All of `requests`, or those that are asked; of a slave built with the default options, but for these.
+    All of `requests`, or those in `asked`; of a slave built with the default options and `options`.
     """
     asked = requests() if asked is None else asked
     moving_asked = {name: request for name, request in asked.items() if name != REFUSED_MOVING}
     scenes = [(*REST, each) for each in asked.values()] + [(*MOVING, each) for each in moving_asked.values()]
     lines = _run(shop, scenes, options)
-    heard = (_heard(match) for match in map(_LINE.fullmatch, lines) if match)  # simavr prints as well
+    heard = (_heard(match) for match in map(_LINE.fullmatch, lines) if match)  # simavr prints other lines too
     rest = {name: _slowest(name, heard, REST) for name in asked}
     moving = {name: _slowest(name, heard, MOVING) for name in moving_asked}
     limits = {name: f"QLINK_RESPONSE_US({name.upper()}, {BAUD}ul)" for name in asked}
@@ -140,7 +140,7 @@ def _heard(line: re.Match[str]) -> Heard:
 
 
 def _slowest(name: str, heard: Iterator[Heard], before: Sequence[qlink.Message]) -> int:
-    """Cycles of the slowest answer to one request, of all phases; the next lines of the run are taken."""
+    """Cycles of the slowest answer to one request, of all phases; consumes the next lines of the run."""
     plays = [list(itertools.islice(heard, len(before) + 1)) for _ in range(PHASES)]
     for *prepared, last in plays:
         _check_answer(name, last)
@@ -155,22 +155,22 @@ def _check_answer(name: str, heard: Heard) -> None:
     if type(message) is not qlink.COMMANDS[name].response:
         raise Unexpected(f"{name} was answered by {message}")
     if isinstance(message, qlink.MotorResponsePollResponse) and message.motor_data != bytes([_A5] * 25):
-        raise Unexpected(f"the motor has not done its request, or another: {message}")
+        raise Unexpected(f"the motor has not completed its request, or another one: {message}")
 
 
 def _check_motion(name: str, motion: Heard, last: Heard) -> None:
-    """The motor has begun, and words are left when the request is complete."""
+    """Check that the motor has begun, and that words are left when the request is complete."""
     message = motion.answer
     if not isinstance(message, qlink.MotionResponse) or not message.motor_status & qlink.MotorStatus.RUNNING:
-        raise Unexpected(f"the motor does not move in front of {name}: {message}")
+        raise Unexpected(f"the motor does not move before {name}: {message}")
     if (last.complete - motion.complete) * RATE >= (len(PATH.segments) - 1) * clock():
         raise Unexpected(f"the motor may have no words left when {name} is complete")
 
 
 def _check_phases(name: str, complete: Sequence[int]) -> None:
-    """The ends of the requests lie all over a tick; how long the slave worked before moves them a little."""
+    """Check that the ends of the requests cover a tick; the work of the slave before moves them a little."""
     period = clock() / TICK
     places = sorted(cycle % period for cycle in complete)
     gaps = [later - earlier for earlier, later in itertools.pairwise([*places, places[0] + period])]
     if max(gaps) >= 4 * period / PHASES:
-        raise Unexpected(f"{name} was not asked everywhere in a tick: {max(gaps):.0f} cycles left out")
+        raise Unexpected(f"{name} was not asked in all parts of a tick: a gap of {max(gaps):.0f} cycles")

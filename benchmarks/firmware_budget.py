@@ -1,4 +1,4 @@
-"""What headers and slave may take, and whether they do: CI fails 10 % above, and where an answer is late."""
+"""The budget of headers and slave: CI fails 10 % above it, and if an answer is late."""
 
 from __future__ import annotations
 
@@ -26,41 +26,43 @@ class Limit:
 
 LIMITS = {CORTEX_M0.name: Limit(450, 100, 64), AVR.name: Limit(550, 150, 32)}
 RECEIVER = 10  # bytes of RAM on top of the longest payload
-# Flash, and all of the RAM with the stack. Most of the RAM is the store for a program that is loaded.
+# Flash, and all of the RAM with the stack. Most of the RAM is the store for a loaded program.
 SLAVES = {"microbit": (6750, 5600), "lm3s6965evb": (6750, 5600), "atmega328p": (9200, 1250)}
 
 
 @dataclass(frozen=True)
 class Allowance:
-    """A message that takes more than the budget: how much CI lets it have by target, and why it does."""
+    """A message above the budget: CI's limit by target, and the reason."""
 
     flash: Mapping[str, int]
     reason: str
 
 
-# By protocol and message. What is here has not met the budget, and the page says so.
+# By protocol and message. These have not met the budget, as the page shows.
 ALLOWANCES = {
     ("qlink", "node_info.response"): Allowance(
         {CORTEX_M0.name: 120, AVR.name: 184},
-        "seven fields in eleven bytes; the budget is that of five in nine",
+        "seven fields in eleven bytes; the budget is for five in nine",
     ),
     ("qlink", "motion.request"): Allowance(
-        {CORTEX_M0.name: 128, AVR.name: 164}, "words of any number, told by the size and checked both ways"
+        {CORTEX_M0.name: 128, AVR.name: 164},
+        "any number of words, derived from the size and checked both ways",
     ),
     ("qlink", "motion.response"): Allowance(
-        {CORTEX_M0.name: 104, AVR.name: 172}, "avr-gcc 5 has no displacement for the pointer to the message"
+        {CORTEX_M0.name: 104, AVR.name: 172}, "avr-gcc 5 uses no displacement for the pointer to the message"
     ),
     ("trio", "character_transfer"): Allowance(
         {CORTEX_M0.name: 116, AVR.name: 190},
-        "every character is looked at, before it is sent and when it came",
+        "every character is checked, in encoding and decoding",
     ),
     ("trio", "direct_variable_transfer"): Allowance(
-        {CORTEX_M0.name: 324, AVR.name: 1018}, "64 bits in groups of seven, shifted on processors of 32 and 8"
+        {CORTEX_M0.name: 324, AVR.name: 1018},
+        "64 bits in groups of seven, shifted on processors of 32 and 8 bits",
     ),
 }
 
 
-# Stack that is above the budget, by target and what takes it: how much CI lets it have. The page says so.
+# Stack above the budget, by target and user of the stack: CI's limit. The page shows it.
 DEEPEST = "deepest stack of a message with its frame"
 DISPATCHING = "stack of a slave that dispatches all commands"
 PAYLOADS = "stack of a core for any payload"
@@ -79,7 +81,7 @@ def allowed(target: Target, protocol: str, message: str) -> int:
 
 
 def goals(measured: Measured) -> list[Goal]:
-    """Every figure that has a limit; of the messages those that take most."""
+    """Every figure with a limit; of the messages the largest ones."""
     found = []
     for target in TARGETS:
         for name, costs in measured.messages[target.name].items():
@@ -88,7 +90,7 @@ def goals(measured: Measured) -> list[Goal]:
 
 
 def _other_goals(measured: Measured, *, held: bool = False) -> list[Goal]:
-    """Everything but the flash of messages; `held` to what CI lets it have instead of the budget."""
+    """All but the flash of messages; with `held`, the limits are CI's instead of the budget."""
     found = []
     for target in TARGETS:
         found += core_goals(target, measured.core[target.name]["LOOP"])
@@ -113,7 +115,7 @@ def core_goals(target: Target, core: Core) -> list[Goal]:
 
 
 def message_goals(target: Target, protocol: str, messages: Messages) -> list[Goal]:
-    """Get and put: each message above the budget, or the largest, and what one takes on average."""
+    """Get and put: each message above the budget, or the largest, and the average."""
     limit, what = LIMITS[target.name].message, f"{target.title}, {protocol}: get and put"
     largest = max(messages.each, key=lambda name: messages.each[name].size.flash)
     above = [name for name, each in messages.each.items() if each.size.flash > limit]
@@ -137,13 +139,13 @@ def stack_goals(target: Target, protocol: str, messages: Messages) -> list[Goal]
 
 
 def receiver_goal(target: Target, protocol: str, sizes: Mapping[str, int]) -> Goal:
-    """RAM that receiving takes."""
+    """RAM for receiving."""
     limit = RECEIVER + sizes["payload"]
     return Goal(f"{target.title}, {protocol}: RAM to receive", sizes["receiver"], limit, "bytes")
 
 
 def deep_stacks(measured: Measured, target: Target) -> list[tuple[str, int]]:
-    """What goes deeper than one message with its fields: a name, for STACK_ALLOWANCES, and bytes."""
+    """Stacks deeper than that of one message with its fields: a name, for STACK_ALLOWANCES, and bytes."""
     messages = measured.messages[target.name]["qlink"].framed.each
     return [
         (DEEPEST, max(each.stack for each in messages.values())),
@@ -159,13 +161,13 @@ def _stack_goal(target: Target, what: str, stack: int, held: bool) -> Goal:
 
 
 def answer_goal(run: Run) -> Goal:
-    """The slowest answer of the AVR slave, and the time that the protocol allows it."""
+    """The slowest answer of the AVR slave, and its limit by the protocol."""
     which, reply = run.slowest, run.replies[run.slowest]
     return Goal(f"slave on atmega328p: slowest answer, {which}", reply.us, reply.allowed_us, TIME)
 
 
 def each_message(target: Target, protocol: str, messages: Messages) -> list[Goal]:
-    """The flash of get and put of every message, and of all of them, by what CI lets them have."""
+    """The flash of get and put of every message, and of all of them, with CI's limits."""
     what = f"{target.title}, {protocol}"
     found = [
         Goal(f"{what}: {name}", each.size.flash, allowed(target, protocol, name), "bytes")
@@ -176,7 +178,7 @@ def each_message(target: Target, protocol: str, messages: Messages) -> list[Goal
 
 
 def complaints(measured: Measured) -> list[str]:
-    """What is more than the slack above its limit, a sentence each; each message is looked at."""
+    """Each figure further above its limit than the slack, as a sentence; every message is checked."""
     found = _other_goals(measured, held=True)
     for target in TARGETS:
         for protocol, costs in measured.messages[target.name].items():
@@ -185,10 +187,10 @@ def complaints(measured: Measured) -> list[str]:
 
 
 def broken(goal: Goal) -> bool:
-    """Whether CI fails for it: bytes have their slack, a time that the protocol allows has none."""
+    """Whether CI fails for it: bytes have a slack, a time limit of the protocol has none."""
     return goal.measured > (1.0 if goal.unit == TIME else SLACK) * goal.limit
 
 
 def figure(goal: Goal) -> str:
-    """What was measured, and the limit."""
+    """The measured value and the limit."""
     return f"{goal.measured:.0f} of {goal.limit:.0f} {goal.unit}"

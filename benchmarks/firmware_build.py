@@ -1,4 +1,4 @@
-"""Programs for small chips: compile, link, and ask the tools what came out."""
+"""Programs for small chips: compile, link, and read the result with the binary tools."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _NANO = ("--specs=nano.specs", "--specs=nosys.specs")
 
 
 class ToolMissing(Exception):
-    """A program of the host that is not there; the text says what to install."""
+    """A missing program of the host; the text says what to install."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A chip, the compiler for it, and the Debian package that brings the compiler."""
+    """A chip, the compiler for it, and the Debian package of the compiler."""
 
     name: str
     title: str
@@ -43,7 +43,7 @@ class Target:
         return tool(f"{self.prefix}-{name}", self.package)
 
     def version(self) -> str:
-        """Which compiler it is, as the page names it."""
+        """Name and version of the compiler, for the page."""
         return f"{self.prefix}-gcc {run(self.tool('gcc'), '-dumpfullversion', '-dumpversion').strip()}"
 
 
@@ -69,22 +69,22 @@ TARGETS = (CORTEX_M0, AVR)
 
 @functools.cache
 def clock() -> int:
-    """Hertz of the ATmega328P: the default of its port, which is the one place where it stands."""
+    """Clock of the ATmega328P in hertz, from the default of its port."""
     place = EXAMPLES / "atmega328p" / "port.mk"
     if (match := re.search(r"^F_CPU \?= (\d+)", place.read_text("utf-8"), re.MULTILINE)) is None:
-        raise ValueError(f"{place} has no line that begins with F_CPU ?= and hertz")
+        raise ValueError(f"{place} has no line 'F_CPU ?= HERTZ'; add it")
     return int(match[1])
 
 
 def tool(name: str, package: str) -> str:
-    """The path of a program, or ToolMissing with the package to install."""
+    """The path of a program; ToolMissing names the package to install."""
     if (path := shutil.which(name)) is None:
         raise ToolMissing(f"{name} is not installed (apt install {package})")
     return path
 
 
 def run(*command: object, folder: Path | None = None, environment: Mapping[str, str] | None = None) -> str:
-    """Run a command and return what it prints; its words come with the error where it fails."""
+    """Run a command and return its output; the error of a failed one contains it."""
     words = [str(word) for word in command]
     done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=folder, env=environment)
     if done.returncode:
@@ -94,7 +94,7 @@ def run(*command: object, folder: Path | None = None, environment: Mapping[str, 
 
 @dataclass(frozen=True)
 class Size:
-    """What a program takes, in bytes: code and constants, initialised and cleared variables."""
+    """Size of a program in bytes: code and constants, initialised and cleared variables."""
 
     text: int
     data: int
@@ -102,16 +102,16 @@ class Size:
 
     @property
     def flash(self) -> int:
-        """What is programmed: the values of initialised variables lie there as well."""
+        """Bytes of flash, including the values of initialised variables."""
         return self.text + self.data
 
     @property
     def ram(self) -> int:
-        """What is taken of the RAM, stack aside."""
+        """Bytes of RAM without the stack."""
         return self.data + self.bss
 
     def __sub__(self, other: Size) -> Size:
-        """What one program has more than another."""
+        """The difference to another program."""
         return Size(self.text - other.text, self.data - other.data, self.bss - other.bss)
 
 
@@ -122,21 +122,21 @@ def size_of(target: Target, program: Path) -> Size:
 
 
 class Workshop:
-    """A folder to build in, and the headers that the programs include."""
+    """A folder to build in, and the folder of the included headers."""
 
     def __init__(self, folder: Path, headers: Path = HEADERS) -> None:
-        """Build in `folder`, with the generated headers of another."""
+        """Build in `folder`, with the generated headers in `headers`."""
         self.folder = folder
         self.headers = headers
 
     def link(self, target: Target, name: str, source: Path, options: Sequence[str] = ()) -> Path:
-        """Compile a source file, or object, to a program; stack usage is written beside it."""
+        """Compile a source file, or object, to a program; writes stack usage next to it."""
         place = self._place(target, name)
         run(*self._compiler(target), *options, source, "-o", "program.elf", folder=place)
         return place / "program.elf"
 
     def compile(self, target: Target, name: str, source: Path) -> Path:
-        """Compile one to an object, from which `link` makes programs."""
+        """Compile a source file to an object, the input of `link`."""
         place = self._place(target, name)
         run(*self._compiler(target), "-c", source, "-o", "program.o", folder=place)
         return place / "program.o"
@@ -150,13 +150,13 @@ class Workshop:
         return place
 
     def size(self, target: Target, name: str, source: Path, options: Sequence[str] = ()) -> Size:
-        """The size of such a program."""
+        """Link a program and return its size."""
         return size_of(target, self.link(target, name, source, options))
 
     def values(self, target: Target, header: str, expressions: Mapping[str, str]) -> dict[str, int]:
-        """What constant expressions over a header are worth to the target's compiler.
+        """Values of constant expressions over a header, by the target's compiler.
 
-        Each becomes the size of an array in an object file, which nm prints: nothing has to run.
+        Each becomes the size of an array in an object file, printed by nm: nothing has to run.
         """
         lines = [f"char {name}[{expression}];" for name, expression in expressions.items()]
         source = self.folder / f"values-{target.name}.c"
@@ -169,12 +169,12 @@ class Workshop:
 
 
 def in_parallel(work: Mapping[str, Callable[[], T]]) -> dict[str, T]:
-    """Do several builds at once; they wait for their compilers."""
+    """Run several builds at once, in threads that wait for their compilers."""
     with ThreadPoolExecutor(2) as pool:
         started = {name: pool.submit(each) for name, each in work.items()}
         return {name: each.result() for name, each in started.items()}
 
 
 def temporary() -> tempfile.TemporaryDirectory[str]:
-    """A folder to build in that goes away."""
+    """A temporary folder to build in."""
     return tempfile.TemporaryDirectory(prefix="qlinkgen-firmware-")

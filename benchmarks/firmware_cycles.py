@@ -21,12 +21,12 @@ FRAMES = {
     "motion.request of 12 words, all stuffed": 3,
 }
 ANSWERS = {"plain": 4, "stuffed": 5}
-_MARK = 1  # cycles of the instruction that marks
+_MARK = 1  # cycles of the marking instruction
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A point that the program has passed: the clock, the stack pointer, its lowest value since the last."""
+    """A mark of the program: the clock, the stack pointer, and its lowest value since the last mark."""
 
     number: int
     cycle: int
@@ -46,32 +46,32 @@ class Frame:
 
 @dataclass(frozen=True)
 class Answer:
-    """Cycles from the call with a request's last byte to the first byte of the answer being ready to send."""
+    """Cycles from the call with a request's last byte until the first byte of the answer is ready to send."""
 
     last_byte: int
     dispatch: int
 
     @property
     def total(self) -> int:
-        """Both together."""
+        """The sum of both."""
         return self.last_byte + self.dispatch
 
 
 @dataclass(frozen=True)
 class Cycles:
-    """What one form of the CRC takes."""
+    """The cycles with one form of the CRC."""
 
     frames: dict[str, Frame]
     answers: dict[str, Answer]
 
     @property
     def worst_call(self) -> int:
-        """The longest that one byte takes, whatever frame it belongs to."""
+        """The longest call for one byte of any frame."""
         return max(max(frame.receive) for frame in self.frames.values())
 
 
 def build_simulator(shop: Workshop, name: str) -> Path:
-    """Build a program that runs programs, run_cycles or run_answer; ToolMissing without simavr's library."""
+    """Build run_cycles or run_answer; ToolMissing without simavr's library."""
     if not SIMAVR.exists():
         raise ToolMissing("simavr's library is not installed (apt install libsimavr-dev)")
     program, source = shop.folder / name, PROGRAMS / f"{name}.c"
@@ -94,7 +94,7 @@ def all_forms(shop: Workshop) -> dict[str, Cycles]:
 
 
 def marks(shop: Workshop, simulate: Path, form: str, frame: int) -> list[Mark]:
-    """What one run has marked; RuntimeError where it did not receive its frame."""
+    """The marks of one run; RuntimeError if it did not receive its frame."""
     options = [f"-DQLINK_CRC_FORM=QLINK_CRC_FORM_{form}", f"-DFRAME={frame}"]
     program = shop.link(AVR, f"cycles-{form}-{frame}", PROGRAMS / "cycles.c", options)
     lines = run(simulate, program, clock()).splitlines()
@@ -106,7 +106,7 @@ def marks(shop: Workshop, simulate: Path, form: str, frame: int) -> list[Mark]:
 
 
 def _spans(found: list[Mark], begin: int, end: int) -> Iterator[tuple[int, int]]:
-    """Cycles and bytes of stack between each two marks that belong together."""
+    """Cycles and bytes of stack between each pair of marks."""
     for first, second in itertools.pairwise(found):
         if (first.number, second.number) == (begin, end):
             yield second.cycle - first.cycle - _MARK, first.stack - second.lowest

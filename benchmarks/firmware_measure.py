@@ -1,4 +1,4 @@
-"""Everything that docs/firmware.md says of size, stack and time; the tests take it from here too."""
+"""All measurements of size, stack and time in docs/firmware.md; the tests use them too."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Measured:
 
 
 def tools() -> str:
-    """The compilers, by which a page knows whether its figures can be compared."""
+    """The compilers; figures of different ones cannot be compared."""
     return ", ".join(target.version() for target in TARGETS)
 
 
 def measure(headers: Path = HEADERS) -> Measured:
-    """Build and run everything of this project's own; ToolMissing says what to install."""
+    """Build and run all of this project's own programs; ToolMissing says what to install."""
     with temporary() as folder:
         shop = Workshop(Path(folder), headers)
         return Measured(

@@ -1,4 +1,4 @@
-"""The tables of docs/firmware.md: each stands between `<!-- table: NAME -->` and `<!-- end -->`."""
+"""The tables of docs/firmware.md, each between `<!-- table: NAME -->` and `<!-- end -->`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _BUFFERS = {
 
 
 def tables(measured: Measured) -> dict[str, str]:
-    """The tables of what is this project's own, by name."""
+    """The tables of this project's own figures, by name."""
     return {
         "tools": f"Compilers: {measured.tools}.",
         "budget": _budget(measured),
@@ -77,7 +77,7 @@ def _allowances() -> str:
         for (target, what), each in STACK_ALLOWANCES.items()
     ]
     return "\n".join(
-        [f"CI holds these to what they take now ({chips}), as they are above the budget:", "", *rows]
+        [f"These are above the budget; CI limits them to their present size ({chips}):", "", *rows]
     )
 
 
@@ -159,12 +159,12 @@ def _megahertz() -> str:
 
 
 def _three_bytes() -> float:
-    """Clock cycles of three byte times on the line: what a slave may take before it answers."""
+    """Clock cycles of three byte times on the line: the limit until the answer begins."""
     return 3 * clock() * qlink.BUS.bits_per_byte / BAUD
 
 
 def _time(measured: Measured) -> str:
-    """What the cycles mean on the line, in words."""
+    """The cycles compared with the time on the line, in words."""
     calls = {form: measured.cycles[form].worst_call for form in FORMS}
     byte = _three_bytes() / 3
     most = 100 * max(calls.values()) / byte
@@ -178,12 +178,12 @@ def _time(measured: Measured) -> str:
 
 def _verdict_of_time(measured: Measured) -> str:
     seen = measured.run
-    asked = f"each command asked at {PHASES} places of the clock's tick, its motor at rest and moving"
+    asked = f"with each command sent at {PHASES} points of the clock's tick, motor at rest and moving"
     if seen.late:
-        return f"The slave of the examples is too late with {', '.join(seen.late)}: {asked}."
+        return f"The slave of the examples answers too late to {', '.join(seen.late)}, {asked}."
     reply = seen.replies[seen.slowest]
     return (
-        f"The slave of the examples was never late, {asked}: its slowest answer, {seen.slowest}, takes "
+        f"The slave of the examples was never late, {asked}: its slowest answer, to {seen.slowest}, takes "
         f"{reply.us:.0f} us of {reply.allowed_us} us."
     )
 
@@ -226,7 +226,7 @@ def _reply(reply: Reply) -> list[str]:
 
 
 def peers(measured: Measured, found: Mapping[str, Mapping[str, Footprint]], missing: Sequence[str]) -> str:
-    """This project's core beside the peers' for the same message; those that are absent are named."""
+    """This project's core and the peers' for the same message, and the names of the missing peers."""
     rows = own_rows(measured) + [_peer(name, footprints) for name, footprints in found.items()]
     table = as_markdown(["", *_by_chip("flash", "RAM", "stack")], rows)
     return "\n\n".join([table, *(f"Not measured: {reason}." for reason in missing)])
@@ -241,7 +241,7 @@ def own_rows(measured: Measured) -> list[list[str]]:
 
 
 def renewed(standing: str, measured: Measured) -> str:
-    """A peers' table with new rows of this project, where the peers cannot be measured."""
+    """The peers' table with new rows of this project only, if the peers cannot be measured."""
     kept = [line for line in standing.splitlines()[2:] if not line.startswith(f"| {OWN}")]
     head, mark, *own = as_markdown(["", *_by_chip("flash", "RAM", "stack")], own_rows(measured)).splitlines()
     return "\n".join([head, mark, *own, *kept])
@@ -260,17 +260,17 @@ def _peer(name: str, found: Mapping[str, Footprint | Core]) -> list[str]:
 
 
 def deviations() -> str:
-    """Findings of the static checkers that stay, with their reasons."""
+    """Accepted findings of the static checkers, with their reasons."""
     if not DEVIATIONS.exists():
         return "None."
     listed = yaml.safe_load(DEVIATIONS.read_text("utf-8"))
     rows = [[each["tool"], each["rule"], " ".join(each["reason"].split())] for each in listed]
-    head = ["| tool | rule | why it stays |", "| --- | --- | --- |"]
+    head = ["| tool | rule | reason |", "| --- | --- | --- |"]
     return "\n".join([*head, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 def written(page: str) -> dict[str, str]:
-    """The tables that stand in a page, by name."""
+    """The tables of a page, by name."""
     return {
         match["name"]: match[0].removeprefix(match["head"]).removesuffix(match["end"]).strip()
         for match in _TABLE.finditer(page)
@@ -278,5 +278,5 @@ def written(page: str) -> dict[str, str]:
 
 
 def rewritten(page: str, new: Mapping[str, str]) -> str:
-    """A page with these tables; KeyError where it has none of that name, or one that nobody makes."""
+    """A page with these tables; KeyError if its table names and those of `new` differ."""
     return _TABLE.sub(lambda match: f"{match['head']}\n{new[match['name']]}\n\n{match['end']}", page)

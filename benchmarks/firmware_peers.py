@@ -1,4 +1,4 @@
-"""The same message through MAVLink's and nanopb's C code, generated now; nothing of theirs is kept."""
+"""The same message through MAVLink's and nanopb's C code, generated now and not kept."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _RUNTIME = ("pb_common.c", "pb_decode.c", "pb_encode.c")
 
 @dataclass(frozen=True)
 class Footprint:
-    """A peer's program less the empty one; `stack` is None where it has no bound that can be computed."""
+    """A peer's program less the empty one; `stack` is None if its bound cannot be computed."""
 
     size: Size
     stack: int | None
@@ -43,7 +43,7 @@ class Peer:
 def measured(
     shop: Workshop, targets: tuple[Target, ...], missing: list[str]
 ) -> dict[str, dict[str, Footprint]]:
-    """Each peer on each target; `missing` gets the reason for those who are not here."""
+    """Each peer on each target; `missing` gets the reason for each missing peer."""
     found = {}
     for make in (mavlink, nanopb):
         try:
@@ -64,7 +64,8 @@ def _footprint(shop: Workshop, target: Target, peer: Peer) -> Footprint:
 
 
 def _stack(target: Target, program: Path) -> int | None:
-    # Pointers lead nowhere: MAVLink's callback is not set. nanopb enters messages in messages by recursion.
+    # Calls through pointers are ignored: MAVLink's callback is not set. nanopb recurses for messages in
+    # messages.
     try:
         return CallGraph(target, program, pointed_to=()).depth("main")
     except UnknownDepth:
@@ -72,7 +73,7 @@ def _stack(target: Target, program: Path) -> int | None:
 
 
 def mavlink(folder: Path) -> list[Peer]:
-    """MAVLink 1 and 2, as they come and with one channel and a short longest message."""
+    """MAVLink 1 and 2, as generated and with one channel and a short longest message."""
     load("pymavlink")
     mavgen = importlib.import_module("pymavlink.generator.mavgen")
     peers = []
@@ -85,7 +86,7 @@ def mavlink(folder: Path) -> list[Peer]:
         )
         with contextlib.redirect_stdout(io.StringIO()):
             mavgen.mavgen(options, [str(place / "motion.xml")])
-        # As a folder of the system: its warnings are not ours.
+        # As a system folder: without its warnings.
         include = ("-std=gnu99", "-isystem", str(place))
         name, source = f"MAVLink {version[0]}", PROGRAMS / "mavlink.c"
         peers += [
@@ -96,7 +97,7 @@ def mavlink(folder: Path) -> list[Peer]:
 
 
 def nanopb(folder: Path) -> list[Peer]:
-    """The payload by nanopb in this project's frame, as it comes and with every switch to make it small."""
+    """The payload by nanopb in this project's frame, by default and with every option to make it small."""
     load("nanopb")
     load("grpc_tools", "grpcio-tools")
     place = folder / "nanopb"
@@ -108,13 +109,13 @@ def nanopb(folder: Path) -> list[Peer]:
     options = ("-isystem", str(runtime), "-isystem", str(place), *sources)
     source = PROGRAMS / "nanopb.c"
     return [
-        Peer("nanopb in a Q.link frame, as it comes", source, options),
-        Peer("nanopb in a Q.link frame, every switch", source, (*options, *_LEAN)),
+        Peer("nanopb in a Q.link frame, by default", source, options),
+        Peer("nanopb in a Q.link frame, all options", source, (*options, *_LEAN)),
     ]
 
 
 def _nanopb_runtime(place: Path) -> Path:
-    """Its C files: PyPI has the generator alone, so Debian's source package, where apt can reach it."""
+    """Its C files from Debian's source package, since PyPI has only the generator."""
     (place / "apt" / "lists" / "partial").mkdir(parents=True, exist_ok=True)
     try:
         apt = tool("apt-get", "apt")
@@ -130,7 +131,7 @@ def _nanopb_runtime(place: Path) -> Path:
 
 
 def _download(apt: str, place: Path) -> None:
-    """Fetch a source package with lists of our own: the machine's apt stays as it is, root is not needed."""
+    """Fetch a source package with separate package lists: apt's own are not changed, root is not needed."""
     site = run(
         apt, "indextargets", "--format", "$(REPO_URI) $(CODENAME)", "Created-By: Packages", "Component: main"
     )

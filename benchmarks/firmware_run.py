@@ -13,7 +13,7 @@ from benchmarks.firmware_page import PAGE, peers, renewed, rewritten, tables, wr
 
 
 def main(*, write: bool, check: bool) -> int:
-    """Measure everything; 1 where the budget is broken and that was asked for, 2 where a tool is missing."""
+    """Measure everything; 1 if `check` finds the budget exceeded, 2 if a tool is missing."""
     try:
         measured = measure()
     except ToolMissing as missing:

@@ -1,4 +1,4 @@
-"""Flash, RAM and stack of the headers: the core with each form of the CRC, and what each message adds."""
+"""Flash, RAM and stack of the headers: the core with each form of the CRC, and the cost of each message."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Core:
 
 @dataclass(frozen=True)
 class Added:
-    """What a message adds to a program that has all others: two functions of it."""
+    """Size that the two functions of a message add to a program with all others."""
 
     size: Size
     stack: int
@@ -39,7 +39,7 @@ class Added:
 
 @dataclass(frozen=True)
 class Messages:
-    """What the messages of a protocol cost one by one, and all together beside the receiver."""
+    """Cost of the messages of a protocol one by one, and of all together without the receiver."""
 
     each: dict[str, Added]
     together: Size
@@ -47,7 +47,7 @@ class Messages:
 
     @property
     def mean(self) -> float:
-        """Flash for a message, what they share divided among them."""
+        """Average flash per message, shared code included."""
         return self.together.flash / len(self.each)
 
 
@@ -56,7 +56,7 @@ class Costs:
     """The messages of a protocol.
 
     Attributes:
-        fields: get and put, `_decode` and `_encode`, of messages with fields; what the budget is for.
+        fields: get and put, `_decode` and `_encode`, of messages with fields; the budget applies to these.
         framed: `_decode` and `_to_frame` of every message.
         structs: RAM of a message with fields.
     """
@@ -94,10 +94,10 @@ def protocol(name: str) -> Protocol:
 
 
 def functions(description: Protocol, *, framed: bool) -> tuple[str, dict[str, list[str]]]:
-    """A program with the receiver and every message's functions, and which of them are each message's.
+    """A program with the receiver and every message's functions, and the names of each message's functions.
 
-    Each is inside a function of the same parameters. The linker is told which of those to keep, so a message
-    counts as it is called from anywhere, and no call of it is counted.
+    Each is called in a wrapper with the same parameters. The linker keeps the chosen wrappers, so the size is
+    that of the functions without any call of them.
     """
     names, prefix = Names(description), description.name
     parts = [f'#include "{prefix}.h"', _receiver(prefix)]
@@ -139,13 +139,13 @@ def _get(names: Names, message: Message) -> str:
 
 
 def costs(shop: Workshop, target: Target, name: str) -> Costs:
-    """What each message adds to the receiver and all others: its fields alone, and with their frame."""
+    """Cost of each message on top of the receiver and all others: only its fields, and with the frame."""
     fields, framed = (messages(shop, target, name, framed=framed) for framed in (False, True))
     return Costs(fields, framed, _structs(shop, target, protocol(name)))
 
 
 def messages(shop: Workshop, target: Target, name: str, *, framed: bool) -> Messages:
-    """An object with the functions of all messages, linked with those of each and without."""
+    """Link the functions of all messages, and those of all but each."""
     text, kept = functions(protocol(name), framed=framed)
     called = f"{name}-{'frames' if framed else 'fields'}"
     source = shop.folder / f"{target.name}-{called}.c"
@@ -171,7 +171,7 @@ def messages(shop: Workshop, target: Target, name: str, *, framed: bool) -> Mess
 
 @dataclass(frozen=True)
 class Dispatch:
-    """A slave's receiver, dispatch and every answer, from a header that knows some of the commands."""
+    """A slave's receiver, dispatch and every answer, from a header with some of the commands."""
 
     lines: int
     flash: int
@@ -186,7 +186,7 @@ CHOICES = {
 
 
 def dispatch(shop: Workshop, target: Target) -> dict[str, Dispatch]:
-    """What `--role` and `--only` leave of a header, and of a slave that dispatches all that it knows."""
+    """Size of a header with `--role` and `--only`, and of a slave that dispatches all its commands."""
     empty = shop.size(target, "empty", PROGRAMS / "core.c", ["-DEMPTY"])
     found = {}
     for number, (name, options) in enumerate(CHOICES.items()):
@@ -211,7 +211,7 @@ def _structs(shop: Workshop, target: Target, description: Protocol) -> dict[str,
 
 
 def buffers(shop: Workshop, target: Target, name: str) -> dict[str, int]:
-    """Bytes of what a program declares: receiver, longest frame, dispatch table; and the longest payload."""
+    """Bytes of the variables of a program: receiver, longest frame, dispatch table; and longest payload."""
     upper = name.upper()
     table = "slave" if name == "qlink" else "listener"
     return shop.values(

@@ -1,8 +1,8 @@
-"""How deep the stack gets: frames by the compiler, calls by the disassembly of the linked program.
+"""Stack depth: frames by the compiler, calls from the disassembly of the linked program.
 
-`-fstack-usage` tells what each function keeps, and the disassembly who calls whom; the sum along the worst
-path is the answer. AVR's compiler is too old for a call graph of its own, so both targets are read this one
-way. A function in assembler, from the compiler's library, has no line of `-fstack-usage`: its pushes count.
+`-fstack-usage` gives the frame of each function, and the disassembly the calls; the depth is the sum along
+the worst path. AVR's compiler is too old to write a call graph, so both targets are read in this way. An
+assembler function from the compiler's library has no line of `-fstack-usage`: its pushes are counted.
 """
 
 from __future__ import annotations
@@ -17,33 +17,33 @@ from benchmarks.firmware_build import Target, run
 
 _HEAD = re.compile(r"^(?P<start>[0-9a-f]+) <(?P<name>[^>]+)>:$", re.MULTILINE)
 _LINE = re.compile(r"^\s*[0-9a-f]+:\t(?P<mnemonic>\S+)(?:\t(?P<operands>.*))?$")
-# The address alone: the name beside it may be that of a constant which happens to be the same number.
+# Only the address: the name next to it may be that of a constant with the same value.
 _PLACE = re.compile(r"\b(?:0x)?(?P<address>[0-9a-f]+) <[^>]+>\s*$")
 _USAGE = re.compile(r"^.*:(?P<name>[^:\t]+)\t(?P<size>\d+)\t(?P<kind>.+)$")
 _CALLS = {"call", "rcall", "bl"}
 _INDIRECT = {"icall", "eicall", "blx"}
 _ENDS = {"ret", "reti", "jmp", "rjmp", "ijmp", "b", "b.n", "b.w", "bx", "udf"}
 _POPS_PC = re.compile(r"pop\s.*\bpc\b")
-# A function that is jumped to through a register, instead of called; AVR's tables of a switch do it as well.
+# A jump to a function through a register, instead of a call; also the jump tables of a switch on AVR.
 _TAIL_BY_REGISTER = {"ijmp", "bx"}
 _SWITCH = "__tablejump2__"
 
 
 class UnknownDepth(Exception):
-    """A stack that no sum can bound: recursion, a frame of any size, a call to who knows where."""
+    """A stack without a computable bound: recursion, a variable frame size, a call to an unknown function."""
 
 
 @dataclass
 class Function:
-    """What one function of a program keeps on the stack, and where it goes from there."""
+    """Stack frame of one function of a program, and its calls and jumps."""
 
     name: str
     frame: int = 0  # bytes without the return address
     calls: set[str] = field(default_factory=set)
-    jumps: set[str] = field(default_factory=set)  # ends there, or goes on there
+    jumps: set[str] = field(default_factory=set)  # targets of its jumps
     indirect: bool = False
-    compiled: bool = False  # -fstack-usage knows it
-    falls_into: str = ""  # assembler may run on into the next symbol; compiled code never does
+    compiled: bool = False  # listed by -fstack-usage
+    falls_into: str = ""  # assembler may continue into the next symbol; compiled code never does
 
 
 class CallGraph:
@@ -58,7 +58,7 @@ class CallGraph:
     ) -> None:
         """Read a program and the `.su` files beside it, or in another folder.
 
-        `pointed_to` are all that pointers may lead to; without it a call through one is an UnknownDepth.
+        `pointed_to` are all possible targets of pointers; without it a call through one raises UnknownDepth.
         """
         self._target = target
         self.pointed_to = pointed_to
@@ -85,8 +85,8 @@ class CallGraph:
             raise UnknownDepth(f"{' -> '.join((*path, name))} is not in the program")
         calls = function.calls | (self._through_pointers(function) if function.indirect else set())
         called = [self._target.call + self._below(each, (*path, *jumped, name), ()) for each in calls]
-        # Compiled code has left its frame when it jumps to another function; assembler may have not. Jumps
-        # in a circle are a loop of assembler with labels in it, not a recursion.
+        # Compiled code has released its frame when it jumps to another function; assembler may not have. A
+        # cycle of jumps is an assembler loop with labels in it, not a recursion.
         gone = [
             self._below(each, path, (*jumped, name)) for each in function.jumps - {name} - frozenset(jumped)
         ]
@@ -101,7 +101,7 @@ class CallGraph:
         return set(self.pointed_to)
 
     def callers(self) -> Mapping[str, set[str]]:
-        """Who goes to a function, by call or by jump."""
+        """The callers of each function, by call or by jump."""
         found: dict[str, set[str]] = {name: set() for name in self.functions}
         for function in self.functions.values():
             for each in function.calls | function.jumps:
@@ -110,13 +110,13 @@ class CallGraph:
 
 
 def usages(folder: Path) -> dict[str, int]:
-    """What `-fstack-usage` has written in a folder, return address included where the chip has it there."""
+    """The output of `-fstack-usage` in a folder, return address included if the chip pushes it."""
     found: dict[str, int] = {}
     for line in _lines(folder):
         if (match := _USAGE.match(line)) is None:
             continue
         if match["kind"] not in {"static", "dynamic,bounded"}:
-            raise UnknownDepth(f"{match['name']} takes as much stack as it likes: {match['kind']}")
+            raise UnknownDepth(f"{match['name']} has a stack frame of variable size: {match['kind']}")
         found[match["name"]] = max(int(match["size"]), found.get(match["name"], 0))
     return found
 
@@ -149,7 +149,7 @@ def _functions(listing: str) -> dict[str, Function]:
 
 
 def _take(function: Function, mnemonic: str, operands: str, to: str) -> bool:
-    """Note what an instruction does that names a place in `to`; returns whether the next one can follow."""
+    """Record an instruction with the target `to`; returns whether execution can continue after it."""
     if mnemonic in _CALLS and to:
         function.calls.add(to)
     elif mnemonic in _INDIRECT:
@@ -166,5 +166,5 @@ def _take(function: Function, mnemonic: str, operands: str, to: str) -> bool:
 
 
 def _pushed(operands: str) -> int:
-    """Bytes that a push takes: AVR's one register, or ARM's list of words."""
+    """Bytes of a push: one register on AVR, a list of words on ARM."""
     return 4 * len(operands.strip("{}").split(",")) if operands.startswith("{") else 1

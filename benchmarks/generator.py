@@ -1,4 +1,4 @@
-"""The generator as a whole process: all protocols and targets, and how its cost grows with the schema."""
+"""The generator as a whole process: all protocols and targets, and growth with the size of the schema."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ LIMIT_SECONDS = 2.0
 LIMIT_GROWTH = 2.2  # twice the messages; linear growth is 2, less what starting up costs
 
 INTRO = """\
-`qlinkgen generate` from start to exit, all targets, best of the rounds. *x messages*: a made-up schema of
-that many messages of one to six fields (integers, enums, scaled values, arrays). Growth is linear as long
-as twice the messages take no more than twice the time."""
+`qlinkgen generate` from start to exit, all targets, best of the rounds. *x messages*: a synthetic schema
+of x messages of one to six fields (integers, enums, scaled values, arrays). Growth is linear if twice the
+messages take at most twice the time."""
 
 HEAD = """\
 qlinkgen: 1
@@ -53,7 +53,7 @@ FIELDS = (
 
 
 def synthetic(messages: int, seed: int = 5) -> str:
-    """A schema of that many messages, two to a command; the same text for the same number."""
+    """A schema of `messages` messages, two per command; the same text for the same number."""
     chance = random.Random(seed)
     return HEAD + "".join(_command(i, chance) for i in range(messages // 2))
 
@@ -76,7 +76,7 @@ def _generate(target: Path, *schemas: str) -> list[str]:
 
 
 def section(rounds: int) -> Section:
-    """The shipped protocols, then the made-up ones, in turns; a single round leaves out the large ones."""
+    """The shipped protocols, then the synthetic ones, in turns; a single round leaves out the large ones."""
     sizes = SIZES if rounds > 1 else SIZES[:3]
     result = Section("Generator", INTRO, ["", "wall", "CPU", "CPU per message"])
     with tempfile.TemporaryDirectory() as folder:
@@ -85,7 +85,7 @@ def section(rounds: int) -> Section:
             schema = Path(folder, f"synthetic_{size}.yaml")
             schema.write_text(synthetic(size))
             commands[_name(size)] = _generate(Path(folder, f"out_{size}"), str(schema))
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}  # works where qlinkgen is not installed, too
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}  # works without an installed qlinkgen
         runs = interleave(commands, rounds, environment, warm=False)
     shipped, *_ = commands
     result.rows = [_row(shipped, runs[shipped], 0), *(_row(_name(s), runs[_name(s)], s) for s in sizes)]
@@ -101,7 +101,7 @@ def _name(size: int) -> str:
 
 
 def _growth(runs: dict[str, Run], sizes: tuple[int, ...]) -> float:
-    """What twice the messages cost, in the largest schemas."""
+    """Time ratio of the two largest schemas, one with twice the messages of the other."""
     half, whole = (runs[_name(size)].cpu.best for size in sizes[-2:])
     return whole / half
 

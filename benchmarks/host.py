@@ -1,4 +1,4 @@
-"""Transactions of the MC1231A host over a pty: the public API beside raw system calls."""
+"""Transactions of the MC1231A host over a pty: the public API and raw system calls."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from qlinkgen.transport.opening import open_port
 
 SLICE = 100
 BAUD = 115200
-#: Seconds: the responder may have to wait for the machine, and nothing else costs more by it.
+#: Seconds: the responder may have to wait for the machine; a long timeout costs nothing otherwise.
 SLACK = 1.0
 INTRO = """\
-A transaction with a chip set that answers at once from a second process, over a pty: set_vel has 5 bytes
-there and 2 of checksum back, get_actl_pos 1 and 6, both for the axis that is current. Best round trip of all
-rounds, all in turns, over that of the bare system calls with the same bytes. CPU is the host's."""
+A transaction with a chip set in a second process that answers at once, over a pty: set_vel sends 5 bytes
+and receives 2 of checksum, get_actl_pos 1 and 6, both for the current axis. Best round trip of all rounds,
+all in turns, over that of the bare system calls with the same bytes. CPU is the host's."""
 
 
 @contextlib.contextmanager
 def responder() -> Iterator[str]:
-    """A process that answers on a pty; gives the name of the host's side."""
+    """A process that answers on a pty; yields the name of the host's side."""
     master, slave = os.openpty()
     tty.setraw(slave)
     process = subprocess.Popen(
@@ -48,7 +48,7 @@ def responder() -> Iterator[str]:
 
 
 def raw_client(name: str, request: bytes) -> Client:
-    """Nothing but two system calls."""
+    """Two system calls only."""
     descriptor = os.open(name, os.O_RDWR | os.O_NOCTTY)
     size = len(ANSWERS[request])
 
@@ -80,7 +80,7 @@ def section(rounds: int) -> Section:
 
 
 def _pair(stack: contextlib.ExitStack, kind: str) -> tuple[str, Run, Run]:
-    """The public API and the bare calls, each with a responder of its own."""
+    """The public API and the bare calls, each with its own responder."""
     bare = raw_client(stack.enter_context(responder()), REQUESTS[kind].to_frame())
     host = stack.enter_context(Host(open_port(stack.enter_context(responder()), baud=BAUD), slack=SLACK))
     axis = host.axis(1)

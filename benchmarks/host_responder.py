@@ -1,4 +1,4 @@
-"""The chip set's end of a pty: a process that answers at once, with answers made beforehand.
+"""The chip set's end of a pty: a process that answers at once, with precomputed answers.
 
 Started as `python -m benchmarks.host_responder`; the pty's master side is its standard input.
 """

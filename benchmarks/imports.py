@@ -1,4 +1,4 @@
-"""What importing a generated module costs over a bare interpreter."""
+"""Import time of a generated module over a bare interpreter."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ OTHERS = ("dataclasses", "enum", "construct", "serial", "pymavlink.mavutil", "ca
 
 INTRO = """\
 A new interpreter for each import, in turns with one that imports nothing (`python -I -S`, bytecode
-cached); what an import costs is the difference of the two. The goals are held against the best wall
-clock. The others are there for scale."""
+cached); the cost of an import is the difference of the two. The goals apply to the best wall clock. The
+others are for comparison."""
 
 
 def _command(module: str, path: str = "") -> list[str]:
-    """`-S` leaves site-packages out, so that what a peer needs is put on the path by name."""
+    """`-S` leaves site-packages out, so the folders of a peer are added to the path."""
     setup = f"import sys; sys.path[:0] = {[path] if path else _site()!r}; " if module else ""
     return [sys.executable, "-I", "-S", "-c", f"{setup}import {module}" if module else ""]
 
@@ -41,7 +41,7 @@ def section(rounds: int) -> Section:
     )
     others = [name for name in OTHERS if importlib.util.find_spec(name.partition(".")[0])]
     result.missing = [f"{name} (not installed)" for name in OTHERS if name not in others]
-    with tempfile.TemporaryDirectory() as folder:  # a copy: the bytecode is left there
+    with tempfile.TemporaryDirectory() as folder:  # a copy: the bytecode is written there
         shutil.copytree(ROOT / "qlinkgen" / "codecs", Path(folder, "qlinkgen", "codecs"))
         shutil.copy(ROOT / "qlinkgen" / "__init__.py", Path(folder, "qlinkgen"))
         commands = {BARE: _command("")}

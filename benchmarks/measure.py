@@ -1,8 +1,7 @@
-"""Timing for a machine that others use too: short slices, interleaved, and the best of many.
+"""Timing on a shared machine: short slices, interleaved, and the best of many.
 
-Noise only ever adds time, so the smallest time of many short slices is the one closest to the code's own. All
-cases take turns within a round, so that a slow spell of the machine meets them all alike, and ratios keep
-their meaning.
+Noise only adds time, so the smallest time of many short slices is closest to that of the code. All cases take
+turns within a round, so that a slow period of the machine affects all of them, and ratios stay valid.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ SLICE_SECONDS = 0.0004
 
 @dataclass(frozen=True)
 class Case:
-    """One statement to time; `per` operations happen each time it runs."""
+    """One statement to time; each run of it does `per` operations."""
 
     name: str
     statement: str
@@ -34,16 +33,16 @@ class Timing:
 
     @property
     def best(self) -> float:
-        """The smallest: what the code needs when nobody disturbs it."""
+        """The smallest: the time of the undisturbed code."""
         return min(self.rounds)
 
     @property
     def median(self) -> float:
-        """What it needed in the middle of all rounds."""
+        """The median of all rounds."""
         return statistics.median(self.rounds)
 
     def over(self, base: Timing) -> float:
-        """How many times the base it takes: best over best."""
+        """The ratio to the base: best over best."""
         return self.best / base.best
 
     def spread_over(self, base: Timing) -> tuple[float, float]:
@@ -54,21 +53,21 @@ class Timing:
 
 
 def measure(cases: Sequence[Case], rounds: int) -> dict[str, Timing]:
-    """Time every case once a round; the statement's own errors come out of the first, untimed call."""
+    """Time every case once a round; errors of a statement are raised by the first, untimed call."""
     timers = [(case, timeit.Timer(case.statement, globals=dict(case.names))) for case in cases]
     numbers = [_number(timer) for _, timer in timers]
     timings = {case.name: Timing() for case in cases}
-    gc.collect()  # while it times, timeit switches the collector off
+    gc.collect()  # timeit disables the collector while it times
     for _ in range(rounds):
         for (case, timer), number in zip(timers, numbers, strict=True):
-            timer.timeit(1 + number // 8)  # brings its code back into the caches
+            timer.timeit(1 + number // 8)  # warms the caches up
             seconds = timer.timeit(number) / number / case.per
             timings[case.name].rounds.append(seconds)
     return timings
 
 
 def _number(timer: timeit.Timer) -> int:
-    """How often to run the statement for one slice."""
+    """Number of runs of the statement in one slice."""
     timer.timeit(1)
     once = min(timer.timeit(3) / 3 for _ in range(5))
     return max(1, round(SLICE_SECONDS / once))

@@ -1,6 +1,6 @@
-"""What everyone encodes and decodes: one motion.response, one motion.request, and seeded traffic of them.
+"""The messages of all benchmarks: one motion.response, one motion.request, and seeded traffic of them.
 
-Also the frame of Q.link by hand, for the peers that only know fields.
+Also the frame of Q.link by hand, for peers without frames.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ REQUEST_WIRE = wrap(MOTION, NODE, REQUEST_DATA)
 
 
 def motion(count: int, seed: int = 1) -> Iterator[ResponseFields]:
-    """What a master sees while axes move: counters count, positions creep, few bits change."""
+    """Answers of moving axes: counters increment, positions change slowly, few bits change."""
     chance = random.Random(seed)
     position = RESPONSE.position
     for i in range(count):
@@ -69,14 +69,14 @@ def motion(count: int, seed: int = 1) -> Iterator[ResponseFields]:
 
 
 def anything(count: int, seed: int = 2) -> Iterator[ResponseFields]:
-    """Every field over its whole range: more A5 than a line usually sees."""
+    """Every field over its whole range: more A5 than on a usual line."""
     chance = random.Random(seed)
     for _ in range(count):
         yield ResponseFields(*RESPONSE_STRUCT.unpack(chance.randbytes(9)))
 
 
 def noisy(frames: list[bytes], seed: int = 3) -> bytes:
-    """Frames with stray bytes between every tenth pair, and a byte of every twentieth frame spoiled."""
+    """Frames with stray bytes between every tenth pair, and a corrupted byte in every twentieth frame."""
     chance = random.Random(seed)
     stream = bytearray()
     for frame in frames:
@@ -90,7 +90,7 @@ def noisy(frames: list[bytes], seed: int = 3) -> bytes:
 
 
 def chunks(stream: bytes, seed: int = 4) -> list[bytes]:
-    """The stream in pieces of 1 to 64 bytes, as a port hands them out."""
+    """The stream in pieces of 1 to 64 bytes, as read from a port."""
     chance = random.Random(seed)
     pieces, at = [], 0
     while at < len(stream):

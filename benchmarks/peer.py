@@ -1,4 +1,4 @@
-"""What a peer is: statements that do the same work, over names of its own."""
+"""A peer: statements that do the same work, and their namespace."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class Peer:
 
 
 def load(package: str, install: str = "") -> ModuleType:
-    """Import what is not a dependency of the project."""
+    """Import a package that is not a dependency of the project."""
     if importlib.util.find_spec(package.partition(".")[0]) is None:  # find_spec imports parents
         raise PeerMissing(f"{package} is not installed (pip install {install or package})")
     return importlib.import_module(package)
 
 
 def generated_module(source: Path, name: str) -> ModuleType:
-    """Import a file that a peer's generator has just written."""
+    """Import a file just written by a peer's generator."""
     spec = importlib.util.spec_from_file_location(name, source)
     if spec is None or spec.loader is None:
         raise PeerMissing(f"{name} was not generated")

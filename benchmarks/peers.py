@@ -1,7 +1,6 @@
-"""Everyone who does the same work; those who are not installed are named, not passed over.
+"""All packages that do the same work; those not installed are listed as not measured.
 
-A peer that only knows fields gets Q.link's frame by hand (`wrap`, `unwrap`: the quick way), which is kind to
-it.
+A peer without frames gets Q.link's frame by hand (`wrap`, `unwrap`: the quick way), which favours it.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ PEERS: tuple[Callable[[], Peer], ...] = (
 
 
 def available(missing: list[str]) -> Iterator[Peer]:
-    """The peers that are here; for the others, `missing` gets the reason."""
+    """The installed peers; for the others, `missing` gets the reason."""
     for peer in PEERS:
         try:
             yield peer()

@@ -1,4 +1,4 @@
-"""Whole processes, timed from outside: wall clock, and the CPU time the system has counted for them."""
+"""Whole processes, timed from outside: wall clock, and CPU time by the system's accounting."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Run:
         self.cpu = Timing()
 
     def add(self, command: Sequence[str], environment: Mapping[str, str] | None = None) -> None:
-        """Run it once more; its output is not wanted, its failure is."""
+        """Run it once more, without its output; a failure raises RuntimeError."""
         before = _cpu()
         start = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
@@ -40,7 +40,7 @@ def interleave(
     environment: Mapping[str, str] | None = None,
     warm: bool = True,
 ) -> dict[str, Run]:
-    """All commands in turns; a turn that warms caches up is not counted."""
+    """Run all commands in turns; the first turn warms caches up and is not counted."""
     for command in commands.values() if warm else ():
         Run().add(command, environment)
     runs = {name: Run() for name in commands}

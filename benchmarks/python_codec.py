@@ -1,4 +1,4 @@
-"""One message in Python: object to wire bytes and back, the generated module beside its peers."""
+"""One message in Python: object to wire bytes and back, the generated module and its peers."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ INTRO = """\
 Times over raw `struct` for the nine data bytes alone, `Struct.pack` for the first two columns,
 `Struct.unpack` for the others. *encode*: ready object to wire bytes; *build*: make the object by
 keywords, then encode; *decode*: wire bytes to object; *read*: decode, then read every field. "Frame by
-hand" is Q.link's frame written for the bench with `crc_hqx` and `bytes.replace`, for peers that know
-fields only; pymavlink and "frame too" make and check their own."""
+hand" is Q.link's frame written for the benchmark with `crc_hqx` and `bytes.replace`, for peers without
+frames; pymavlink and "frame too" make and check their own."""
 
 
 def generated_response() -> Peer:
@@ -38,7 +38,7 @@ def generated_response() -> Peer:
 
 
 def by_hand() -> Peer:
-    """No object at all: what the frame costs when the fields stay a tuple."""
+    """Without an object: the cost of the frame if the fields stay a tuple."""
     names = {
         "pack": messages.RESPONSE_STRUCT.pack,
         "unpack": messages.RESPONSE_STRUCT.unpack,

@@ -1,4 +1,4 @@
-"""What was found, as text for the terminal and as Markdown for docs/benchmarks.md."""
+"""The results, as text for the terminal and as Markdown for docs/benchmarks.md."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Goal:
-    """A limit the project has set itself, and what was measured."""
+    """A goal of the project, and the measured value."""
 
     what: str
     measured: float
@@ -18,7 +18,7 @@ class Goal:
 
     @property
     def met(self) -> bool:
-        """Whether the measured figure keeps the limit."""
+        """Whether the measured value is within the limit."""
         return self.measured >= self.limit if self.at_least else self.measured <= self.limit
 
     def cells(self) -> list[str]:
@@ -38,7 +38,7 @@ GOAL_COLUMNS = ("goal", "measured", "limit", "")
 
 @dataclass
 class Section:
-    """One table with its title, its goals, and what could not be measured."""
+    """One table with its title, its goals, and the items that could not be measured."""
 
     title: str
     intro: str
@@ -49,7 +49,7 @@ class Section:
 
 
 def number(value: float) -> str:
-    """Three digits, no more than the measurement is worth."""
+    """Three digits, the precision of the measurement."""
     if value >= 100:
         return f"{value:.0f}"
     return f"{value:.1f}" if value >= 10 else f"{value:.2f}"

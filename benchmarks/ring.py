@@ -1,7 +1,7 @@
-"""What a node costs the ring: added latency for each hop, CPU, and messages round a ring of 15.
+"""Cost of a node in the ring: added latency for each hop, CPU, and messages round a ring of 15.
 
-The latency in byte times is that of the engine on a simulated line that takes its time; what the host adds to
-it is measured with a node in a second process, over a pty.
+The latency in byte times is that of the engine on a simulated line with line time; the latency of the host is
+measured with a node in a second process, over a pty.
 """
 
 from __future__ import annotations
@@ -29,23 +29,22 @@ from qlinkgen.transport.ring import NodeIo
 
 BAUD = 38400
 NODES = 15
-#: A variable to the node before this one: it passes 14 others on its way.
+#: A variable to the previous node: it passes 14 others.
 FARTHEST = trio.DirectVariableTransfer(address=NODES - 1, number=1, value=Decimal("1.5"))
-#: The same as a node on the way hears it.
+#: The same as received by a node in between.
 PASSING = trio.DirectVariableTransfer(address=2, number=1, value=Decimal("1.5")).to_frame()
 SLICE = 100
 INTRO = """\
-A variable of 16 bytes. The latency in byte times is what a node adds to the way of a message on a simulated
-line that takes its time, by cut-through (a byte goes on when it has come) and by store-and-forward (a message
-goes on when its end has come). The host's own is measured over a pty, with the node in a second process whose
-program sleeps: from writing the message to reading the first byte of what is sent on, less the same for a
-process that does nothing but `os.read` and `os.write`; the median. The ring of 15 is on memory ports, once
-served by one thread in turns and once by a thread for each node, which is what 15 programs in one process
-would have."""
+A variable of 16 bytes. The latency in byte times is the delay that a node adds to a message on a simulated
+line with line time, by cut-through (each byte is forwarded when it is received) and by store-and-forward (a
+message is forwarded when its end is received). The host's own is measured over a pty, with the node in a
+second process whose program sleeps: from writing the message to reading its first forwarded byte, less the
+same for a process of only `os.read` and `os.write`; the median. The ring of 15 is on memory ports, once
+served by one thread in turns and once by a thread for each node, as with 15 programs in one process."""
 
 
 def hop_latency(*, cut_through: bool) -> float:
-    """Byte times that one more node adds to the way of a message."""
+    """Byte times that one more node adds to the delay of a message."""
     return (_way(NODES - 1, cut_through) - _way(1, cut_through)) / (NODES - 2)
 
 
@@ -66,7 +65,7 @@ class Slices:
 
     @contextlib.contextmanager
     def once(self, count: int) -> Iterator[None]:
-        """Time a slice that does it so many times."""
+        """Time a slice of `count` operations."""
         cpu, start = time.process_time(), time.perf_counter()
         yield
         self.wall.rounds.append((time.perf_counter() - start) / count)
@@ -74,14 +73,14 @@ class Slices:
 
 
 def pass_whole(node: RingNode) -> None:
-    """Send messages on that come in one piece."""
+    """Forward messages received in one piece."""
     for _ in range(SLICE):
         node.receive(PASSING, 0.0)
         node.bytes_to_send(0.0)
 
 
 def pass_bytes(node: RingNode) -> None:
-    """Send messages on that come byte by byte."""
+    """Forward messages received byte by byte."""
     for _ in range(SLICE):
         for at in range(len(PASSING)):
             node.receive(PASSING[at : at + 1], 0.0)
@@ -97,7 +96,7 @@ class MemoryRing:
         self.io = [NodeIo(port, node.link) for port, node in zip(ports, self.nodes, strict=True)]
 
     def once(self) -> None:
-        """Messages that go all the way, one after the other."""
+        """Send messages to the farthest node, one after the other."""
         first = self.io[0]
         for _ in range(SLICE):
             first.node.send(FARTHEST, 0.0)
@@ -120,7 +119,7 @@ def _holds(client: MotionCoordinator, value: int) -> bool:
 
 @contextlib.contextmanager
 def responder(kind: str) -> Iterator[int]:
-    """A process at a pty; gives the descriptor of our end."""
+    """A process at a pty; yields the descriptor of our end."""
     master, slave = os.openpty()
     tty.setraw(slave)
     process = subprocess.Popen(
@@ -139,7 +138,7 @@ def responder(kind: str) -> Iterator[int]:
 
 
 def start(descriptor: int) -> None:
-    """Wait until a process sends on; what is sent before it has opened its end may be thrown away."""
+    """Wait until a process forwards; bytes sent before it has opened its end may be lost."""
     while not select.select([descriptor], (), (), 0.2)[0]:
         os.write(descriptor, PASSING)
     while select.select([descriptor], (), (), 0.2)[0]:
@@ -147,7 +146,7 @@ def start(descriptor: int) -> None:
 
 
 def drain(descriptor: int) -> float:
-    """Read one message; return when its first byte was there."""
+    """Read one message; return the time of its first byte."""
     got = os.read(descriptor, 512)
     first = time.perf_counter()
     while len(got) < len(PASSING):
@@ -156,7 +155,7 @@ def drain(descriptor: int) -> float:
 
 
 def first_byte(descriptor: int) -> float:
-    """Seconds from writing a message to the first byte of what is sent on."""
+    """Seconds from writing a message to its first forwarded byte."""
     start = time.perf_counter()
     os.write(descriptor, PASSING)
     return drain(descriptor) - start
@@ -201,8 +200,8 @@ def section(rounds: int) -> Section:
         ["added latency for each hop, store-and-forward", number(store), "byte times"],
         ["CPU for each hop, message in one piece", number(whole.cpu.best * 1e6), "us"],
         ["CPU for each hop, message byte by byte", number(bytewise.cpu.best * 1e6), "us"],
-        ["first byte sent on over a pty, raw process", number(raw * 1e6), "us"],
-        ["first byte sent on over a pty, node", number(ours * 1e6), "us"],
+        ["first byte forwarded over a pty, raw process", number(raw * 1e6), "us"],
+        ["first byte forwarded over a pty, node", number(ours * 1e6), "us"],
         ["messages round 15 nodes, one thread", number(1 / turns.wall.best), "1/s"],
         ["messages round 15 nodes, a thread each", number(1 / threads.wall.best), "1/s"],
     ]

@@ -1,6 +1,6 @@
-"""A node of a ring in a process of its own, at the pty that is its standard input.
+"""A node of a ring in its own process, at the pty on its standard input.
 
-Started as `python -m benchmarks.ring_responder KIND`: `raw` sends every byte on as it is, by two system
+Started as `python -m benchmarks.ring_responder KIND`: `raw` forwards every byte unchanged, by two system
 calls; `node` is a Motion Coordinator whose program sleeps.
 """
 
@@ -14,13 +14,13 @@ from qlinkgen.protocols.trio import MotionCoordinator
 
 
 def raw(descriptor: int) -> None:
-    """The least that a node in Python could do."""
+    """The minimum for a node in Python."""
     while data := os.read(descriptor, 512):
         os.write(descriptor, data)
 
 
 def node(name: str) -> None:
-    """Send on in the node's thread, while this one does nothing."""
+    """Forward in the node's thread, while this one does nothing."""
     with MotionCoordinator.open(name):
         while True:
             time.sleep(60)

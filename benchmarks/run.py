@@ -1,7 +1,7 @@
-"""Measure the generated code beside its peers: `python benchmarks/run.py [--quick] [--write] [--only NAME]`.
+"""Measure the generated code and its peers: `python benchmarks/run.py [--quick] [--write] [--only NAME]`.
 
-The peers that are installed are measured; those that are not are named. Every figure that matters is a ratio
-to the raw `struct` module, or to hand-written C, taken in the same run: it means the same on another machine.
+Installed peers are measured; the others are listed. Every important figure is a ratio to the raw `struct`
+module, or to hand-written C, taken in the same run, so it is comparable between machines.
 """
 
 from __future__ import annotations

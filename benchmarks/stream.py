@@ -1,4 +1,4 @@
-"""A stream of frames in pieces of 1 to 64 bytes, as a serial port hands them out."""
+"""A stream of frames in pieces of 1 to 64 bytes, as read from a serial port."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from qlinkgen.codecs import qlink
 
 FRAMES = 300
 LIMIT_MB_PER_SECOND = 15.0
-REFERENCE_UNPACK = 100e-9  # the machine the goal speaks of
+REFERENCE_UNPACK = 100e-9  # of the machine in the goal
 
 INTRO = """\
-Messages are handed out as objects with every field, frames checked, faults reported. The ratio is the
-time for 16 bytes of stream (one motion.response, if nothing is stuffed; for pymavlink one of its frames)
-over one raw unpack; MB/s is that ratio on a machine where a raw unpack takes 100 ns. *motion*: counters
-and positions as axes move; *anything*: random fields, more A5; *noise*: stray bytes between the frames
-and spoiled frames."""
+Messages are returned as objects with every field, frames checked, faults reported. The ratio is the time
+for 16 bytes of stream (one motion.response, if nothing is stuffed; for pymavlink one of its frames) over
+one raw unpack; MB/s is that ratio on a machine with a raw unpack of 100 ns. *motion*: counters and
+positions of moving axes; *anything*: random fields, more A5; *noise*: stray bytes between the frames and
+corrupted frames."""
 
 Feed = Callable[[bytes], Any]
 
@@ -63,7 +63,7 @@ def _case(name: str, decoder: Callable[[], Feed], stream: bytes, per_frame: floa
 
 
 def _mavlink_case() -> Case:
-    """Its own frames are 21 bytes with the same fields: the ratio is for one frame there, too."""
+    """Its own frames are 21 bytes with the same fields: the ratio is also per frame."""
     dialect = mavlink_dialect()
     sender = dialect.MAVLink(None, srcSystem=messages.NODE)
     frames = [
@@ -112,6 +112,10 @@ def _goals(timings: dict[str, Timing]) -> list[Goal]:
     return [
         Goal("stream decoder, 16 bytes of stream", ratio, limit, "x raw unpack"),
         Goal(
-            "the same as throughput, were a raw unpack 100 ns", _megabytes(ratio), 15, "MB/s", at_least=True
+            "the same as throughput, with a raw unpack of 100 ns",
+            _megabytes(ratio),
+            15,
+            "MB/s",
+            at_least=True,
         ),
     ]

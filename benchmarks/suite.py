@@ -32,12 +32,12 @@ INTRO = """\
 
 Written by `python benchmarks/run.py --write`; `make bench` shows the figures of your own machine.
 Comparisons are ratios taken in one process, all candidates in turns, the best of {rounds} short slices
-each: ratios mean the same on another machine, times do not. Differences under 10 % mean nothing. Measured
-with {machine}, on a machine with two cores that others used too."""
+each: ratios are comparable between machines, times are not. Differences under 10 % are not significant.
+Measured with {machine}, on a shared machine with two cores."""
 
 
 def machine() -> str:
-    """What was measured with, as far as it matters to a ratio."""
+    """Interpreter, compiler and processor, as they affect ratios."""
     python = f"{platform.python_implementation()} {platform.python_version()}"
     gcc = subprocess.run(
         ["gcc", "-dumpfullversion"], capture_output=True, text=True, check=False
@@ -46,7 +46,7 @@ def machine() -> str:
 
 
 def arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description="Measure the generated code beside its peers.")
+    parser = argparse.ArgumentParser(description="Measure the generated code and its peers.")
     parser.add_argument(
         "--quick", action="store_true", help="few rounds: rough figures in less than a minute"
     )
@@ -58,7 +58,7 @@ def arguments() -> argparse.Namespace:
 
 
 def main() -> int:
-    """Run what was asked for; goals that are not met are said, and are no failure."""
+    """Run the chosen measurements; goals not met are reported, but do not fail."""
     options = arguments()
     if options.write and (options.quick or options.only):
         print("run.py: --write needs the full run: leave out --quick and --only", file=sys.stderr)

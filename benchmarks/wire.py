@@ -1,4 +1,4 @@
-"""Transactions over a pty: the public API beside raw system calls, pyserial, and two Modbus libraries."""
+"""Transactions over a pty: the public API, raw system calls, pyserial, and two Modbus libraries."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from qlinkgen.transport.port import Port
 TIMING = Timing.of(qlink, host_slack=0.0)
 WORDS = list(range(0x1000, 0x100C))
 SLICE = 100
-#: Bytes of an answer in which nothing is stuffed.
+#: Bytes of an answer without stuffing.
 ANSWER = 16
 RAW = "os.write, os.read"
 OURS = "Bus.motion"
 INTRO = """\
-A motion with 12 words to a node that answers at once from a second process, over a pty: 33 bytes there, 16
-back; for the Modbus libraries 5 registers, 8 bytes there and 15 back. Best round trip of all rounds, all in
-turns, over that of the bare system calls. CPU is the client's. The gap is the time from reading the last byte
-of an answer to writing the first byte of the next request while `stream_motion` feeds 4 nodes; with it comes
-the share of the time for which a line of 115200 baud is busy, the node's own turnaround counted as busy."""
+A motion with 12 words to a node in a second process that answers at once, over a pty: 33 bytes sent, 16
+received; for the Modbus libraries 5 registers, 8 bytes sent and 15 received. Best round trip of all rounds,
+all in turns, over that of the bare system calls. CPU is the client's. The gap is the time from reading the
+last byte of an answer to writing the first byte of the next request while `stream_motion` feeds 4 nodes; the
+share is that of the time in which a line of 115200 baud is busy, including the node's own turnaround."""
 
 Client = Callable[[], object]
 
 
 @contextlib.contextmanager
 def responder(kind: str) -> Iterator[str]:
-    """A process that answers on a pty; gives the name of the client's side."""
+    """A process that answers on a pty; yields the name of the client's side."""
     master, slave = os.openpty()
     tty.setraw(slave)
     process = subprocess.Popen(
@@ -61,7 +61,7 @@ def responder(kind: str) -> Iterator[str]:
 
 
 def raw_client(name: str, requests: Iterator[bytes]) -> Client:
-    """Nothing but two system calls."""
+    """Two system calls only."""
     descriptor = os.open(name, os.O_RDWR | os.O_NOCTTY)
 
     def ask() -> bytes:
@@ -75,7 +75,7 @@ def raw_client(name: str, requests: Iterator[bytes]) -> Client:
 
 
 def pyserial_client(name: str, requests: Iterator[bytes]) -> Client:
-    """Pyserial alone, which has to be told how much will come."""
+    """Pyserial only; its read needs the number of bytes."""
     port = load("serial", "pyserial").Serial(name, TIMING.baud, timeout=1)
 
     def ask() -> bytes:
@@ -109,7 +109,7 @@ def minimalmodbus_client(name: str) -> Client:
 
 
 def requests() -> Iterator[bytes]:
-    """Motions to one node, as far as nothing is stuffed in their answers."""
+    """Motions to one node whose answers have no stuffed bytes."""
     answers = motion_answers()
     return itertools.cycle(
         qlink.MotionRequest(node=NODES[0], counter=counter, segments=WORDS).to_frame()
@@ -119,7 +119,7 @@ def requests() -> Iterator[bytes]:
 
 
 class TimedPort(Port):
-    """Notes how long the caller takes from an answer to the next request."""
+    """Records the caller's time from an answer to the next request."""
 
     def __init__(self, port: Port) -> None:
         self._port = port
@@ -130,7 +130,7 @@ class TimedPort(Port):
         self._read_at = 0.0
 
     def read(self, timeout: float) -> bytes:
-        """Read, and note when something came."""
+        """Read, and record the time of the last bytes."""
         data = self._port.read(timeout)
         if data:
             self._read_at = time.perf_counter()
@@ -138,7 +138,7 @@ class TimedPort(Port):
         return data
 
     def write(self, data: bytes) -> None:
-        """Write, and note how long the caller has taken."""
+        """Write, and record the caller's time since the last read."""
         if self._read_at:
             self.gaps.append(time.perf_counter() - self._read_at)
         self.sent += len(data)
@@ -170,7 +170,7 @@ class Run:
 
 
 def section(rounds: int) -> Section:
-    """All clients in turns."""
+    """Measure all clients in turns."""
     result = Section("Transactions over a pty", INTRO, ["", "us", "x raw", "CPU us"])
     with contextlib.ExitStack() as stack:
         runs = dict(_runs(stack, result.missing))
@@ -185,7 +185,7 @@ def section(rounds: int) -> Section:
         Goal("motion through the public API", runs[OURS].wall.over(base), 4, "x raw round trip"),
         *_peer_goals(runs),
         Goal("answer read to next request written, median", gap * 1e6, 100, "us"),
-        Goal("share of a 115200 line that streaming keeps busy", share * 100, 97, "%", at_least=True),
+        Goal("share of time that streaming keeps a 115200 line busy", share * 100, 97, "%", at_least=True),
     ]
     return result
 
@@ -225,7 +225,7 @@ def _peer_goals(runs: dict[str, Run]) -> list[Goal]:
 
 
 def _streaming(transactions: int) -> tuple[float, float]:
-    """Median gap in seconds, and the share of the time for which the line would be busy."""
+    """Median gap in seconds, and the share of the time in which the line would be busy."""
     with responder("motion") as name, Bus(TimedPort(open_port(name)), echo="none") as bus:
         port = bus.port
         assert isinstance(port, TimedPort)

@@ -1,4 +1,4 @@
-"""The other end of a pty: a process that answers at once, with answers made beforehand.
+"""The other end of a pty: a process that answers at once, with precomputed answers.
 
 Started as `python -m benchmarks.wire_responder KIND`; the pty's master side is its standard input.
 """
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from qlinkgen.codecs import qlink
 
 NODES = (1, 2, 3, 4)
-#: Offsets of node and counter in a motion's frame; nothing before them is ever stuffed with these nodes.
+#: Offsets of node and counter in a motion's frame; with these nodes no byte before them is stuffed.
 NODE_AT, COUNTER_AT = 4, 5
 #: Read 5 holding registers of device 1 from register 0, and an answer to that: 8 and 15 bytes.
 MODBUS_REQUEST = bytes.fromhex("01 03 00 00 00 05 85 c9")
@@ -22,7 +22,7 @@ Answer = Callable[[bytes], bytes]
 
 
 def motion_answers() -> dict[tuple[int, int], bytes]:
-    """Answers of nodes that move and have always room, by node and counter."""
+    """Answers of moving nodes with a free FIFO, by node and counter."""
     return {
         (node, counter): qlink.MotionResponse(
             node=node, counter=counter, inputs=0x12, position=-123456, motor_status=3, fifo_space=200
@@ -56,7 +56,7 @@ KINDS: dict[str, Callable[[], Answer]] = {"motion": _motion, "modbus": _modbus}
 
 
 def serve(answer: Answer, descriptor: int) -> None:
-    """Answer every piece that comes: a client writes a request in one go, and a pty hands it on like that."""
+    """Answer every piece read: a client writes a request at once, and a pty delivers it in one piece."""
     while True:
         try:
             request = os.read(descriptor, 512)

@@ -1,5 +1,5 @@
 /*
- * Times the generated header beside hand.h on the same messages, in turns.
+ * Times the generated header and hand.h on the same messages, in turns.
  * Prints a line of names, then a line of nanoseconds per frame for each round.
  */
 #define _POSIX_C_SOURCE 199309L
@@ -19,10 +19,10 @@ static hand_response hand_messages[MESSAGES];
 static qlink_motion_response_t messages[MESSAGES];
 static uint8_t wires[MESSAGES][ROOM];
 static size_t sizes[MESSAGES];
-static size_t capacity = ROOM; /* not a constant for the compiler: both sides check it at run time */
+static size_t capacity = ROOM; /* volatile: both sides check it at run time */
 static unsigned sink;
 
-/* One function call each, with nothing known about its arguments. */
+/* Not inlined: the compiler knows nothing about the arguments. */
 #define CALL static __attribute__((noinline))
 
 CALL int call_hand_encode(const hand_response *message, uint8_t *wire, size_t room)
@@ -137,7 +137,7 @@ static const struct {
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
-/* Axes that move: counters count, positions creep, few bits change. */
+/* Moving axes: counters increment, positions change slowly, few bits change. */
 static void make_messages(void)
 {
     uint32_t chance = 1;
@@ -156,7 +156,7 @@ static void make_messages(void)
     }
 }
 
-/* Both sides must agree before their speed means anything. */
+/* Checks that both sides agree before they are timed. */
 static int agree(int i)
 {
     uint8_t wire[ROOM];
@@ -210,5 +210,5 @@ int main(int argc, char **argv)
             printf("%.3f%c", nanoseconds(cases[i].run), (i + 1 < CASES) ? '\t' : '\n');
         }
     }
-    return sink == 0xFFFFFFFFu; /* keeps the work alive */
+    return sink == 0xFFFFFFFFu; /* keeps the compiler from removing the work */
 }

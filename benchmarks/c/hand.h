@@ -1,6 +1,6 @@
 /*
- * motion.response by hand: what somebody would write who needs this one message and cares for speed.
- * One table of 256 entries, one pass for check value and stuffing. The generated header is measured against it.
+ * motion.response by hand, for this one message and for speed.
+ * One table of 256 entries, one pass for check value and stuffing. The generated header is compared with it.
  */
 #ifndef HAND_H
 #define HAND_H
@@ -20,7 +20,7 @@ typedef struct {
 enum {
     HAND_COMMAND = 0x20,
     HAND_LENGTH = 13, /* command, node, nine data bytes, check value */
-    HAND_BODY = 14,   /* the same with the length itself */
+    HAND_BODY = 14,   /* the same with the length byte */
     HAND_MAX_WIRE = 2 + 2 * HAND_BODY
 };
 
@@ -51,7 +51,7 @@ static inline uint8_t *hand_put(uint8_t *to, uint8_t byte)
     return to;
 }
 
-/* Wire bytes of a message; their number, or -1. */
+/* Encodes a message; returns the number of wire bytes, or -1. */
 static inline int hand_encode(const hand_response *message, uint8_t *wire, size_t capacity)
 {
     const uint32_t position = (uint32_t)message->position;
@@ -86,7 +86,7 @@ static inline int hand_encode(const hand_response *message, uint8_t *wire, size_
     return (int)(to - wire);
 }
 
-/* The fields of an unstuffed body whose check value is good; 0, or -1. */
+/* Decodes the fields of an unstuffed body with a correct check value; returns 0, or -1. */
 static inline int hand_fields(hand_response *message, const uint8_t *body)
 {
     if (body[0] != HAND_LENGTH || body[1] != HAND_COMMAND || body[2] < 1 || body[2] > 16) {
@@ -102,7 +102,7 @@ static inline int hand_fields(hand_response *message, const uint8_t *body)
     return 0;
 }
 
-/* The message of one whole frame; 0, or -1. */
+/* Decodes one whole frame; returns 0, or -1. */
 static inline int hand_decode(hand_response *message, const uint8_t *wire, size_t size)
 {
     uint8_t body[HAND_BODY];
@@ -126,10 +126,10 @@ static inline int hand_decode(hand_response *message, const uint8_t *wire, size_
     return (crc == 0 && from == end) ? hand_fields(message, body) : -1;
 }
 
-/* A receiver for one byte at a time: 1 when it completed a good frame. */
+/* A receiver for one byte at a time: returns 1 if it completed a correct frame. */
 typedef struct {
     uint16_t crc;
-    uint8_t state; /* 0, 1: A5s seen; 2: preamble; 3: body; 4: body, behind an A5 */
+    uint8_t state; /* 0, 1: A5s seen; 2: preamble; 3: body; 4: body, after an A5 */
     uint8_t at;
     uint8_t left;
     uint8_t body[31];

@@ -1,6 +1,6 @@
-/* Receive, change, encode, send: what a header costs. EMPTY: the program around it. MESSAGE: a motion response is
- * decoded, changed and encoded again, which is what the floors of hand-written code and the peers do. ANSWER: any frame
- * is answered by one without data. PAYLOAD: any frame is sent back with the payload that it came with. */
+/* Receive, change, encode, send: the cost of a header. EMPTY: the program without it. MESSAGE: a motion response is
+ * decoded, changed and encoded again, as in the hand-written floors and the peers. ANSWER: any frame is answered by one
+ * without data. PAYLOAD: any frame is sent back with its payload. */
 #include "qlink.h"
 
 #if defined(MESSAGE)

@@ -9,7 +9,7 @@
 
 #include "qlink.h"
 
-/* What run_cycles prints a line for. A mark is one instruction of one cycle, with its value in a register already. */
+/* run_cycles prints a line for each mark: one instruction of one cycle, with its value in a register already. */
 #define MARK(number) __asm__ volatile("out %0, %1" : : "I"(_SFR_IO_ADDR(GPIOR0)), "r"((uint8_t)(number)) : "memory")
 enum { BEGIN = 1, END, FRAME_END, ENCODE_BEGIN, ENCODE_END, ANSWER_BEGIN, ANSWER_END, WRONG };
 

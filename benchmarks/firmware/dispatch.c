@@ -1,4 +1,4 @@
-/* A slave without its device: bytes in, requests to the functions of the dispatch table, answers out. */
+/* A slave without a device: bytes in, requests to the functions of the dispatch table, answers out. */
 #include "qlink.h"
 
 volatile uint8_t port;
@@ -11,7 +11,7 @@ __attribute__((noinline)) void send(const uint8_t *bytes, size_t size)
     }
 }
 
-qlink_slave_t slave; /* whoever links this fills it in */
+qlink_slave_t slave; /* defined by the program that links this */
 static qlink_receiver_t receiver;
 static uint8_t wire[QLINK_MAX_WIRE_SIZE];
 

@@ -1,4 +1,4 @@
-/* What core.c does with MESSAGE, in MAVLink: it has a frame, a check value and an addressee of its own. */
+/* core.c with MESSAGE, in MAVLink, which has its own frame, check value and address. */
 #include "motion/mavlink.h"
 
 volatile uint8_t port;

@@ -1,4 +1,4 @@
-/* What core.c does with MESSAGE, where nanopb makes the payload and the generated header the frame around it. */
+/* core.c with MESSAGE: nanopb makes the payload, and the generated header the frame. */
 #include <pb_decode.h>
 #include <pb_encode.h>
 

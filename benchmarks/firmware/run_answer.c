@@ -4,11 +4,11 @@
  *   run_answer program.elf HERTZ PHASES SCENE...
  *
  * A SCENE is one request or several in hexadecimal digits, with + between them. Each is played PHASES times, the end of
- * its last request that many parts of a millisecond apart, so that the millisecond's interrupt comes everywhere around
- * it. A line is printed for each request: the clock cycle at which its last byte was complete, the cycles from there to
- * the first byte of the answer being written to the UART, and the answer; 0 and - where there is none, for which all but
- * the last of a scene are given a millisecond. A last line tells how many bytes of stack were in use at most. Status 1:
- * the program ended, or did not answer the last of a scene.
+ * its last request at one of that many parts of a millisecond, so that the millisecond's interrupt occurs at all points
+ * around it. A line is printed for each request: the clock cycle at which its last byte was complete, the cycles until
+ * the first byte of the answer is written to the UART, and the answer; 0 and - if there is none within a millisecond. The
+ * last line is the most bytes of stack in use. Status 1: the program ended, or did not answer the last request of a
+ * scene.
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -27,14 +27,14 @@
 #define U2X0 0x02
 #define SPL 0x5D
 #define SPH 0x5E
-#define LIMIT 400000u /* cycles that an answer may take: a guard */
+#define LIMIT 400000u /* most cycles to wait for an answer */
 
 static uint8_t answer[256];
 static unsigned answered;
 static avr_cycle_count_t first;
 static avr_cycle_count_t latest;
-static avr_cycle_count_t per_byte; /* of the request before, on the line */
-static unsigned lowest = 0xFFFFu; /* that the stack pointer has been */
+static avr_cycle_count_t per_byte; /* of the previous request, on the line */
+static unsigned lowest = 0xFFFFu; /* of the stack pointer */
 
 static void written(struct avr_irq_t *irq, uint32_t value, void *context)
 {
@@ -45,7 +45,7 @@ static void written(struct avr_irq_t *irq, uint32_t value, void *context)
     answer[answered++ % sizeof answer] = (uint8_t)value;
 }
 
-/* Time passes in the simulation alone: a processor that sleeps is not waited for. */
+/* Only simulated time passes: a sleep of the processor takes no real time. */
 static void no_sleep(avr_t *avr, avr_cycle_count_t cycles)
 {
     (void)avr;
@@ -84,7 +84,7 @@ static bool is_received(const avr_t *avr)
     return (avr->data[UCSR0A] & RXC0) != 0;
 }
 
-/* Sends one byte when the program has taken the one before; it is complete when this returns. */
+/* Sends one byte when the program has read the previous one; it is complete when this returns. */
 static void send(avr_t *avr, uint8_t byte)
 {
     const avr_cycle_count_t begin = avr->cycle;
@@ -112,8 +112,8 @@ static avr_uart_t *uart_of(const avr_t *avr)
     return (avr_uart_t *)io;
 }
 
-/* A byte has ten bits of eight clocks, times the divider that the program has set. simavr takes longer for one that
- * comes, how much depends on its version; so after the first request its UART is told otherwise. */
+/* A byte has ten bits of eight clocks, times the divider that the program has set. simavr takes longer for a received
+ * one, by an amount that depends on its version; so its UART is adjusted after the first request. */
 static void keep_rate(avr_t *avr)
 {
     static bool is_set;
@@ -124,12 +124,12 @@ static void keep_rate(avr_t *avr)
         uart->cycles_per_byte = uart->cycles_per_byte * wanted / per_byte;
         is_set = true;
     } else if (per_byte * 100u > wanted * 105u || per_byte * 100u < wanted * 95u) {
-        fprintf(stderr, "run_answer: bytes come in %u cycles, not in %u\n", (unsigned)per_byte, wanted);
+        fprintf(stderr, "run_answer: a byte takes %u cycles, not %u\n", (unsigned)per_byte, wanted);
         exit(EXIT_FAILURE);
     }
 }
 
-/* Sends a request of so many digits; returns the cycle at which its last byte was complete. */
+/* Sends a request of `digits` digits; returns the cycle at which its last byte was complete. */
 static avr_cycle_count_t ask(avr_t *avr, const char *hex, size_t digits)
 {
     const avr_cycle_count_t begin = avr->cycle;

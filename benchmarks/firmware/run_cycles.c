@@ -1,11 +1,11 @@
 /*
- * Runs a program for an ATmega328P in simavr to its end, and prints what it has marked.
+ * Runs a program for an ATmega328P in simavr to its end, and prints its marks.
  *
  *   run_cycles program.elf HERTZ
  *
- * The program writes the number of a mark to GPIOR0, which does nothing else; a line for each is printed: the mark, the
+ * The program writes the number of a mark to GPIOR0, which has no other use; a line for each is printed: the mark, the
  * clock cycle, the stack pointer, and its lowest value since the mark before. It ends by `cli` and `sleep`. Status 1:
- * it crashed, or ran for too long.
+ * it crashed, or ran too long.
  */
 #include <stdint.h>
 #include <stdio.h>
@@ -18,7 +18,7 @@
 #define GPIOR0 0x3E /* address in data space */
 #define SPL 0x5D
 #define SPH 0x5E
-#define LONGEST 50000000u /* cycles: a guard against a program that never ends */
+#define LONGEST 50000000u /* cycles: the limit for a program that does not end */
 
 static unsigned lowest = 0xFFFFu;
 

@@ -244,7 +244,7 @@ def test_sending_nothing_does_not_hang(
         ((), "usage: run_simavr [--hertz 18432000] firmware.elf"),
         (("--hertz", "0", "x.elf"), "usage: "),
         (("--speed", "1", "x.elf"), "usage: "),
-        (("/nowhere/x.elf",), "/nowhere/x.elf is no firmware in ELF"),
+        (("/nowhere/x.elf",), "/nowhere/x.elf is not an ELF firmware"),
     ],
 )
 def test_the_simulator_says_what_is_wrong(

@@ -13,7 +13,7 @@
 
 #include "line.h"
 
-/* Double speed: eight clocks a bit. An int has 16 bits here, so the numbers say that they are long. */
+/* Double speed: eight clocks a bit. An int has 16 bits here, so the constants are marked long. */
 #define BAUD_SETTING ((F_CPU + 4UL * BOARD_BAUD) / (8UL * BOARD_BAUD) - 1UL)
 #define BAUD_CLOCKS (8UL * (BAUD_SETTING + 1UL) * BOARD_BAUD) /* F_CPU, if the rate were exact */
 #if BAUD_SETTING > 4095 || 50 * BAUD_CLOCKS > 51 * F_CPU || 50 * BAUD_CLOCKS < 49 * F_CPU
@@ -27,8 +27,8 @@
 #define RECEIVER _BV(PD0)
 #define PINS 0x3Fu /* of port B, and of port C */
 
-static volatile uint8_t ring[RING_SIZE]; /* volatile too: a place is read before it counts as taken */
-static volatile uint8_t written; /* both count on and wrap; their difference is what waits */
+static volatile uint8_t ring[RING_SIZE]; /* volatile too: a byte is read before its place is freed */
+static volatile uint8_t written; /* free-running, they wrap; their difference is the number of bytes waiting */
 static volatile uint8_t taken;
 static volatile uint16_t overruns;
 static volatile uint32_t milliseconds;
@@ -45,10 +45,10 @@ static void count_lost(void)
     }
 }
 
-/* Reading UDR0 is the acknowledgement. A second byte that waits in the UART interrupts again. */
+/* Reading UDR0 is the acknowledgement. A second byte in the UART interrupts again. */
 ISR(USART_RX_vect)
 {
-    const uint8_t status = UCSR0A; /* first: it is that of the byte in UDR0 */
+    const uint8_t status = UCSR0A; /* read first: it belongs to the byte in UDR0 */
     const uint8_t byte = UDR0;
     const uint8_t place = written;
     if ((status & _BV(DOR0)) != 0u) {
@@ -64,12 +64,12 @@ ISR(USART_RX_vect)
 
 void board_start(void)
 {
-    PORTD = RECEIVER; /* its pull-up; the direction pin first of all, and low */
+    PORTD = RECEIVER; /* its pull-up; the direction pin is set first, and low */
     DDRD = DRIVER;
     PORTC = PINS;
     DDRB = PINS;
 
-    OCR1A = (uint16_t)(TICK_CLOCKS - 1); /* before the timer runs, or it would begin with a period of one clock */
+    OCR1A = (uint16_t)(TICK_CLOCKS - 1); /* before the timer runs, or its first period would be one clock */
     TIMSK1 = _BV(OCIE1A);
     TCCR1B = _BV(WGM12) | _BV(CS10);
 
@@ -78,7 +78,7 @@ void board_start(void)
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
     UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
 
-    SMCR = _BV(SE); /* sleep is idle: UART and timer go on */
+    SMCR = _BV(SE); /* sleep mode idle: UART and timer keep running */
     sei();
 }
 
@@ -97,15 +97,15 @@ void board_send(const uint8_t *bytes, size_t size)
 {
     size_t index;
     if (size == 0u) {
-        return; /* no stop bit would ever come */
+        return; /* without data the transmit-complete flag is never set */
     }
     _delay_us(BOARD_TURNAROUND_US);
     board_driver(true);
     for (index = 0u; index < size; ++index) {
         while ((UCSR0A & _BV(UDRE0)) == 0u) {
         }
-        /* The flag of the last stop bit is cleared behind the byte, not before it: only the end of this one can set it
-         * again, and no interrupt comes between. */
+        /* The transmit-complete flag is cleared after the byte is written, not before it: only the end of this byte
+         * can set it again, and interrupts are off in between. */
         ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
         {
             UDR0 = bytes[index];
@@ -121,7 +121,7 @@ void board_wait(void)
 {
     cli();
     if (taken == written) {
-        sei(); /* takes effect behind the next instruction: no interrupt gets between the question and the sleep */
+        sei(); /* takes effect after the next instruction: no interrupt between the check and the sleep */
         sleep_cpu();
     }
     sei();

@@ -1,9 +1,9 @@
 /*
- * Board: Stellaris LM3S6965 (Cortex-M3, 50 MHz), for example its evaluation board, which QEMU calls lm3s6965evb.
- * Register and bit names are those of the data sheet.
+ * Board: Stellaris LM3S6965 (Cortex-M3, 50 MHz), for example its evaluation board, QEMU machine lm3s6965evb.
+ * Register and bit names as in the data sheet.
  *
- * The UART works without its FIFO. That would tell of a single byte only 32 bit times after it, and a Q.link slave has
- * to answer within 30. Without it every byte interrupts at once, and has to be taken before the next one is complete.
+ * The FIFO of the UART is off: it reports a single byte only after 32 bit times, and a Q.link slave has to answer
+ * within 30. Without the FIFO every byte interrupts at once, and has to be read before the next one is complete.
  */
 #include "board.h"
 
@@ -51,7 +51,7 @@
 #define PORT_B 0x40005000u
 #define PORT_E 0x40024000u
 #define PORT_F 0x40025000u
-/* The address says which pins an access is for, so the others need not be read before. */
+/* The address selects the pins of an access: no read-modify-write for the others. */
 #define GPIO_DATA(port, pins) REGISTER((port) + ((uint32_t)(pins) << 2))
 #define GPIO_DIR(port) REGISTER((port) + 0x400u)
 #define GPIO_AFSEL(port) REGISTER((port) + 0x420u)
@@ -67,14 +67,14 @@
 /* Wiring. */
 #define PIN_RX 0x01u        /* PA0 */
 #define PIN_TX 0x02u        /* PA1 */
-#define PIN_DIRECTION 0x01u /* PB0: high while sending; 10 kOhm to ground at DE hold it low until here */
+#define PIN_DIRECTION 0x01u /* PB0: high while sending; 10 kOhm to ground at DE hold it low until then */
 #define PIN_BUTTONS 0x0Fu   /* PE0 to PE3: inputs 1 to 4, low when pressed */
 #define PIN_SELECT 0x02u    /* PF1: input 5, low when pressed */
 #define PIN_LEDS 0x0Du      /* PF0, PF2, PF3: outputs 1 to 3 */
 
 #define CLOCK 50000000ul
 #define DIVISOR ((8u * CLOCK / BOARD_BAUD + 1u) / 2u) /* of 16 times the baud, in steps of 1/64 */
-#define CLOCKS_64 (4u * CLOCK) /* 64 steps of the divisor, 16 times the baud: DIVISOR * baud, if the rate were exact */
+#define CLOCKS_64 (4u * CLOCK) /* 64 steps of the divisor, 16 times the baud: DIVISOR * baud, for an exact rate */
 #if DIVISOR < 64u || DIVISOR > 4194303u
 #error "BOARD_BAUD does not fit the divider of the UART: 48 to 3125000 baud"
 #elif 50u * DIVISOR * BOARD_BAUD > 51u * CLOCKS_64 || 50u * DIVISOR * BOARD_BAUD < 49u * CLOCKS_64
@@ -83,7 +83,7 @@
 
 #define TICK_CLOCKS (CLOCK / 1000u)
 
-static volatile uint8_t ring[256]; /* its indices wrap by themselves */
+static volatile uint8_t ring[256]; /* its indices wrap without a modulo */
 static volatile uint8_t head;
 static volatile uint8_t tail;
 static volatile uint16_t overruns;
@@ -92,7 +92,7 @@ static volatile uint32_t milliseconds;
 static void start_clock(void)
 {
     SYSCTL_RCC = (SYSCTL_RCC | RCC_BYPASS) & ~(RCC_USESYSDIV | RCC_MOSCDIS);
-    for (volatile uint32_t settle = 0u; settle < 0x8000u; ++settle) { /* the crystal needs some milliseconds */
+    for (volatile uint32_t settle = 0u; settle < 0x8000u; ++settle) { /* the crystal starts within some milliseconds */
     }
     SYSCTL_RCC = (SYSCTL_RCC & ~(RCC_XTAL | RCC_OSCSRC | RCC_PWRDN)) | RCC_XTAL_8MHZ;
     SYSCTL_RCC = (SYSCTL_RCC & ~RCC_SYSDIV) | RCC_SYSDIV_4 | RCC_USESYSDIV; /* 200 MHz / 4 */
@@ -107,7 +107,7 @@ static void start_clock(void)
 static void start_pins(void)
 {
     SYSCTL_RCGC2 |= RCGC2_PORTS;
-    (void)SYSCTL_RCGC2; /* a port may be used three clocks after it was switched on */
+    (void)SYSCTL_RCGC2; /* a port needs three clocks after it is enabled */
     GPIO_DATA(PORT_B, PIN_DIRECTION) = 0u;
     GPIO_DIR(PORT_B) |= PIN_DIRECTION;
     GPIO_DEN(PORT_B) |= PIN_DIRECTION;
@@ -135,13 +135,13 @@ static void start_uart(void)
 
 void board_start(void)
 {
-    start_pins(); /* first, since the clock takes milliseconds: the driver is off from here on */
+    start_pins(); /* first, since the clock takes milliseconds: the driver is off from now on */
     start_clock();
     start_uart();
 }
 
-/* Reading DR is the acknowledgement. Where the ring is full the byte waits in the UART until board_receive. A byte
- * without its stop bit is dropped: the frame it belongs to is lost, and the receiver finds the next one. */
+/* Reading DR is the acknowledgement. If the ring is full, the byte waits in the UART until board_receive. A byte
+ * without stop bit is dropped: its frame is lost, and the receiver finds the next one. */
 void uart0_interrupt(void)
 {
     while ((UART_FR & FR_RXFE) == 0u) {
@@ -152,7 +152,7 @@ void uart0_interrupt(void)
         }
         data = UART_DR;
         if ((data & DR_OE) != 0u && overruns != UINT16_MAX) {
-            ++overruns; /* a byte came while another one was still here */
+            ++overruns; /* overrun: a byte was received before the last one was read */
         }
         if ((data & (DR_FE | DR_BE)) == 0u) {
             ring[head] = (uint8_t)data;
@@ -173,7 +173,7 @@ bool board_receive(uint8_t *byte)
     }
     *byte = ring[tail];
     ++tail;
-    UART_IM = IM_RX; /* there is room again */
+    UART_IM = IM_RX; /* the ring has room again */
     return true;
 }
 
@@ -182,14 +182,14 @@ static void wait_microseconds(uint32_t duration)
     uint32_t before = SYST_CVR;
     uint32_t left = duration * (CLOCK / 1000000u);
     while (left > 0u) {
-        const uint32_t now = SYST_CVR; /* counts down to 0, then begins at the top */
+        const uint32_t now = SYST_CVR; /* counts down to 0, then reloads */
         const uint32_t gone = before >= now ? before - now : before + TICK_CLOCKS - now;
         left -= gone < left ? gone : left;
         before = now;
     }
 }
 
-/* Nothing ends the waiting for the UART: it needs its clock only, and that is the processor's. */
+/* Waiting for the UART needs no timeout: it runs on the clock of the processor. */
 void board_send(const uint8_t *bytes, size_t size)
 {
     if (size == 0u) {
@@ -202,12 +202,12 @@ void board_send(const uint8_t *bytes, size_t size)
         }
         UART_DR = bytes[index];
     }
-    while ((UART_FR & FR_BUSY) != 0u) { /* until the last stop bit has gone */
+    while ((UART_FR & FR_BUSY) != 0u) { /* until the last stop bit is sent */
     }
     board_driver(false);
 }
 
-/* An interrupt wakes the processor although it is masked, and is taken behind cpsie: none is lost in between. */
+/* A masked interrupt wakes the processor all the same, and is taken after cpsie: none is lost in between. */
 void board_wait(void)
 {
     __asm volatile("cpsid i" ::: "memory");

@@ -31,8 +31,8 @@ void reset(void)
     }
 }
 
-/* A fault, or an interrupt that nobody has asked for. A reset makes all pins inputs: the line is released where 10 kOhm
- * at DE pull it low, and is held by nobody knows whom where DE floats. */
+/* A fault or an unexpected interrupt. A reset makes all pins inputs: with 10 kOhm to ground at DE the line is released;
+ * if DE floats, the driver may hold it. */
 static void fault(void)
 {
     *(volatile uint32_t *)0xE000ED0Cu = 0x05FA0004u; /* AIRCR: SYSRESETREQ */
@@ -40,7 +40,7 @@ static void fault(void)
     }
 }
 
-#define INTERRUPT(number) (15 + (number)) /* behind the stack and the exceptions 1 to 15 */
+#define INTERRUPT(number) (15 + (number)) /* after the stack pointer and the exceptions 1 to 15 */
 
 struct vectors {
     uint32_t *stack;

@@ -1,6 +1,6 @@
 /*
  * Board: BBC micro:bit, first version (Nordic nRF51822, Cortex-M0, 16 MHz).
- * Register names are those of the nRF51 Series Reference Manual.
+ * Register names as in the nRF51 Series Reference Manual.
  */
 #include "board.h"
 
@@ -52,7 +52,7 @@
 #define IRQ_UART0 (1u << 2)
 #define IRQ_TIMER0 (1u << 8)
 
-/* Wiring: numbers of P0 pins. TXD and RXD go to the USB chip of the board unless told otherwise. */
+/* Wiring: numbers of P0 pins. TXD and RXD go to the USB chip of the board by default. */
 #ifndef BOARD_PIN_TXD
 #define BOARD_PIN_TXD 24u
 #endif
@@ -67,7 +67,7 @@
 #define PIN_OUTPUT_2 2u   /* P1 */
 #define PIN_OUTPUT_3 1u   /* P2 */
 
-/* The baud rate in units of 16 MHz / 2^32, of which the chip takes the upper 20 bits. */
+/* The baud rate in units of 16 MHz / 2^32, of which the chip uses the upper 20 bits. */
 #define STEPS 0x100000000ull
 #define CLOCK 16000000u
 #define BAUDRATE ((BOARD_BAUD * STEPS / CLOCK + 0x800u) / 0x1000u * 0x1000u)
@@ -80,7 +80,7 @@
 #define BIT_US ((1000000u + BOARD_BAUD - 1u) / BOARD_BAUD) /* rounded up */
 #define TICK_US 1000u
 
-static volatile uint8_t ring[256]; /* its indices wrap by themselves */
+static volatile uint8_t ring[256]; /* its indices wrap without a modulo */
 static volatile uint8_t head;
 static volatile uint8_t tail;
 static volatile uint16_t overruns;
@@ -88,7 +88,7 @@ static volatile uint32_t milliseconds;
 
 static void start_clock(void)
 {
-    CLOCK_TASKS_HFCLKSTART = 1u; /* the crystal: the oscillator inside is too coarse for a UART */
+    CLOCK_TASKS_HFCLKSTART = 1u; /* the crystal: the internal oscillator is too inaccurate for a UART */
     while (CLOCK_EVENTS_HFCLKSTARTED == 0u) {
     }
     TIMER_PRESCALER = 4u; /* 1 MHz */
@@ -123,7 +123,7 @@ static void start_uart(void)
 
 void board_start(void)
 {
-    start_pins(); /* first, since the crystal takes its time: the driver is off from here on */
+    start_pins(); /* first, since the crystal starts slowly: the driver is off from now on */
     start_clock();
     start_uart();
     NVIC_ISER = IRQ_UART0 | IRQ_TIMER0;
@@ -136,17 +136,17 @@ static void count_overrun(void)
     }
 }
 
-/* What was wrong since it was last asked. */
+/* Receive errors since the last call. */
 static uint32_t take_errors(void)
 {
     const uint32_t errors = UART_ERRORSRC;
-    UART_ERRORSRC = errors; /* a 1 clears */
+    UART_ERRORSRC = errors; /* writing a 1 clears it */
     return errors;
 }
 
-/* The chip has a FIFO of six bytes behind RXD. Each byte that moves into RXD sets the event; cleared behind the
- * reading, it would hide the next one. Where the ring is full the rest waits in the FIFO until board_receive. A byte
- * without its stop bit is dropped: the frame it belongs to is lost, and the receiver finds the next one. */
+/* RXD is the output of a FIFO of six bytes. Each byte that moves into RXD sets the event; clearing it after the read
+ * would miss the next one. If the ring is full, the rest waits in the FIFO until board_receive. A byte without stop bit
+ * is dropped: its frame is lost, and the receiver finds the next one. */
 void uart0_interrupt(void)
 {
     const uint32_t errors = take_errors();
@@ -181,7 +181,7 @@ bool board_receive(uint8_t *byte)
     }
     *byte = ring[tail];
     ++tail;
-    UART_INTENSET = INTEN_RXDRDY; /* there is room again */
+    UART_INTENSET = INTEN_RXDRDY; /* the ring has room again */
     return true;
 }
 
@@ -194,17 +194,17 @@ static uint32_t microseconds(void)
 static void wait_microseconds(uint32_t duration)
 {
     uint32_t before = microseconds();
-    uint32_t left = duration + (duration > 0u ? 1u : 0u); /* the first may be over already */
+    uint32_t left = duration + (duration > 0u ? 1u : 0u); /* the first tick may have passed already */
     while (left > 0u) {
-        const uint32_t now = microseconds(); /* begins at 0 with every tick */
+        const uint32_t now = microseconds(); /* restarts at 0 with every tick */
         const uint32_t gone = now >= before ? now - before : now + TICK_US - before;
         left -= gone < left ? gone : left;
         before = now;
     }
 }
 
-/* The event tells that a byte has been sent, and there is no buffer behind TXD. Nothing ends the waiting for it: it
- * needs the crystal only, from which the processor runs as well. */
+/* The event means that a byte has been sent; TXD has no buffer. Waiting for it needs no timeout: the UART runs on the
+ * same crystal as the processor. */
 void board_send(const uint8_t *bytes, size_t size)
 {
     if (size == 0u) {
@@ -218,11 +218,11 @@ void board_send(const uint8_t *bytes, size_t size)
         while (UART_EVENTS_TXDRDY == 0u) {
         }
     }
-    wait_microseconds(BIT_US); /* the manual does not say whether the stop bit has gone, too */
+    wait_microseconds(BIT_US); /* the manual does not say whether this includes the stop bit */
     board_driver(false);
 }
 
-/* An interrupt wakes the processor although it is masked, and is taken behind cpsie: none is lost in between. */
+/* A masked interrupt wakes the processor all the same, and is taken after cpsie: none is lost in between. */
 void board_wait(void)
 {
     __asm volatile("cpsid i" ::: "memory");

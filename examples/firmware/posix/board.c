@@ -1,4 +1,4 @@
-/* A process as a board: its serial line is a pty, whose path it prints. SIGTERM and SIGINT end it. */
+/* A process as a board: its serial line is a pty; it prints the path. SIGTERM and SIGINT end it. */
 #define _XOPEN_SOURCE 600
 
 #include "board.h"
@@ -15,11 +15,11 @@
 
 #define BUFFER_SIZE 256u
 #define TICK_MS 1
-#define SEND_MS 100 /* nobody reads for so long: the rest is gone, as it would be on a wire */
+#define SEND_MS 100 /* without a reader for so long, the rest is dropped, as on a wire */
 
 static int line = -1;
 static struct timespec started;
-static uint8_t buffer[BUFFER_SIZE]; /* what came; what does not fit waits in the pty, so nothing is lost */
+static uint8_t buffer[BUFFER_SIZE]; /* received bytes; those that do not fit wait in the pty, so none is lost */
 static size_t received;
 static size_t taken;
 static volatile sig_atomic_t stopping;
@@ -36,7 +36,7 @@ static void on_stop(int number)
     stopping = 1;
 }
 
-/* Bytes pass as they are: no echo, no line ends, no signals. */
+/* Raw mode: no echo, no translation of line ends, no signals. */
 static void make_raw(int port)
 {
     struct termios settings;
@@ -62,7 +62,7 @@ static void open_line(void)
     if (line < 0 || grantpt(line) != 0 || unlockpt(line) != 0 || (path = ptsname(line)) == NULL) {
         die("pty");
     }
-    /* This end of the pty is never closed: the line does not hang up when a master does. */
+    /* This end of the pty is never closed: the line does not hang up when a master closes its end. */
     port = open(path, O_RDWR | O_NOCTTY);
     if (port < 0) {
         die(path);
@@ -94,7 +94,7 @@ bool board_receive(uint8_t *byte)
     return true;
 }
 
-/* What is an interrupt on a chip is a wake-up here: the pty keeps a byte that comes before. */
+/* poll takes the place of an interrupt: the pty keeps a byte received before it. */
 void board_wait(void)
 {
     struct pollfd waiting = { .fd = line, .events = POLLIN };
@@ -148,7 +148,7 @@ void board_outputs(uint32_t outputs)
 
 void board_driver(bool transmit)
 {
-    (void)transmit; /* a pty has a wire in each direction */
+    (void)transmit; /* a pty is full duplex */
 }
 
 uint16_t board_overruns(void)

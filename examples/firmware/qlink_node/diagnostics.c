@@ -10,7 +10,7 @@
 #define MARK_SIZE 2u
 #define MAX_IMAGE_BYTES (MOTOR_MAX_DATA - 1u)
 
-/* What is left of the arguments of a request. */
+/* The arguments of a request that are not read yet. */
 typedef struct arguments {
     const uint8_t *at;
     uint8_t left;
@@ -28,7 +28,7 @@ void diagnostics_init(diagnostics_t *diagnostics)
     diagnostics->size = 0u;
 }
 
-/* ---- What the node reports ---- */
+/* ---- Reports of the node ---- */
 
 void diagnostics_words(node_t *node, const uint16_t *words, uint8_t count)
 {
@@ -84,7 +84,7 @@ static uint32_t get(arguments_t *arguments, uint8_t bytes)
     return number;
 }
 
-/* ---- Operations that tell ---- */
+/* ---- Operations that read ---- */
 
 static void tell_motions(diagnostics_t *diagnostics)
 {
@@ -155,7 +155,7 @@ static void tell_state(node_t *node)
     put(diagnostics, board_overruns(), 2u);
 }
 
-/* ---- Operations that change something ---- */
+/* ---- Operations that write ---- */
 
 static bool force_inputs(node_t *node, arguments_t *arguments)
 {
@@ -195,7 +195,7 @@ static bool configure(node_t *node, arguments_t *arguments)
     if (settings.number < QLINK_FIRST_NODE || settings.number > QLINK_LAST_NODE) {
         return false;
     }
-#if NODE_FIFO < UINT8_MAX /* else every byte is a capacity, and compilers complain of the comparison */
+#if NODE_FIFO < UINT8_MAX /* with 255, every byte is a capacity, and compilers warn of the comparison */
     if (settings.capacity > NODE_FIFO) {
         return false;
     }
@@ -205,7 +205,7 @@ static bool configure(node_t *node, arguments_t *arguments)
     return true;
 }
 
-/* What was answered is a request to this node. Only what was not is looked at once more: no answer waits for it. */
+/* An answered frame is a request to this node. The others are decoded once more: no answer waits for it. */
 static bool is_request(const node_t *node, const qlink_frame_t *frame, size_t size)
 {
     return size > 0u ||
@@ -220,7 +220,7 @@ void diagnostics_handled(node_t *node, const qlink_frame_t *frame, size_t size)
     }
     diagnostics->own = false;
     if (diagnostics->configuring && diagnostics->size == 0u) {
-        const node_settings_t settings = diagnostics->settings; /* power-up clears the one that it is in */
+        const node_settings_t settings = diagnostics->settings; /* power-up clears it */
         node_power_up(node, &settings, board_inputs(), node->now);
     }
 }
@@ -280,7 +280,7 @@ static uint8_t size_of_arguments(uint8_t operation)
     }
 }
 
-/* Does an operation whose arguments have the right size; returns false where it is unknown or they are wrong. */
+/* Runs an operation; returns false if it is unknown or its arguments are wrong. */
 static bool operate(node_t *node, uint8_t operation, arguments_t *arguments)
 {
     switch (operation) {

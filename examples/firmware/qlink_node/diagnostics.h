@@ -1,10 +1,10 @@
 /*
- * A look inside over the line, for tests and service, without a second one. A motor_request whose motor_data begins
- * with 7E D1 is for the node itself: 7E D1, operation, arguments. The next motor_response_poll tells the answer,
- * once: the operation and its data; FF and the operation where it is unknown or its arguments are wrong. A request of
- * the motor that is under way is not disturbed. Numbers are big-endian. Neither message counts in any counter.
+ * Diagnostics over the same line, for tests and service. A motor_request whose motor_data begins with 7E D1 is for the
+ * node itself: 7E D1, operation, arguments. The next motor_response_poll returns the answer, once: the operation and
+ * its data; FF and the operation if it is unknown or its arguments are wrong. A pending motor request is not affected.
+ * Numbers are big-endian. Neither message counts in any counter.
  *
- * Only a build with -DNODE_DIAGNOSTICS=1 has it; in any other one 7E D1 goes to the motor like anything else.
+ * Only for builds with -DNODE_DIAGNOSTICS=1; in the others 7E D1 goes to the motor like other data.
  */
 #ifndef DIAGNOSTICS_H
 #define DIAGNOSTICS_H
@@ -31,17 +31,17 @@ typedef enum diagnostics_operation {
     DIAGNOSTICS_IMAGE = 0x04,
     /* CRC u16 over all path words queued since power-up, each big-endian, and their number u32 */
     DIAGNOSTICS_WORDS = 0x05,
-    /* inputs u24, power-up u8: from now on the inputs are these and not the pins; with 1 there is no edge */
+    /* inputs u24, power-up u8: from now on these replace the pins; with 1 there is no edge */
     DIAGNOSTICS_INPUTS = 0x06,
     /* outputs u24, inputs u24, position i32, waiting u8, started u8, running u8, milliseconds u32, lost bytes u16 */
     DIAGNOSTICS_STATE = 0x07,
     /* capacity u8, rate u32, started u8, T1 u8, T2 u8, position type u8, serial u32, number u8, motor ms u16: power-up
-     * with these settings, all counters 0. It happens when the answer has been told: until then the node is the old one
-     * and has its old number. */
+     * with these settings, all counters 0. It follows the answer: until then the node keeps its old number and
+     * settings. */
     DIAGNOSTICS_CONFIGURE = 0x08,
     /* position i32 */
     DIAGNOSTICS_POSITION = 0x09,
-    /* mask u32: from now on only commands whose bit is 1 are answered. Bit 0 is node_setup; they stand in the order of
+    /* mask u32: from now on only commands whose bit is 1 are answered. Bit 0 is node_setup; the order is that of
      * qlink_slave_t. The two commands that carry diagnostics are always answered. */
     DIAGNOSTICS_COMMANDS = 0x0A,
     /* 0: the motor answers with its request, 1: with its request backwards */
@@ -51,14 +51,14 @@ typedef enum diagnostics_operation {
 
 #if NODE_DIAGNOSTICS
 
-/* Counts since power-up; a reset by command leaves them. */
+/* Counts since power-up; a reset by command keeps them. */
 typedef struct counters {
-    uint16_t requests; /* for this node, those included that it does not answer */
+    uint16_t requests; /* for this node, including those that it does not answer */
     uint16_t motions;
-    uint16_t duplicates; /* motions with the counter of the one before, answered but not taken again */
+    uint16_t duplicates; /* motions with the counter of the last one, answered but not queued again */
     uint32_t words;
     uint16_t overruns; /* motions with more words than fitted */
-    uint16_t jumps;    /* motions whose counter was not one up */
+    uint16_t jumps;    /* motions whose counter was not the last one plus 1 */
     uint16_t syncs;
     uint16_t repeated_syncs;
     uint32_t missed_syncs;
@@ -74,24 +74,24 @@ typedef struct counters {
 
 typedef struct diagnostics {
     counters_t counters;
-    uint16_t words_check;  /* register of the CRC over the path words */
-    uint16_t text_check;   /* and over the text of the program */
-    uint32_t inputs;       /* that take the place of the pins */
-    bool forced;           /* they do */
-    bool configuring;      /* power-up when the answer has been told */
-    bool own;              /* the request that is being handled is one of these, and counts nowhere */
-    uint8_t size;          /* of the answer that waits, 0 when there is none */
+    uint16_t words_check;  /* CRC over the path words */
+    uint16_t text_check;   /* CRC over the text of the program */
+    uint32_t inputs;       /* replace the pins */
+    bool forced;           /* the inputs above are used */
+    bool configuring;      /* power-up after the answer is sent */
+    bool own;              /* the request being handled is a diagnostic one, and is not counted */
+    uint8_t size;          /* of the pending answer, 0 if there is none */
     uint8_t answer[MOTOR_MAX_DATA];
     node_settings_t settings; /* for that power-up */
 } diagnostics_t;
 
-/* Counts in a build with diagnostics, and does nothing in one without. */
+/* Counts in a build with diagnostics, does nothing without. */
 #define COUNT(node, counter) ((void)++(node)->diagnostics.counters.counter)
 #define COUNT_MORE(node, counter, number) ((void)((node)->diagnostics.counters.counter += (number)))
 
 void diagnostics_init(diagnostics_t *diagnostics);
 
-/* Goes on with the CRC over the path words, and with that over the program's text (begun again by an opening). */
+/* Continue the CRC over the path words, and the one over the program's text (restarted by an opening). */
 void diagnostics_words(node_t *node, const uint16_t *words, uint8_t count);
 void diagnostics_text(node_t *node, const uint8_t *text, uint8_t size);
 void diagnostics_opened(node_t *node);
@@ -99,11 +99,11 @@ void diagnostics_opened(node_t *node);
 /* Returns whether a motor request was for the node itself. */
 bool diagnostics_take(node_t *node, const qlink_motor_request_request_t *request);
 
-/* Returns whether there was an answer to tell. */
+/* Returns whether an answer was pending. */
 bool diagnostics_poll(node_t *node, qlink_motor_response_poll_response_t *response);
 
-/* Counts a frame that was handled, if it is a request to this node, and does what was put off until its answer was
- * made: `size` bytes, 0 for none. */
+/* Counts a handled frame, if it is a request to this node, and then runs the deferred power-up. `size`: of the answer,
+ * 0 for none. */
 void diagnostics_handled(node_t *node, const qlink_frame_t *frame, size_t size);
 
 /* The inputs: those of the board, unless they are forced. */

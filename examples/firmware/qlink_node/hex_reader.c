@@ -6,7 +6,7 @@
 #define NO_DIGIT 0xFFu
 
 enum { DATA = 0, END = 1, SEGMENT = 2, SEGMENT_ENTRY = 3, LINEAR = 4, LINEAR_ENTRY = 5 };
-/* Where what stands in a record, in bytes; the checksum follows the data. */
+/* Offsets in a record, in bytes; the checksum follows the data. */
 enum { COUNT_AT = 0, OFFSET_AT = 1, OFFSET_LOW_AT = 2, TYPE_AT = 3, DATA_AT = 4 };
 
 void hex_reader_init(hex_reader_t *reader)
@@ -20,7 +20,7 @@ static uint8_t digit_of(uint8_t character)
     if (character >= '0' && character <= '9') {
         return (uint8_t)(character - '0');
     }
-    character |= 0x20u; /* small letter */
+    character |= 0x20u; /* lower case */
     return (character >= 'a' && character <= 'f') ? (uint8_t)(character - 'a' + 10) : (uint8_t)NO_DIGIT;
 }
 
@@ -56,7 +56,7 @@ static uint8_t count_of(uint8_t type)
     }
 }
 
-/* A record is complete: do what it says. */
+/* Applies a complete record. */
 static bool finish(hex_reader_t *reader)
 {
     reader->position = 0u;
@@ -77,7 +77,7 @@ static bool finish(hex_reader_t *reader)
         reader->ended = true;
         return !reader->doubled;
     } else {
-        /* Where execution starts is of no interest here. */
+        /* The start address is ignored. */
     }
     return true;
 }
@@ -87,7 +87,7 @@ static bool take_byte(hex_reader_t *reader, uint16_t index, uint8_t byte)
     reader->sum = (uint8_t)(reader->sum + byte);
     if (index == COUNT_AT) {
         reader->count = byte;
-        return !reader->flawed; /* without a count there is no end to wait for */
+        return !reader->flawed; /* without a count the end of the record is unknown */
     }
     if (index == OFFSET_AT || index == OFFSET_LOW_AT) {
         reader->offset = (uint16_t)((uint16_t)(reader->offset << 8) | byte);

@@ -3,7 +3,7 @@
 #include "line.h"
 #include "node.h"
 
-/* A byte on the line in whole milliseconds, and one more because the first tick may be near. */
+/* Time of a byte on the line in whole milliseconds, plus one because the first tick may be near. */
 #define BYTE_MS (QLINK_BITS_PER_BYTE * 1000ul / BOARD_BAUD + 2u)
 
 static node_t node;
@@ -21,8 +21,8 @@ static bool receive_within(uint8_t *byte, uint32_t milliseconds)
     return true;
 }
 
-/* A frame is complete with its check value. If that ends with the byte of the preamble, one more is inserted behind
- * it, and whoever asks is still sending: the answer waits for that byte. */
+/* A frame is complete with its check value. If that ends with the preamble byte, the master still sends the byte
+ * inserted after it: the answer waits for that byte. */
 static void wait_for_inserted(void)
 {
     uint8_t byte;
@@ -32,8 +32,8 @@ static void wait_for_inserted(void)
 }
 
 #if BOARD_HEARS_ITSELF
-/* What comes now is the answer itself, and some answers look like requests. Another byte or a silence is the end of
- * it; what follows is for the receiver. */
+/* The next bytes are the echo of the answer, and some answers look like requests. A different byte or silence ends the
+ * echo; the bytes after it go to the receiver. */
 static void drop_echo(size_t size)
 {
     size_t index;
@@ -67,8 +67,8 @@ static void advance(uint32_t now)
     board_outputs(node.io.outputs);
 }
 
-/* The answer has to begin within three byte times. So time is not worked out once more in front of it, unless so many
- * bytes came at once that ticks were missed. */
+/* The answer has to begin within three byte times, so the time is not updated once more before it, unless so many bytes
+ * were received at once that ticks were missed. */
 static void answer_frame(uint8_t last)
 {
     const uint32_t now = board_milliseconds();
@@ -95,7 +95,7 @@ int main(void)
         } else if (node_receive(&node, byte)) {
             answer_frame(byte);
         } else {
-            /* more is to come */
+            /* the frame is not complete */
         }
     }
 }

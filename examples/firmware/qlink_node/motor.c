@@ -9,7 +9,7 @@ void motor_init(motor_t *motor, uint16_t delay)
     motor_forget(motor);
 }
 
-/* Which byte of a request stands at a place of its answer. */
+/* The index of the request's byte at an index of the answer. */
 static uint8_t source(const motor_t *motor, uint8_t index, uint8_t size)
 {
 #if NODE_DIAGNOSTICS

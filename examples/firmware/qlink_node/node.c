@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/* Milliseconds in a step of T1; T2 has the same steps. */
+/* Milliseconds per step of T1 and T2. */
 #define STEP_MS (1000u * QLINK_TENTHS_FACTOR / QLINK_TENTHS_DIVISOR)
 
 static node_t *node_of(qlink_slave_t *slave)
@@ -137,7 +137,7 @@ static bool on_motor_request(qlink_slave_t *slave, const qlink_motor_request_req
     return true;
 }
 
-/* A node without a position type that the document names knows no position. */
+/* A node with a position type that the document does not name has no position. */
 static bool is_position_known(const node_t *node)
 {
     return node->settings.position_type != QLINK_POSITION_TYPE_NONE &&
@@ -155,7 +155,7 @@ static qlink_motor_status_t motor_status(const node_t *node)
     return (qlink_motor_status_t)(running | (is_position_known(node) ? QLINK_MOTOR_STATUS_POSITION_VALID : 0u));
 }
 
-/* Takes a motion that is new, all of it or nothing. */
+/* Queues a new motion, all of it or nothing. */
 static bool take_motion(node_t *node, const qlink_motion_request_t *request)
 {
     if (!path_fifo_push(&node->path, request->segments, request->segments_count)) {
@@ -263,7 +263,7 @@ static bool on_loop_back(qlink_slave_t *slave, const qlink_loop_back_request_t *
 
 /* ---- The node ---- */
 
-/* A command that yours does not know: leave its function out, and it is not answered. */
+/* If your node does not know a command, leave its function out: it is not answered. */
 void node_set_functions(node_t *node)
 {
     qlink_slave_t *const slave = &node->slave;

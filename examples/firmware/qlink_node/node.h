@@ -1,11 +1,10 @@
 /*
- * A Q.link slave: an I/O and motion node that knows every command of the document. It has no clock, no pins and no
- * line of its own; main.c gives it those of the board. What the document leaves open it does as the virtual node of
- * qlinkgen does.
+ * A Q.link slave: an I/O and motion node with every command of the document. It has no clock, pins or line of its own;
+ * main.c passes those of the board. Behaviour that the document leaves open is that of qlinkgen's virtual node.
  *
- * Power-up and reset leave it stopped: it fills its FIFO and holds it until node_start, so that a broadcast starts
- * all nodes at the same time. A reset empties the FIFO, clears the outputs, forgets the counters and the motor's
- * request; number, settings, program and position stay.
+ * After power-up and reset it is stopped: it fills its FIFO and holds it until node_start, so that a broadcast starts
+ * all nodes at the same time. A reset empties the FIFO, clears the outputs, the counters and the motor's request, and
+ * keeps number, settings, program and position.
  */
 #ifndef NODE_H
 #define NODE_H
@@ -23,7 +22,7 @@
 #include "qlink.h"
 #include "settings.h"
 
-/* The counter of the last message of a kind, by which a repeat is known. */
+/* The counter of the last message of a kind, to detect a repeat. */
 typedef struct counter {
     bool known;
     uint8_t last;
@@ -33,8 +32,8 @@ struct node {
     qlink_receiver_t receiver;
     qlink_slave_t slave;
     node_settings_t settings;
-    bool settings_changed; /* by a node_setup, and not stored yet */
-    uint32_t now; /* the millisecond that it was told last */
+    bool settings_changed; /* changed by node_setup, and not stored yet */
+    uint32_t now; /* the millisecond of the last update */
     path_fifo_t path;
     io_image_t io;
     motor_t motor;
@@ -44,7 +43,7 @@ struct node {
     diagnostics_t diagnostics;
 };
 
-/* Is as after power-up, with the settings of settings_load. `inputs` are the levels that were there before: no edge. */
+/* State after power-up, with the settings of settings_load. `inputs` are the initial levels: they make no edge. */
 void node_init(node_t *node, uint32_t inputs, uint32_t now);
 
 /* The same with other settings. */
@@ -53,20 +52,20 @@ void node_power_up(node_t *node, const node_settings_t *settings, uint32_t input
 /* Fills the dispatch table with every command. */
 void node_set_functions(node_t *node);
 
-/* Lets happen what happens until now. Call it every millisecond. */
+/* Updates the node to the present time. Call it every millisecond. */
 void node_advance(node_t *node, uint32_t inputs, uint32_t now);
 
-/* Takes a byte of the line. Returns whether it completes a frame: node_answer handles it, before the next byte. */
+/* Takes a byte from the line. Returns true if it completes a frame: call node_answer before the next byte. */
 bool node_receive(node_t *node, uint8_t byte);
 
-/* Does what the frame says, if it is for this node. Returns the size of the answer to send, 0 where there is none.
+/* Handles the frame, if it is for this node. Returns the size of the answer to send, 0 if there is none.
  * `answer` takes QLINK_MAX_WIRE_SIZE bytes. */
 size_t node_answer(node_t *node, uint8_t *answer);
 
-/* Stores settings that have changed. Call it when the answer has been sent: writing may take its time. */
+/* Stores changed settings. Call it after the answer is sent: writing may take long. */
 void node_sent(node_t *node);
 
-/* Where the motor is, in encoder counts, whether or not the node tells it. */
+/* Position of the motor in encoder counts, whether or not the node reports it. */
 int32_t node_position(const node_t *node);
 
 #endif

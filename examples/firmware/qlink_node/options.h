@@ -1,4 +1,4 @@
-/* What a build may choose, each by -DNAME=VALUE. The node numbers, delays and position type can be set on the line. */
+/* Options of a build, each set by -DNAME=VALUE. Node number, delays and position type can also be set on the line. */
 #ifndef OPTIONS_H
 #define OPTIONS_H
 
@@ -9,7 +9,7 @@
 #define NODE_T1_TENTHS 10 /* from input 1 going high to output 1 going high, 0..255 tenths of a second */
 #endif
 #ifndef NODE_T2_TENTHS
-#define NODE_T2_TENTHS 10 /* the same for going low */
+#define NODE_T2_TENTHS 10 /* the same for input 1 going low */
 #endif
 #ifndef NODE_POSITION_TYPE
 #define NODE_POSITION_TYPE 0 /* QLINK_POSITION_TYPE_... */
@@ -28,7 +28,7 @@
 #endif
 
 #ifndef NODE_FIFO
-#define NODE_FIFO 48 /* path words that fit, 1..255; two bytes of RAM each */
+#define NODE_FIFO 48 /* capacity in path words, 1..255; two bytes of RAM each */
 #endif
 #if NODE_FIFO < 1 || NODE_FIFO > 255
 #error "NODE_FIFO must be 1 to 255: a byte of the motion's answer tells how many words are free"
@@ -36,15 +36,15 @@
 
 #ifndef NODE_RATE
 /* Path words a second; 0 for a motor that never moves. The words of a millisecond are done at once, NODE_FIFO of them
- * at most, and an answer that falls due meanwhile waits: on an 8-bit processor it can come late with more than some
- * ten thousand a second. */
+ * at most, and an answer waits for them: on an 8-bit processor it can be late above some ten thousand words a
+ * second. */
 #define NODE_RATE 1000
 #endif
 #ifndef NODE_STARTED
 #define NODE_STARTED 0 /* 1: the motor takes words after power-up and reset without a node_start */
 #endif
 #ifndef NODE_MOTOR_MS
-#define NODE_MOTOR_MS 50 /* until the motor has done a request, 0..65535 */
+#define NODE_MOTOR_MS 50 /* until the motor completes a request, 0..65535 */
 #endif
 
 #ifndef NODE_PROGRAM_SIZE /* bytes of a loaded program, from address 0 on; nine bits of RAM each */
@@ -59,11 +59,11 @@
 #endif
 
 #ifndef NODE_DIAGNOSTICS
-#define NODE_DIAGNOSTICS 0 /* 1 takes in counters and diagnostics.c, for tests and service */
+#define NODE_DIAGNOSTICS 0 /* 1 adds counters and diagnostics.c, for tests and service */
 #endif
 
 #ifndef BOARD_HEARS_ITSELF
-#define BOARD_HEARS_ITSELF 0 /* 1: what the node sends comes back to it, as with /RE tied low; it is dropped */
+#define BOARD_HEARS_ITSELF 0 /* 1: the node receives its own bytes, as with /RE tied low; they are dropped */
 #endif
 
 #endif

@@ -13,7 +13,7 @@ void path_fifo_init(path_fifo_t *path, uint8_t capacity, uint32_t rate, uint32_t
     path_fifo_clear(path);
 }
 
-/* The place that follows another one in the ring; no division, which an 8-bit processor is slow at. */
+/* The next index in the ring; without a division, which is slow on an 8-bit processor. */
 static uint8_t after(uint8_t place, uint8_t count)
 {
     const uint16_t sum = (uint16_t)(place + count);

@@ -1,6 +1,6 @@
 /*
- * Takes a program in pieces (section 7.6). An acknowledged piece is a stored piece: a wrong counter, text that is no
- * Intel HEX and bytes that do not fit are not acknowledged, nor is anything after them until the next opening.
+ * Takes a program in pieces (section 7.6). Every acknowledged piece is stored. Pieces with a wrong counter, text that
+ * is not Intel HEX or bytes that do not fit are not acknowledged, nor are those after them until the next opening.
  */
 #ifndef PROGRAM_STORE_H
 #define PROGRAM_STORE_H
@@ -12,15 +12,15 @@
 
 typedef enum program_state {
     PROGRAM_NONE,
-    PROGRAM_LOADING, /* opened, and the end record has not come */
+    PROGRAM_LOADING, /* opened, and the end record not received */
     PROGRAM_THERE,   /* from its end record on */
-    PROGRAM_FAULT    /* given up until the next opening */
+    PROGRAM_FAULT    /* failed; until the next opening */
 } program_state_t;
 
 typedef enum program_verdict {
     PROGRAM_OPENED,
     PROGRAM_STORED,
-    PROGRAM_REPEATED, /* acknowledged as well, and not looked at */
+    PROGRAM_REPEATED, /* acknowledged as well, and not stored again */
     PROGRAM_REFUSED   /* not to be acknowledged */
 } program_verdict_t;
 

@@ -1,7 +1,7 @@
 /*
- * The settings of the build, at each power-up: what node_setup changes lasts until the node is switched off.
+ * The settings of the build, at each power-up: changes by node_setup last until the node is switched off.
  *
- * Yours keeps them in EEPROM or flash, with a check value: settings_load falls back to these where it does not fit.
+ * Keep yours in EEPROM or flash, with a check value: settings_load falls back to these if the check value is wrong.
  */
 #include "settings.h"
 

@@ -1,4 +1,4 @@
-/* What a node is after power-up, and where that is kept while it is off. */
+/* The settings of a node after power-up, and their storage while it is off. */
 #ifndef SETTINGS_H
 #define SETTINGS_H
 
@@ -9,7 +9,7 @@ typedef struct node_settings {
     uint8_t number;
     uint8_t capacity; /* path words, up to NODE_FIFO */
     uint32_t rate;    /* path words a second */
-    bool started;     /* takes words without a node_start, after a reset too */
+    bool started;     /* the motor takes words without a node_start, also after a reset */
     uint8_t t1_tenths;
     uint8_t t2_tenths;
     uint8_t position_type;
@@ -17,10 +17,10 @@ typedef struct node_settings {
     uint16_t motor_ms;
 } node_settings_t;
 
-/* What the node begins with. */
+/* Reads the settings at power-up. */
 void settings_load(node_settings_t *settings);
 
-/* Called behind the answer to a node_setup that has changed them. */
+/* Called after the answer to a node_setup that has changed them. */
 void settings_store(const node_settings_t *settings);
 
 #endif

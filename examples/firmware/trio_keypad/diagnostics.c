@@ -6,7 +6,7 @@
 
 #include "board.h"
 
-#define OPERATION 16u /* numbers of each operation, one for each address */
+#define OPERATION 16u /* variable numbers per operation, one for each address */
 #define OVERHEAD 4u  /* bytes of a frame beyond its payload, check value included */
 
 typedef enum operation { PRESS, RELEASE, INPUTS, ROW, LOOK, RESTART } operation_t;
@@ -126,6 +126,6 @@ uint32_t diagnostics_inputs(uint32_t pins)
 
 #else
 
-typedef int diagnostics_are_left_out; /* a file of C holds something */
+typedef int diagnostics_are_left_out; /* ISO C forbids an empty translation unit */
 
 #endif

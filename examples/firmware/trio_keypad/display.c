@@ -56,7 +56,7 @@ static void control(display_t *display, uint8_t character)
     }
 }
 
-/* A character behind ESCAPE. */
+/* A character after ESCAPE. */
 static void sequence(display_t *display, uint8_t character)
 {
     if (display->escape == 1u && character == GO) {

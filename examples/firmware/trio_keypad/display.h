@@ -1,12 +1,12 @@
 /*
  * The text display.
  *
- *   12          clears it; the cursor goes home
+ *   12          clears the display; the cursor goes home
  *   14          the cursor goes home, to the upper left
- *   20          the cursor gets invisible
+ *   20          the cursor becomes invisible
  *   27, 72, p   the cursor goes to place p, counted from the upper left along the rows
  *   13, 10      start of the row, next row
- *   32 to 126   stands at the cursor, which moves on; behind the last place comes the first
+ *   32 to 126   is shown at the cursor, which moves on; after the last place follows the first
  *
  * A sequence may be spread over messages. Anything else is ignored and counted.
  */
@@ -27,7 +27,7 @@ typedef struct display {
     uint8_t cells[DISPLAY_CELLS]; /* row by row */
     uint8_t place;                /* of the cursor */
     bool cursor_visible;
-    uint8_t escape;               /* characters that have come of 27, 72, p */
+    uint8_t escape;               /* characters received of 27, 72, p */
     uint16_t ignored;
 } display_t;
 

@@ -4,10 +4,10 @@
 
 #include "diagnostics.h"
 
-#define KEY_UP 64u /* in mode ON_OFF a key that goes up sends so much more than one that goes down */
+#define KEY_UP 64u /* in mode ON_OFF a released key sends its number plus this */
 #define INPUTS 24u
 
-/* Whether a message may do something now. */
+/* Whether a message may have an effect now. */
 static bool is_told(keypad_t *keypad)
 {
     if (keypad->offset == 0u) {
@@ -105,7 +105,7 @@ void keypad_release(keypad_t *keypad, uint8_t key)
     }
 }
 
-/* The keys that have changed, as two looks agree. */
+/* The keys that have changed, debounced: two scans agree. */
 static uint32_t changes(keypad_t *keypad, uint32_t inputs)
 {
     const uint32_t agreed = ~(inputs ^ keypad->seen);

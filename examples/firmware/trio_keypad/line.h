@@ -5,7 +5,7 @@
 #include "trio.h"
 
 #ifndef BOARD_BAUD
-#define BOARD_BAUD 38400ul /* the document names no speed */
+#define BOARD_BAUD 38400ul /* the document does not specify the baud rate */
 #endif
 
 #endif

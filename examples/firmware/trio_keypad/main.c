@@ -1,4 +1,4 @@
-/* A membrane keypad of the Trio network. One UART is both sides: it receives from the node before and sends to the
+/* A membrane keypad of the Trio network. One UART for both sides: it receives from the previous node and sends to the
  * next one. */
 #include "board.h"
 #include "diagnostics.h"

@@ -1,8 +1,8 @@
-/* What may be chosen when the application is built, such as -DKEYPAD_ROWS=2u. */
+/* Options of a build, such as -DKEYPAD_ROWS=2u. */
 #ifndef OPTIONS_H
 #define OPTIONS_H
 
-/* Size of the display; at most 128 places, since CURSOR names a place by a seven-bit character. */
+/* Size of the display; at most 128 places, since CURSOR has a seven-bit place. */
 #ifndef KEYPAD_ROWS
 #define KEYPAD_ROWS 4u
 #endif
@@ -10,22 +10,22 @@
 #define KEYPAD_COLUMNS 20u
 #endif
 
-/* Silence inside a message after which it is given up, in milliseconds. */
+/* Silence within a message until it is abandoned, in milliseconds. */
 #ifndef KEYPAD_PATIENCE
 #define KEYPAD_PATIENCE 500u
 #endif
 
-/* Time between two looks at the keys, in milliseconds. A key counts when two looks agree. */
+/* Time between two scans of the keys, in milliseconds. A change counts when two scans agree. */
 #ifndef KEYPAD_DEBOUNCE
 #define KEYPAD_DEBOUNCE 10u
 #endif
 
-/* Bytes of own messages that can wait; a key press takes 3. */
+/* Size of the queue of own messages in bytes; a key press takes 3. */
 #ifndef KEYPAD_QUEUE
 #define KEYPAD_QUEUE 192u
 #endif
 
-/* Answers variables that a keypad does not have, for tests and service: see diagnostics.h. */
+/* 1: answers diagnostic variables, for tests and service: see diagnostics.h. */
 #ifndef KEYPAD_DIAGNOSTICS
 #define KEYPAD_DIAGNOSTICS 0
 #endif

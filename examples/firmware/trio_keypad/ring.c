@@ -15,7 +15,7 @@ void ring_start(ring_t *ring, trio_listener_t *listener)
 
 bool ring_has_room(const ring_t *ring)
 {
-    return ring->on_size + 2u <= sizeof ring->on; /* an end for the old message, a header for the new one */
+    return ring->on_size + 2u <= sizeof ring->on; /* the end of the old message and the header of the new one */
 }
 
 static void send_on(ring_t *ring, uint8_t byte)
@@ -29,7 +29,7 @@ static bool is_open(const ring_t *ring)
     return ring->state == RING_TAKING || ring->state == RING_PASSING || ring->state == RING_BLOCKING;
 }
 
-/* The message under way is broken: the nodes behind that have its head have to know. */
+/* The current message is broken: tell the nodes that have received its head. */
 static void break_off(ring_t *ring)
 {
     if (ring->state == RING_PASSING) {
@@ -151,7 +151,7 @@ bool ring_send(ring_t *ring, const uint8_t *frame, size_t size)
     return true;
 }
 
-/* Size of the own message that came first: up to its end byte. */
+/* Size of the oldest own message: up to its end byte. */
 static size_t first_own(const ring_t *ring)
 {
     size_t at = 1u;
@@ -161,7 +161,7 @@ static size_t first_own(const ring_t *ring)
     return at + 1u;
 }
 
-/* One at a time, so that no message of another node waits for longer than it must. */
+/* One at a time, so that a message of another node does not wait longer than necessary. */
 static void send_own(ring_t *ring)
 {
     const size_t size = first_own(ring);

@@ -1,9 +1,9 @@
 /*
- * A node of the ring: takes its messages, sends the others on, and sends its own in between.
+ * A node of the ring: receives its messages, forwards the others, and sends its own in between.
  *
- * A message to another node goes on while it still comes, a byte when the byte has come, with the address one lower in
- * its header and its end. Where it then turns out to be broken, it is ended by an end byte with the address 0, which
- * no header has: so the nodes behind drop it too. What stands between header and end is not looked at.
+ * A message to another node is forwarded byte by byte as it is received, with the address reduced by one in its header
+ * and its end. If it turns out to be broken, it is ended by an end byte with the address 0, which no header has: so
+ * the nodes after this one drop it too. The bytes between header and end are not checked.
  */
 #ifndef RING_H
 #define RING_H
@@ -18,49 +18,49 @@
 #define RING_TYPE 0x07u
 
 typedef enum ring_state {
-    RING_CLOSED,   /* no message is under way */
+    RING_CLOSED,   /* no current message */
     RING_TAKING,   /* a message for this node */
-    RING_PASSING,  /* a message for another one */
-    RING_BLOCKING, /* the same, while nothing may be sent through this node */
-    RING_HUNTING   /* behind a fault that was counted: only a header is of interest */
+    RING_PASSING,  /* a message for another node */
+    RING_BLOCKING, /* the same, while this node may not forward */
+    RING_HUNTING   /* after a counted fault: waiting for a header */
 } ring_state_t;
 
 typedef struct ring {
     trio_receiver_t receiver;   /* of the messages to this node */
-    trio_listener_t *listener;  /* gets them */
+    trio_listener_t *listener;  /* receives them */
     ring_state_t state;
-    bool passes;                /* messages to others are sent on at all */
-    uint8_t header;             /* of the message under way */
-    uint16_t count;             /* its bytes behind the header, where it is for another node */
-    uint32_t last;              /* when the last byte came, in milliseconds */
-    uint8_t on[64];             /* bytes to be sent on */
+    bool passes;                /* messages to other nodes are forwarded */
+    uint8_t header;             /* of the current message */
+    uint16_t count;             /* bytes after its header, if it is for another node */
+    uint32_t last;              /* time of the last byte, in milliseconds */
+    uint8_t on[64];             /* bytes to forward */
     uint8_t on_size;
-    uint8_t own[KEYPAD_QUEUE];  /* own messages that wait */
+    uint8_t own[KEYPAD_QUEUE];  /* queued own messages */
     uint16_t own_size;
-    uint16_t taken;             /* messages to this node that were in order; counters wrap */
-    uint16_t passed;            /* messages sent on to their end */
-    uint16_t blocked;           /* messages not sent on */
-    uint16_t cut_short;         /* broken messages whose head was sent on */
-    uint16_t frame_faults;      /* incomplete or corrupt messages, and bytes in none */
+    uint16_t taken;             /* correct messages to this node; counters wrap */
+    uint16_t passed;            /* messages forwarded to their end */
+    uint16_t blocked;           /* messages not forwarded */
+    uint16_t cut_short;         /* broken messages whose head was forwarded */
+    uint16_t frame_faults;      /* incomplete or corrupt messages, and bytes outside messages */
     uint16_t crc_faults;        /* variables to this node with a wrong check value */
 } ring_t;
 
 /* As after power-up. The listener stays. */
 void ring_start(ring_t *ring, trio_listener_t *listener);
 
-/* Whether there is room for what the next byte may have sent on. */
+/* Whether there is room for the bytes that the next byte may forward. */
 bool ring_has_room(const ring_t *ring);
 
-/* Takes the next byte from the node before. */
+/* Takes the next byte from the previous node. */
 void ring_receive(ring_t *ring, uint8_t byte, uint32_t now);
 
-/* Gives up a message that does not go on. */
+/* Abandons a message that does not continue. */
 void ring_poll(ring_t *ring, uint32_t now);
 
-/* Queues an own message, a whole frame; false where it has no room, and was not taken. */
+/* Queues an own message, a whole frame; false if there is no room for it. */
 bool ring_send(ring_t *ring, const uint8_t *frame, size_t size);
 
-/* Sends what is to be sent on, else one own message; false when there was nothing to do. */
+/* Sends the bytes to forward, else one own message; false if there was nothing to send. */
 bool ring_transmit(ring_t *ring);
 
 #endif

@@ -5,9 +5,9 @@
  *
  * The first line it prints is the path of the pty. SIGTERM and SIGINT end it.
  *
- * It has a pty of its own and not libsimavr's uart_pty: that one leaves a link with a fixed name in /tmp, prints in
- * front of the path, and its bytes wait until the sleep of the chip is over. Here they end the sleep. Simulated time
- * follows real time while the chip sleeps; while it works it runs as fast as it can, and the next sleep evens it out.
+ * It has its own pty instead of libsimavr's uart_pty: that one leaves a link with a fixed name in /tmp, prints before
+ * the path, and delivers bytes only after the sleep of the chip. Here they end the sleep. Simulated time follows real
+ * time while the chip sleeps; otherwise it runs at full speed, and the next sleep makes up the difference.
  */
 #define _GNU_SOURCE
 
@@ -31,9 +31,9 @@
 #define DEFAULT_HERTZ 18432000u
 #define UART '0'
 #define BUFFER_SIZE 256u
-#define LOOK_AFTER 20000u /* instructions without a sleep, until the pty is looked at all the same */
-#define SHORTEST_NS 50000 /* a process that sleeps for less gets up later than it asked for */
-#define SEND_MS 100       /* nobody reads for so long: the rest is gone, as it would be on a wire */
+#define LOOK_AFTER 20000u /* instructions without a sleep until the pty is polled */
+#define SHORTEST_NS 50000 /* shorter sleeps of a process last longer than requested */
+#define SEND_MS 100       /* without a reader for so long, the rest is dropped, as on a wire */
 
 typedef struct buffer {
     uint8_t bytes[BUFFER_SIZE];
@@ -41,11 +41,11 @@ typedef struct buffer {
     size_t done;
 } buffer_t;
 
-static FILE *output; /* of this program; what the simulator has to say goes to stderr */
+static FILE *output; /* of this program; messages of the simulator go to stderr */
 static int line = -1;
 static buffer_t to_chip;
 static buffer_t from_chip;
-static bool full; /* the UART of the simulator takes no more for now */
+static bool full; /* the UART of the simulator is full */
 static avr_irq_t *input;
 static struct timespec started;
 static volatile sig_atomic_t stopping;
@@ -71,7 +71,7 @@ static void open_line(void)
     if (line < 0 || grantpt(line) != 0 || unlockpt(line) != 0 || (path = ptsname(line)) == NULL) {
         die("pty");
     }
-    /* This end of the pty is never closed: the line does not hang up when a master does. */
+    /* This end of the pty is never closed: the line does not hang up when a master closes its end. */
     port = open(path, O_RDWR | O_NOCTTY);
     if (port < 0 || tcgetattr(port, &settings) != 0) {
         die(path);
@@ -143,7 +143,7 @@ static void on_full(struct avr_irq_t *irq, uint32_t value, void *unused)
 
 /* ---- Time ---- */
 
-/* Cycles that a real chip would have done by now. */
+/* Cycles of a real chip up to now. */
 static int64_t real_cycles(const avr_t *avr)
 {
     struct timespec now;
@@ -157,7 +157,7 @@ static avr_cycle_count_t least(avr_cycle_count_t one, avr_cycle_count_t other)
     return (one < other) ? one : other;
 }
 
-/* The chip sleeps for so many cycles, unless a byte comes before. */
+/* The chip sleeps for so many cycles, or until a byte is received. */
 static void on_sleep(avr_t *avr, avr_cycle_count_t cycles)
 {
     struct pollfd waiting = { .fd = line, .events = (to_chip.done == to_chip.size) ? POLLIN : 0 };
@@ -167,8 +167,8 @@ static void on_sleep(avr_t *avr, avr_cycle_count_t cycles)
     if (ahead >= SHORTEST_NS) {
         const struct timespec limit = { .tv_sec = ahead / 1000000000, .tv_nsec = ahead % 1000000000 };
         if (ppoll(&waiting, 1, &limit, NULL) > 0) {
-            /* Awake before the time: what was not slept has not passed. The caller adds all of it. The count stays
-             * above 0 in the first sleep too, or the UART would time the byte for the far end of it. */
+            /* Woken early: subtract the rest of the sleep, since the caller adds all of it. The count stays above 0 in
+             * the first sleep too, or the UART would time the byte for the end of it. */
             const int64_t left = end - real_cycles(avr);
             avr->cycle -= (left < 0) ? 0u : least(least((avr_cycle_count_t)left, cycles), avr->cycle);
         }
@@ -185,7 +185,7 @@ static void connect_uart(avr_t *avr)
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ(UART), UART_IRQ_OUTPUT), on_byte, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ(UART), UART_IRQ_OUT_XON), on_room, NULL);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ(UART), UART_IRQ_OUT_XOFF), on_full, NULL);
-    /* Bytes are not text for the terminal, and a look at the status register is no reason to sleep. */
+    /* Do not print the bytes on the terminal, and do not sleep when the status register is read. */
     (void)avr_ioctl(avr, AVR_IOCTL_UART_GET_FLAGS(UART), &flags);
     flags &= ~(uint32_t)(AVR_UART_FLAG_STDIO | AVR_UART_FLAG_POLL_SLEEP);
     (void)avr_ioctl(avr, AVR_IOCTL_UART_SET_FLAGS(UART), &flags);
@@ -200,14 +200,14 @@ static avr_t *make_chip(const char *path, uint32_t hertz)
         exit(EXIT_FAILURE);
     }
     if (elf_read_firmware(path, &firmware) != 0) {
-        (void)fprintf(stderr, "run_simavr: %s is no firmware in ELF\n", path);
+        (void)fprintf(stderr, "run_simavr: %s is not an ELF firmware\n", path);
         exit(EXIT_FAILURE);
     }
     avr_init(avr);
     firmware.frequency = hertz;
     avr_load_firmware(avr, &firmware);
     avr->sleep = on_sleep;
-    /* PD2 can interrupt: while it is low, simavr would ask in each clock of a sleep whether it still is. */
+    /* PD2 can interrupt: while it is low, simavr would poll it in each clock of a sleep. */
     avr_extint_set_strict_lvl_trig(avr, 0, 0);
     connect_uart(avr);
     return avr;
