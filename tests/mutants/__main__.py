@@ -27,6 +27,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
@@ -48,19 +49,25 @@ def main(words: Sequence[str] | None = None) -> int:
     given.results.parent.mkdir(parents=True, exist_ok=True)
     known = page.reasons()
     results = settled(given.results, mutants, known) if given.keep else {}
-    with given.results.open("a" if given.keep else "w", encoding="utf-8") as file:
-        left = [each for each in mutants if each.place.id not in results]
+    left = [each for each in mutants if each.place.id not in results]
+    with (
+        given.results.open("a" if given.keep else "w", encoding="utf-8") as file,
+        suppress(KeyboardInterrupt),
+    ):
         for mutant, result in zip(left, _judged(left, given.jobs), strict=True):
             results[result.id] = result
             print(json.dumps(asdict(result)), file=file, flush=True)
             print(_line(mutant, result), flush=True)
+    tried = [each for each in mutants if each.place.id in results]
     command = shlex.join(["python", "-m", "tests.mutants", *(sys.argv[1:] if words is None else words)])
-    run = page.Run(command, given.seed, len(places), mutants, results)
-    if given.output:
+    run = page.Run(command, given.seed, len(places), len(mutants), tried, results)
+    if given.output and tried:
         given.output.write_text(page.text(run, known), "utf-8")
     unexplained = [each for each in run.survivors if page.reason_of(each, known) == page.UNEXPLAINED]
-    print(f"{len(run.survivors)} of {len(mutants)} survive, {len(unexplained)} without a known reason")
-    return int(bool(unexplained))
+    print(f"{len(run.survivors)} of {len(tried)} survive, {len(unexplained)} without a known reason")
+    if len(tried) < len(mutants):
+        print(f"stopped; --keep goes on with the other {len(mutants) - len(tried)}")
+    return int(bool(unexplained) or len(tried) < len(mutants))
 
 
 def settled(path: Path, mutants: Sequence[Mutant], known: Sequence[page.Reason]) -> dict[str, Result]:

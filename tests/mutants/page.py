@@ -21,7 +21,7 @@ _PAGE = """\
 
 {number} mutants of `qlinkgen/plan` and `qlinkgen/model`, drawn with seed {seed} from {places} places where
 cosmic-ray changes the code. Each is tried against the tests below. {killed} are killed, {share} %.
-`tests/mutants/__main__.py` says what is not drawn, and why.
+`tests/mutants/__main__.py` says what is not drawn, and why.{stopped}
 
 `make mutants` runs it and writes this page; the last run was
 
@@ -77,11 +77,12 @@ def reason_of(mutant: Mutant, known: Sequence[Reason]) -> str:
 
 @dataclass(frozen=True)
 class Run:
-    """What was drawn and what became of it."""
+    """The mutants that were tried, of so many drawn, and their results."""
 
     command: str
     seed: int
     places: int
+    drawn: int
     mutants: Sequence[Mutant]
     results: Mapping[str, Result]
 
@@ -95,8 +96,10 @@ def text(run: Run, known: Sequence[Reason]) -> str:
     """The page."""
     results = [run.results[each.place.id] for each in run.mutants]
     killed = len(results) - len(run.survivors)
+    rest = run.drawn - len(results)
     return _PAGE.format(
         number=len(results),
+        stopped=f" The run was stopped before it tried {rest} more of those drawn." if rest else "",
         places=run.places,
         seed=run.seed,
         killed=killed,

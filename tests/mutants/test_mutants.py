@@ -146,9 +146,11 @@ def test_a_page_names_every_survivor_with_its_reason() -> None:
     mutants = [mutant_of(place, "a = 1\n", f"a = {5 * place.number}\n") for place in places]
     results = {each.id: killing.Result(each.id, None, late=False, seconds=30.0) for each in places}
     results[places[2].id] = killing.Result(places[2].id, "plan", late=True, seconds=60.0)
-    run = page.Run("python -m tests.mutants", 1, 99, mutants, results)
+    run = page.Run("python -m tests.mutants", 1, 99, 3, mutants, results)
     text = page.text(run, [page.Reason("the same", module="m.py", was="a = 1", now="a = 0")])
     assert "3 mutants" in text
+    assert "stopped" not in text
+    assert "stopped before it tried 2 more" in page.text(replace(run, drawn=5), [])
     assert "1 are killed, 33.3 %" in text
     assert "| `m.py:1` | `` a = 1 `` | `` a = 0 `` | the same |\n" in text
     assert f"| `m.py:1` | `` a = 1 `` | `` a = 5 `` | {page.UNEXPLAINED} |\n" in text
