@@ -9,7 +9,19 @@ from math import lcm
 import pytest
 
 from qlinkgen.model.integer import Integer, byte_chunks
-from qlinkgen.model.types import BitField, Constant, Count, Length, Reserved, Role, Scalar, Scaling, Settable
+from qlinkgen.model.types import (
+    Array,
+    BitField,
+    Blob,
+    Constant,
+    Count,
+    Length,
+    Reserved,
+    Role,
+    Scalar,
+    Scaling,
+    Settable,
+)
 
 _SCALES = [
     (scale, offset) for scale in ("1/10", "3/4", "7", "5/12", "-2") for offset in ("0", "1/6", "-9/4", "20")
@@ -84,6 +96,14 @@ def test_a_length_is_fixed_unless_it_is_counted() -> None:
         False,
         False,
     ]
+
+
+def test_a_default_that_is_not_given_is_nothing() -> None:
+    assert (_scalar().default, _scalar().role) == (0, Settable())
+    assert (Blob(text=False, length=Length(0, 1)).default, Array(_scalar(), Length(0, 1)).default) == (
+        b"",
+        (),
+    )
 
 
 def test_equal_layouts_are_equal() -> None:

@@ -60,6 +60,17 @@ _SHAPES = {
         [_DOUBLE, _NUMBER, _NODE, _DATA, _SUM],
         "{after: 0x7E, insert: 0x00, exempt: [start]}",
     ),
+    "wide": (
+        [
+            "start: {role: constant, value: 0x5A}",
+            "size: {role: length, type: u16, counts: [data]}",
+            "id: {role: message, type: u16}",
+            "node: {role: address, type: u16}",
+            _DATA,
+            _CRC,
+        ],
+        "",
+    ),
     "bare": ([_NUMBER, _NODE, _DATA, _SUM], ""),
 }
 _SCHEMA = """

@@ -101,3 +101,9 @@ def test_a_wrong_frame_ends_where_that_is_known(
     with pytest.raises(BadFrame) as caught:
         Codec(plan).decode(bytes.fromhex(wire), direction, bytes.fromhex(request_ or ""))
     assert (caught.value.kind, caught.value.end) == (kind, end)
+
+
+def test_a_frame_is_for_address_0_unless_another_is_said() -> None:
+    codec = Codec(_plan(_ROOT / "schemas" / "qlink.yaml"))
+    assert codec.wrap("node_sync.request", b"\x00").hex() == "a5a505050000d375"
+    assert codec.wrap("node_sync.request", b"\x00", 3)[4] == 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -206,6 +207,16 @@ _FRAMES = {
         "0x05",
     ),
 }
+
+
+@pytest.mark.parametrize(
+    ("word", "text"), [(1, "every byte"), (2, "every 2-byte word"), (4, "every 4-byte word")]
+)
+def test_a_sum_of_a_packet_is_of_bytes_or_of_words(word: int, text: str) -> None:
+    frame = _plan("schemas/mc1231a.yaml").frame
+    assert frame.check
+    sent = describe.check_text(replace(frame.check, word=word), frame)
+    assert sent == f"sum16 of command and {text}, written or read"
 
 
 @pytest.mark.parametrize("path", _FRAMES)

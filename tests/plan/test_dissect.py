@@ -19,6 +19,9 @@ from tests.plan.shapes import cases, frames
 from tests.plan.shapes import plan as plan_at
 
 _MUTANTS = 150
+_QLINK, _TRIO = (
+    Path(__file__).resolve().parents[2] / "schemas" / f"{name}.yaml" for name in ("qlink", "trio")
+)
 
 
 def _mutant(wire: bytes, others: list[tuple[bytes, bytes]], chance: random.Random) -> bytes:
@@ -69,32 +72,48 @@ def _check_place(found: Dissection, fault: Fault) -> None:
     what, wire, seen = (found.wire.hex(), fault), found.wire, fault.seen
     own = [place for span in found.spans if span.of is fault.of for place in span.places]
     rest = {span.of: span.places for span in found.spans if isinstance(span.of, Around)}
+    preamble = found.plan.frame.envelope.preamble
     match fault.rule:
         case Rule.BEGINNING:
             assert fault.at == 0, what
+            assert not preamble or preamble not in wire, what
         case Rule.FIRST:
             assert (fault.at, seen) == (0, len(rest[Around.BEFORE])), what
+            assert _begins(found, len(rest[Around.BEFORE])), what
         case Rule.WHOLE:
             assert fault.at == len(wire), what
-            assert seen is not None, what
-            assert seen > 0, what
+            assert seen, what
         case Rule.LAST:
             assert (fault.at, seen) == (rest[Around.AFTER][0], len(rest[Around.AFTER])), what
         case Rule.ALONE:
             assert fault.at == rest[Around.NEXT][0], what
+            assert _begins(found, fault.at), what
         case Rule.STUFFING if seen is not None:
             assert wire[fault.at] == seen, what
         case Rule.STUFFING | Rule.SIZE:
-            inside = sorted(place for span in found.spans if _is_payload(span.of) for place in span.places)
-            if inside:
-                assert fault.at == (inside[-1] + 1 if fault.rule is Rule.STUFFING else inside[0]), what
+            inside = _payload_places(found)
+            end = inside[-1:] if fault.rule is Rule.STUFFING else [each - 1 for each in inside[:1]]
+            assert end in ([], [fault.at - 1]), what
         case Rule.VALUE:
             assert fault.at in own, what
         case _:
             assert own[:1] == [fault.at] or fault.at in rest[Around.NEXT], what
+            assert fault.rule is not Rule.LENGTH or Around.AFTER not in rest, "the payload is what is left"
+
+
+def _begins(found: Dissection, at: int) -> bool:
+    """Whether a frame may begin at a place."""
+    first = found.plan.frame.envelope.parts[0]
+    if isinstance(first, MarkPart):
+        return bool(found.wire[at] & first.marker)
+    return found.wire[at:].startswith(found.plan.frame.envelope.preamble)
 
 
 _ENVELOPE = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | CheckPart
+
+
+def _payload_places(found: Dissection) -> list[int]:
+    return sorted(place for span in found.spans if _is_payload(span.of) for place in span.places)
 
 
 def _is_payload(of: Owner) -> bool:
@@ -128,3 +147,83 @@ def test_a_frame_that_is_cut_lacks_what_was_cut(path: Path | str, direction: Dir
             if missing and not whole.kind:
                 faults = {fault.rule: fault for fault in dissect(plan, wire[:cut], direction).faults}
                 assert (faults[Rule.WHOLE].at, faults[Rule.WHOLE].seen) == (cut, missing)
+
+
+@pytest.mark.parametrize(
+    ("sent", "faults"),
+    [
+        ("07 01 00 7E 01 02", []),
+        ("07 01 7E 7E 7E 01 02", []),
+        ("07 01 00 01 7E 7E 7E", []),
+        ("07 01 00 01 7E 7E", [("stuffing", 11, None)]),
+        ("07 01 7E 7E 05 06", [("stuffing", 9, 5)]),
+        ("07 01 7E 7E 05 06 7E 7E", [("stuffing", 9, 5), ("stuffing", 13, None)]),
+    ],
+)
+def test_a_byte_that_is_not_inserted_into_a_payload(
+    sent: str, faults: list[tuple[str, int, int | None]]
+) -> None:
+    plan = plan_at("stuffed_payload")
+    codec, message = Codec(plan), plan.message("counted.request")
+    wire = codec.join(message, codec.cells(message, bytes.fromhex(sent), 3))
+    found = dissect(plan, wire, "request")
+    assert [(fault.kind, fault.at, fault.seen) for fault in found.faults] == faults
+
+
+def _places(found: Dissection) -> str:
+    """The places of each span, with what is wrong."""
+    texts = []
+    for span in found.spans:
+        name = span.of.value if isinstance(span.of, Around) else span.of.name
+        texts.append(f"{name} {span.places[0]}..{span.places[-1]}{span.fault and f' {span.fault}'}")
+    return ", ".join(texts)
+
+
+def _faults(found: Dissection) -> list[tuple[str, Rule, int, int | None]]:
+    return [(fault.kind, fault.rule, fault.at, fault.seen) for fault in found.faults]
+
+
+@pytest.mark.parametrize(
+    ("after", "spans", "faults"),
+    [
+        ("", "", []),
+        ("00", ", inserted 8..8", []),
+        ("01", ", after 8..8 length", [("length", Rule.LAST, 8, 1)]),
+        ("A5", ", after 8..8 length", [("length", Rule.LAST, 8, 1)]),
+        ("00 00", ", inserted 8..8, after 9..9 length", [("length", Rule.LAST, 9, 1)]),
+    ],
+)
+def test_a_frame_that_ends_with_the_stuffed_byte(
+    after: str, spans: str, faults: list[tuple[str, Rule, int, int | None]]
+) -> None:
+    """The byte inserted after it belongs to it, and may be missing."""
+    plan = plan_at(_QLINK)
+    found = dissect(plan, bytes.fromhex("A5 A5 05 05 00 DD C9 A5" + after), "request")
+    frame = "preamble 0..1, length 2..2, command 3..3, node 4..4, counter 5..5, crc 6..7"
+    assert (_places(found), _faults(found)) == (frame + spans, faults)
+
+
+@pytest.mark.parametrize(
+    ("size", "check", "end", "spans", "faults"),
+    [
+        (12, "7904", "98", "value 3..12, checksum 13..14, end 15..15", []),
+        (12, "7904", "", "value 3..12, checksum 13..14", [("truncated", Rule.WHOLE, 15, 1)]),
+        (12, "79", "", "value 3..12, checksum 13..13 truncated", [("truncated", Rule.WHOLE, 14, 2)]),
+        (12, "", "98", "value 3..12, end 13..13", [("frame", Rule.SIZE, 1, 12)]),
+        (12, "79", "98", "value 3..12, extra 13..13 length, end 14..14", [("frame", Rule.SIZE, 1, 13)]),
+        (
+            13,
+            "7904",
+            "98",
+            "value 3..12, extra 13..13 length, checksum 14..15 crc, end 16..16",
+            [("frame", Rule.SIZE, 1, 13), ("crc", Rule.CHECK, 14, 0x479)],
+        ),
+    ],
+)
+def test_a_check_value_precedes_the_end(
+    size: int, check: str, end: str, spans: str, faults: list[tuple[str, Rule, int, int | None]]
+) -> None:
+    """Between two marks is the payload, and the check value if there is room for both."""
+    wire = b"\x9a" + bytes(size) + bytes.fromhex(check + end)
+    found = dissect(plan_at(_TRIO), wire, "message")
+    assert (_places(found), _faults(found)) == (f"header 0..0, number 1..2, {spans}", faults)
