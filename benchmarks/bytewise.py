@@ -25,7 +25,7 @@ class BytewiseReceiver:
         self._body = bytearray()
 
     def feed(self, chunk: bytes) -> list[Response | None]:
-        """Take the next bytes of the stream."""
+        """Process the next bytes of the stream."""
         found: list[Response | None] = []
         for byte in chunk:
             if self._state == 3:

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print, write, check; 1 if the budget is exceeded, 2 if a tool is missing."""
     options = _options(arguments)
-    # Works in a bare checkout too: this package, the compiler and the generated code are found from here.
+    # Without installation this package, the compiler and the generated code are found from here.
     sys.path.insert(0, str(ROOT))
     run = importlib.import_module("benchmarks.firmware_run")
     status: int = run.main(write=options.write, check=options.check)

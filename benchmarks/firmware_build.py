@@ -39,7 +39,7 @@ class Target:
     call: int  # bytes that a call instruction puts on the stack
 
     def tool(self, name: str) -> str:
-        """The path of one of its tools: gcc, size, nm, objdump."""
+        """The path of a tool: gcc, size, nm, objdump."""
         return tool(f"{self.prefix}-{name}", self.package)
 
     def version(self) -> str:

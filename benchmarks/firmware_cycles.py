@@ -1,4 +1,4 @@
-"""Clock cycles on an ATmega328P, counted by simavr: receiving a byte, making a frame, a slave's answer."""
+"""Clock cycles on an ATmega328P, counted by simavr: receiving a byte, encoding a frame, a slave's answer."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.firmware_size import CRC_FORMS
 
 SIMAVR = Path("/usr/include/simavr/sim_avr.h")
 
-# The marks of benchmarks/firmware/cycles.c, and what its FRAME chooses.
+# The marks of benchmarks/firmware/cycles.c, and the values of its FRAME.
 _BEGIN, _END, _FRAME_END, _ENCODE_BEGIN, _ENCODE_END, _ANSWER_BEGIN, _ANSWER_END, _WRONG = range(1, 9)
 FRAMES = {
     "motion.response": 0,
@@ -36,7 +36,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Frame:
-    """Cycles for one frame: making it, and each call that receives a byte of it."""
+    """Cycles for one frame: encoding it, and each call that receives a byte of it."""
 
     encode: int
     receive: tuple[int, ...]

@@ -23,7 +23,7 @@ PROTOCOLS = ("qlink", "trio")
 
 @dataclass(frozen=True)
 class Core:
-    """One program of the core less the same without it."""
+    """A program with the core less the same program without it."""
 
     size: Size
     stack: int

@@ -1,4 +1,4 @@
-"""The whole slave of examples/firmware on each chip: size and depth of its stack."""
+"""The slave of examples/firmware on each chip: size and stack depth."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ class CallGraph:
         self.functions = _functions(listing)
         self.measured = usages(stacks or program.parent)
         for name, function in self.functions.items():
-            # A copy made for constant arguments has a names must be unique here, such as wrap.constprop.0.
+            # A copy made for constant arguments has its own name here, such as wrap.constprop.0.
             usage = self.measured.get(name, self.measured.get(name.partition(".")[0]))
             if usage is not None:
                 function.frame, function.compiled = usage - target.call, True

@@ -63,7 +63,7 @@ def raw_client(name: str, request: bytes) -> Client:
 
 
 def section(rounds: int) -> Section:
-    """All clients in turns."""
+    """All clients, interleaved."""
     result = Section("MC1231A transactions over a pty", INTRO, ["", "us", "x raw", "CPU us"])
     with contextlib.ExitStack() as stack:
         pairs = [_pair(stack, kind) for kind in ("write", "read")]

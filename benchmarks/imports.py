@@ -35,7 +35,7 @@ def _site() -> list[str]:
 
 
 def section(rounds: int) -> Section:
-    """Bare, generated and known imports, interleaved."""
+    """Imports of nothing, of generated modules and of known ones, interleaved."""
     result = Section(
         "Import time over a bare interpreter", INTRO, ["", "wall, best", "wall, median", "CPU, median"]
     )

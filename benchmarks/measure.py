@@ -27,7 +27,7 @@ class Case:
 
 @dataclass
 class Timing:
-    """Seconds for one operation, one entry a round."""
+    """Seconds for one operation, one entry per round."""
 
     rounds: list[float] = field(default_factory=list)
 
@@ -46,7 +46,7 @@ class Timing:
         return self.best / base.best
 
     def spread_over(self, base: Timing) -> tuple[float, float]:
-        """The middle half of the ratios taken round by round."""
+        """The middle half of the ratios of each round."""
         ratios = [mine / its for mine, its in zip(self.rounds, base.rounds, strict=True)]
         low, _, high = statistics.quantiles(ratios, n=4)
         return low, high

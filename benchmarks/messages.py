@@ -37,7 +37,7 @@ REQUEST_DATA = REQUEST_STRUCT.pack(*REQUEST_VALUES)
 
 
 def wrap(command: int, node: int, data: bytes) -> bytes:
-    """Q.link's frame by hand, the quick way: length, CRC and stuffing by the standard library's C code."""
+    """Q.link's frame by hand, optimised: length, CRC and stuffing by C code of the standard library."""
     body = bytes((len(data) + 4, command, node)) + data
     body += crc_hqx(body, 0xFFFF).to_bytes(2, "big")
     if 0xA5 in body:

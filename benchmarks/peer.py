@@ -18,7 +18,7 @@ KEYWORDS = ", ".join(f"{name}={value}" for name, value in messages.RESPONSE._asd
 
 
 class PeerMissing(Exception):
-    """A peer that cannot be measured here; the text says what to install."""
+    """A peer that cannot be measured; the text names the package to install."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def construct_fields(compiled: bool) -> Peer:
 
 
 def construct_frame(compiled: bool) -> Peer:
-    """Length, command and CRC in construct as well; only the stuffing is done outside, by bytes.replace."""
+    """Length, command and CRC in construct as well; only the stuffing is done by bytes.replace."""
     construct = load("construct")
     body = construct.Struct(
         "length" / construct.Const(13, construct.Int8ub),

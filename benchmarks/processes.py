@@ -11,7 +11,7 @@ from benchmarks.measure import Timing
 
 
 class Run:
-    """One command, run again and again."""
+    """One command, run repeatedly."""
 
     def __init__(self) -> None:
         self.wall = Timing()
@@ -29,7 +29,7 @@ class Run:
 
 
 def _cpu() -> float:
-    """Seconds of CPU time of all child processes so far; os.times() would only count in ticks of 10 ms."""
+    """Seconds of CPU time of all child processes so far; os.times() counts only ticks of 10 ms."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 

@@ -80,7 +80,7 @@ def _row(peer: Peer, timings: dict[str, Timing]) -> list[str]:
 
 
 def section(rounds: int) -> Section:
-    """Every peer, all four kinds of work, in one interleaved run."""
+    """Every peer and all four kinds of work, in one interleaved run."""
     result = Section(
         "motion.response in Python, over raw struct", INTRO, ["", "encode", "build", "decode", "read"]
     )

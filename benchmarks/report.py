@@ -96,7 +96,7 @@ def section_markdown(section: Section) -> str:
 
 
 def page(intro: str, sections: Sequence[Section]) -> str:
-    """The whole of docs/benchmarks.md: goals first, then every table."""
+    """The text of docs/benchmarks.md: goals first, then every table."""
     goals = [goal.cells() for section in sections for goal in section.goals]
     parts = [intro, "## Goals", as_markdown(GOAL_COLUMNS, goals)]
     return "\n\n".join(parts) + "\n\n" + "\n".join(section_markdown(section) for section in sections)

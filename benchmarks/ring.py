@@ -57,7 +57,7 @@ def _way(address: int, cut_through: bool) -> float:
 
 
 class Slices:
-    """Times one way to do something, slice by slice."""
+    """Times one operation, slice by slice."""
 
     def __init__(self) -> None:
         self.wall = measure.Timing()
@@ -88,7 +88,7 @@ def pass_bytes(node: RingNode) -> None:
 
 
 class MemoryRing:
-    """15 nodes on memory ports, served in turns by one thread."""
+    """15 nodes on memory ports, served by one thread."""
 
     def __init__(self) -> None:
         self.nodes = [CoordinatorNode() for _ in range(NODES)]
@@ -162,7 +162,7 @@ def first_byte(descriptor: int) -> float:
 
 
 def host_latency(rounds: int) -> tuple[float, float]:
-    """Median seconds of a raw process and of a node, in turns."""
+    """Median seconds of a raw process and of a node, interleaved."""
     raw: list[float] = []
     node: list[float] = []
     with responder("raw") as plain, responder("node") as ours:
@@ -173,7 +173,7 @@ def host_latency(rounds: int) -> tuple[float, float]:
 
 
 def section(rounds: int) -> Section:
-    """Everything."""
+    """All measurements of the ring."""
     result = Section("A node of the Trio ring", INTRO, ["", "figure", "unit"])
     cut, store = hop_latency(cut_through=True), hop_latency(cut_through=False)
     whole, bytewise, turns, threads = Slices(), Slices(), Slices(), Slices()

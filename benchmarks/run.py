@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def main() -> int:
-    # Works in a bare checkout too: this package, the compiler and the generated code are found from here.
+    # Without installation this package, the compiler and the generated code are found from here.
     sys.path.insert(0, str(ROOT))
     status: int = importlib.import_module("benchmarks.suite").main()
     return status

@@ -82,7 +82,7 @@ def _mavlink_case() -> Case:
 
 
 def section(rounds: int) -> Section:
-    """Generated decoder, a byte-at-a-time one in Python, and pymavlink, interleaved."""
+    """The generated decoder, a decoder that works byte by byte in Python, and pymavlink, interleaved."""
     result = Section("Stream decoder, pieces of 1 to 64 bytes", INTRO, ["", "x raw unpack", "MB/s at 100 ns"])
     streams = _qlink_streams()
     cases = [_case(f"generated Python, {kind}", generated, stream) for kind, stream in streams.items()]

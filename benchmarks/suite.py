@@ -1,4 +1,4 @@
-"""All measurements, one after the other; the text for the terminal, and the page for docs/."""
+"""All measurements, one after the other; text for the terminal, and the page for docs/."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def pymodbus_client(name: str) -> Client:
 
 
 def minimalmodbus_client(name: str) -> Client:
-    """An instrument of minimalmodbus."""
+    """A client of minimalmodbus."""
     module = load("minimalmodbus")
     instrument = module.Instrument(name, 1)
     instrument.serial.baudrate = TIMING.baud

@@ -1,7 +1,7 @@
 /*
- * Cycles on the AVR, for run_cycles: receiving each byte of a frame, and making one. FRAME chooses what is sent and
- * received: 0 a motion response without a byte to stuff, 1 one whose every byte of data is stuffed; 2 and 3 the same of
- * the longest motion request; 4 a slave that answers a frame of 2 with one of 1; 5 the same for 3.
+ * Cycles on the AVR, for run_cycles: receiving each byte of a frame, and encoding one. FRAME selects the frame: 0 a
+ * motion response without stuffed bytes, 1 one with every data byte stuffed; 2 and 3 likewise for the longest motion
+ * request; 4 a slave that answers frame 2 with frame 1; 5 the same for frame 3.
  */
 #include <avr/interrupt.h>
 #include <avr/io.h>

@@ -1,5 +1,5 @@
 /*
- * Sends requests to a slave's program for an ATmega328P in simavr, and prints how long it takes to answer.
+ * Sends requests to a slave program for an ATmega328P in simavr, and prints its response times.
  *
  *   run_answer program.elf HERTZ PHASES SCENE...
  *
