@@ -148,7 +148,8 @@ def test_the_stack_is_as_deep_as_computed(
 SOURCES = {
     "recursion": "__attribute__((noinline)) int f(int n) { return n != 0 ? f(n - 1) * port + 1 : port; }",
     "calls through a pointer": "int (*volatile to)(int); int f(int n) { return to(n) + 1; }",
-    "stack frame of variable size": "int f(int n) { volatile char a[n]; a[n / 2] = 1; return a[port] + port; }",
+    "stack frame of variable size": "int f(int n) "
+    "{ volatile char a[n]; a[n / 2] = 1; return a[port] + port; }",
 }
 
 
