@@ -35,7 +35,7 @@ HEX = b":04000000A5A500FFB3\r\n:00000001FF\r\n"
 
 
 def session(bus: Bus, seed: int) -> Iterator[object]:
-    """Call everything; what comes back depends on the node alone."""
+    """Call every command; the results depend only on the node."""
     chance = random.Random(seed)
     yield bus.node_setup(1, node_number=4, t1_delay=1.5, t2_delay=25.5, position_type=2)
     yield bus.node_setup(4, node_number=3, t1_delay=0.0, t2_delay=0.0, position_type=2)

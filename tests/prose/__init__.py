@@ -1,8 +1,8 @@
-"""A word list for prose: turns of phrase that a reader stumbles on, with what to say instead.
+"""A word list for prose: phrases that readers stumble over, and their replacements.
 
-`make lint` runs `python -m tests.prose`, which looks through every text of the project that is not generated.
-Files that were written before the list and have not changed since are left alone: `untouched.txt` has their
-digests. Reword such a file when you change it; `--forget` then takes out its line.
+`make lint` runs `python -m tests.prose`, which searches every text of the project that is not generated.
+Files that were written before the list and have not changed since are exempt: `untouched.txt` has their
+digests. Reword such a file when you change it; `--forget` then removes its line.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 UNTOUCHED = Path(__file__).with_name("untouched.txt")
 KINDS = ("*.py", "*.md", "*.j2", "*.yaml", "*.c", "*.h", "*.toml", "Makefile")
-#: Not ours to word: generated, or the list itself and its tests.
+#: Not searched: generated files, and the list itself with its tests.
 ELSEWHERE = ("generated/", "tests/prose/", "qlinkgen/codecs", "tests/c/corpus/")
 
-#: What is looked for, and what to say.
+#: Patterns, and the advice for each.
 PHRASES: Mapping[str, str] = {
     r"\b(stand|stands|stood) (in|at|behind|alone|there|for|on|beside|between)\b": "is, occurs, appears",
     r"\bin front of\b": "before",
@@ -31,15 +31,23 @@ PHRASES: Mapping[str, str] = {
     r"\bof no (bytes|data|items)\b": "empty; without data",
     r"\b[Ww]hat is not there\b": "name the thing that is missing",
     r"\bmisfits?\b": "LayoutError; a frame that does not fit",
+    r"\bknows? (nothing|better)\b": "does not depend on; lacks",
+    r"\bgoes? both ways\b": "in both directions",
+    r"\bcomes? out\b": "is delivered, results",
+    r"\b(takes?|took|taken|taking) apart\b": "divide, decode",
+    r"\bleft alone\b": "unchanged, omitted",
+    r"\bha(s|ve) to (say|know)\b": "must state, needs",
+    r"\b(whom?|what) (it|they) (is|are) for\b": "the recipient, the purpose",
+    r"\bin (its|their) stead\b": "instead",
 }
-#: Between two words a line may end, with what begins a line of a comment.
+#: A gap between words; it may contain a line end and the mark of a comment line.
 _GAP = r"(?:[ \t]|\n[ \t]*(?:#:? |[*>] |// )?)+"
 _PATTERNS = {re.compile(each.replace(" ", _GAP)): better for each, better in PHRASES.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """A turn of phrase in a file."""
+    """A phrase of the list in a file."""
 
     path: str
     line: int
@@ -47,12 +55,12 @@ class Hit:
     advice: str
 
     def __str__(self) -> str:
-        """As compilers print it."""
+        """In the format of compiler messages."""
         return f"{self.path}:{self.line}: '{self.phrase}'; say: {self.advice}"
 
 
 def texts() -> Iterator[tuple[str, str]]:
-    """Every text of the project by its path, whether committed or about to be."""
+    """Path and text of every file of the project, committed or not yet."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *KINDS]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for path in filter(None, listed.split("\0")):
@@ -62,7 +70,7 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 def hits(path: str, text: str) -> list[Hit]:
-    """The turns of phrase in a text; one that is broken over two lines is found too."""
+    """The phrases of the list in a text, including those split over two lines."""
     found = [(each, better) for pattern, better in _PATTERNS.items() for each in pattern.finditer(text)]
     return [
         Hit(path, text.count("\n", 0, each.start()) + 1, " ".join(each[0].split()), better)
@@ -71,10 +79,10 @@ def hits(path: str, text: str) -> list[Hit]:
 
 
 def digest(path: str, text: str) -> str:
-    """What tells whether a file is the one that it was."""
+    """Hash and path of a file, as a line of the list of exempt files."""
     return f"{hashlib.sha256(text.encode()).hexdigest()[:16]} {path}"
 
 
 def untouched() -> set[str]:
-    """Files as they were before the list."""
+    """Lines of the list of exempt files."""
     return set(UNTOUCHED.read_text("utf-8").splitlines())

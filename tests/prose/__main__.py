@@ -8,7 +8,7 @@ from tests.prose import UNTOUCHED, digest, hits, texts, untouched
 
 
 def main(arguments: list[str]) -> int:
-    """`--forget` takes out the files that changed or need no rewording any more."""
+    """`--forget` removes exempt files that changed or need no rewording any more."""
     before, found = untouched(), []
     left = set()
     for path, text in texts():
