@@ -22,7 +22,7 @@ static size_t sizes[MESSAGES];
 static size_t capacity = ROOM; /* volatile: both sides check it at run time */
 static unsigned sink;
 
-/* Not inlined: the compiler knows nothing about the arguments. */
+/* Not inlined: the arguments are unknown to the compiler. */
 #define CALL static __attribute__((noinline))
 
 CALL int call_hand_encode(const hand_response *message, uint8_t *wire, size_t room)

@@ -72,7 +72,7 @@ def test_lives_until_a_signal(port: str, copied: Path, require_tool: Tool, missi
             copied / "build" / "atmega328p-qlink_node.elf",
         ]
     with running(*command) as (process, path):
-        for _ in range(3):  # meanwhile nobody holds the line
+        for _ in range(3):  # meanwhile the line is free
             with Bus.open(path, slack=HANGS, echo="none") as bus:
                 assert bus.node(1).loop_back(data=b"\x00\xa5\x00").data == b"\x00\xa5\x00"
         if Path("/proc/self/stat").exists():
@@ -118,7 +118,7 @@ def test_a_node_that_hears_itself_drops_its_answers(copied: Path, require_tool: 
             port.write(wire)  # /RE is tied low
         port.write(SECOND)
         assert answer_of(port, SECOND) == SECOND
-        # Another byte is the end of the echo: what comes behind it is a request.
+        # Another byte ends the echo: the bytes after it are a request.
         port.write(b"\0" + FIRST)
         assert answer_of(port, FIRST) == FIRST
         port.write(FIRST)

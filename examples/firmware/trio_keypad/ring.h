@@ -57,7 +57,7 @@ void ring_receive(ring_t *ring, uint8_t byte, uint32_t now);
 /* Abandons a message that does not continue. */
 void ring_poll(ring_t *ring, uint32_t now);
 
-/* Queues an own message, a whole frame; false if there is no room for it. */
+/* Queues an own message, a whole frame; false if it does not fit. */
 bool ring_send(ring_t *ring, const uint8_t *frame, size_t size);
 
 /* Sends the bytes to forward, else one own message; false if there was nothing to send. */
