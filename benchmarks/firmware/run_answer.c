@@ -6,8 +6,8 @@
  * A SCENE is one request or several in hexadecimal digits, with + between them. Each is played PHASES times, the end of
  * its last request at one of that many parts of a millisecond, so that the millisecond's interrupt occurs at all points
  * around it. A line is printed for each request: the clock cycle at which its last byte was complete, the cycles until
- * the first byte of the answer is written to the UART, and the answer; 0 and - if there is none within a millisecond. The
- * last line is the most bytes of stack in use. Status 1: the program ended, or did not answer the last request of a
+ * the first byte of the answer is written to the UART, and the answer; 0 and - if there is none within a millisecond.
+ * The last line is the most bytes of stack in use. Status 1: the program ended, or did not answer the last request of a
  * scene.
  */
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-"""Firmware for every test in here: see `fixtures`."""
+"""Firmware for all tests in this folder: see `fixtures`."""
 
 from __future__ import annotations
 

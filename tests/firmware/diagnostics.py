@@ -1,4 +1,4 @@
-"""What the example firmware tells of itself: motor requests that begin with 7E D1 are for the node.
+"""Diagnostics of the example firmware: motor requests that begin with 7E D1 are for the node.
 
 examples/firmware/qlink_node/diagnostics.c is the other side.
 """
@@ -13,14 +13,14 @@ from typing import NamedTuple
 from qlinkgen.codecs import qlink
 
 MARK = b"\x7e\xd1"
-#: An answer that begins so refuses the operation in its second byte.
+#: First byte of an answer that refuses the operation in its second byte.
 REFUSED = 0xFF
-#: Bytes of the program that one answer can carry.
+#: Most bytes of the program in one answer.
 MOST_BYTES = 24
 
 
 class Op(IntEnum):
-    """What can be asked."""
+    """Operations."""
 
     COUNTERS = 1
     MORE_COUNTERS = 2
@@ -36,7 +36,7 @@ class Op(IntEnum):
 
 
 class ProgramState(IntEnum):
-    """How far a load has come."""
+    """The progress of a load."""
 
     NONE = 0
     LOADING = 1
@@ -45,7 +45,7 @@ class ProgramState(IntEnum):
 
 
 class Counters(NamedTuple):
-    """As `NodeStatistics` has them, but for those that the firmware does not keep."""
+    """The counters of `NodeStatistics` that the firmware keeps."""
 
     requests: int
     motions: int
@@ -67,7 +67,7 @@ class Counters(NamedTuple):
 
 
 class Program(NamedTuple):
-    """A load of a program: `size` of what it has put into memory, `crc` of its text since the opening."""
+    """A load of a program: `size` in memory, `crc` of its text since the opening."""
 
     state: ProgramState
     size: int
@@ -75,7 +75,7 @@ class Program(NamedTuple):
 
 
 class State(NamedTuple):
-    """The node at this moment; `lost` counts bytes that its receive buffer had no room for."""
+    """The state of the node; `lost` counts bytes lost because its receive buffer was full."""
 
     outputs: int
     inputs: int
@@ -95,10 +95,10 @@ _STATE = struct.Struct(">3s3siBBBIH")
 
 
 class Diagnostics:
-    """Asks and tells a node; every call is done at once.
+    """Reads and sets the state of a node; every call takes effect at once.
 
     Args:
-        exchange: sends the data of a motor request and returns that of the poll which follows.
+        exchange: sends the data of a motor request and returns that of the following poll.
     """
 
     def __init__(self, exchange: Callable[[bytes], bytes]) -> None:
@@ -111,14 +111,14 @@ class Diagnostics:
         return answer[1:]
 
     def counters(self) -> Counters:
-        """Return everything that is counted."""
+        """Return all counters."""
         first = _FIRST.unpack(self._ask(Op.COUNTERS))
         second = _SECOND.unpack(self._ask(Op.MORE_COUNTERS))
         third = _PROGRAM.unpack(self._ask(Op.PROGRAM))
         return Counters(*first, *second, *third[:4])
 
     def program(self) -> Program:
-        """Return how far the load is."""
+        """Return the state of the load."""
         state, size, crc = _PROGRAM.unpack(self._ask(Op.PROGRAM))[4:]
         return Program(ProgramState(state), size, crc)
 
@@ -140,7 +140,7 @@ class Diagnostics:
         self._ask(Op.INPUTS, inputs.to_bytes(3, "big") + bytes((power_up,)))
 
     def state(self) -> State:
-        """Return the node at this moment."""
+        """Return the state of the node."""
         outputs, inputs, *rest = _STATE.unpack(self._ask(Op.STATE))
         position, waiting, started, running, milliseconds, lost = rest
         return State(
@@ -167,7 +167,7 @@ class Diagnostics:
         number: int,
         motor_seconds: float,
     ) -> None:
-        """Let the node be as after power-up with these settings; see `VirtualNode` for each."""
+        """Put the node in the state after power-up with these settings; see `VirtualNode` for each."""
         tenths = (round(10 * t1_delay), round(10 * t2_delay))
         head = struct.pack(">BIB", capacity, rate, started)
         tail = struct.pack(
@@ -176,11 +176,11 @@ class Diagnostics:
         self._ask(Op.CONFIGURE, head + tail)
 
     def set_position(self, position: int) -> None:
-        """Put the motor somewhere."""
+        """Set the position of the motor."""
         self._ask(Op.POSITION, struct.pack(">i", position))
 
     def disable(self, commands: Iterable[str]) -> None:
-        """Take these commands out of the dispatch table, and put all others in."""
+        """Remove these commands from the dispatch table, and add all others."""
         names = list(qlink.COMMANDS)
         gone = {names.index(command) for command in commands}
         mask = sum(1 << bit for bit in range(len(names)) if bit not in gone)

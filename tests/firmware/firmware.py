@@ -1,6 +1,6 @@
 """The example firmware, built and running: each port as a process with a serial line.
 
-No pytest in here: the soak uses it as well.
+Without pytest, since the soak uses it as well.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from tests.support.sharing import locked
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ROOT / "examples" / "firmware"
-#: Seconds after which a program that ought to have said or done something hangs.
+#: Seconds without a reaction after which a program counts as hanging.
 HANGS = 30.0
-#: The line on which a program names its end of the serial line: QEMU puts words around the path.
+#: The line with the path of the serial line: QEMU adds words around it.
 _PATH = re.compile(rb"(/dev/[\w/.-]+)[^\n]*\n")
-# A make that has started the tests must not tell the one in here how to work.
+# Options of an outer make must not affect make in the tests.
 _OUTER_MAKE = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}
-#: Words that the node of the tests can queue: all that a byte can tell.
+#: Capacity of the tests' node in words: the largest value of a byte.
 FIFO = 255
-#: Bytes of a program that it can hold, which every port has room for.
+#: Size of its program memory in bytes, which fits every port.
 PROGRAM_SIZE = 512
 _NODE = f"-DNODE_DIAGNOSTICS=1 -DNODE_FIFO={FIFO} -DNODE_PROGRAM_SIZE={PROGRAM_SIZE}"
 
 
 @dataclass(frozen=True)
 class Target:
-    """One port of the firmware, and what it takes to build and run it.
+    """One port of the firmware, and the tools to build and run it.
 
     Attributes:
         name: folder of the port.
-        tools: (program, Debian package) of what is needed beside make.
-        headers: (header, compiler that has to find it, Debian package).
-        goals: what make is to make.
-        command: what runs the program; {build} is the folder of the build, {program} the program.
+        tools: (program, Debian package) needed in addition to make.
+        headers: (header, compiler that uses it, Debian package).
+        goals: goals for make.
+        command: the command to run the program; {build} is the folder of the build, {program} the program.
         options: for the compiler, when the node is built for tests.
-        pinned: keep it to one processor. QEMU's threads hand every byte to and fro, which costs twice as much
+        pinned: run it on one processor only. QEMU's threads exchange every byte, which costs twice as much
             between two processors and can be many times as slow.
     """
 
@@ -86,7 +86,7 @@ TARGETS = {
             (("avr/io.h", "avr-gcc", "avr-libc"), ("simavr/sim_avr.h", "cc", "libsimavr-dev")),
             goals=("program", "simulator"),
             command=("{build}/run_simavr", "{program}"),
-            # Of the baud rates that a crystal of 18.432 MHz has: simulated bytes take their time.
+            # A baud rate for a crystal of 18.432 MHz: simulated bytes take time.
             options=f"{_NODE} -DBOARD_BAUD=1152000",
         ),
     )
@@ -94,23 +94,23 @@ TARGETS = {
 
 
 class BuildFailed(Exception):
-    """make has said no; the text is what it wrote."""
+    """make has failed; the text is its output."""
 
 
 def build(target: str, app: str, folder: Path, options: str = "") -> Path:
-    """Build an application for a port, once for all processes that name the same folder.
+    """Build an application for a port, once for all processes with the same folder.
 
     Args:
         target: name of the port.
         app: "qlink_node" or "trio_keypad".
-        folder: where the results go; never the source tree.
+        folder: of the results; never the source tree.
         options: for the compiler, such as "-DNODE_FIFO=128".
 
     Returns:
         The program.
 
     Raises:
-        BuildFailed: with what make wrote.
+        BuildFailed: with the output of make.
     """
     folder.mkdir(parents=True, exist_ok=True)
     program = folder / (f"{target}-{app}" if target == "posix" else f"{target}-{app}.elf")
@@ -136,7 +136,7 @@ def build(target: str, app: str, folder: Path, options: str = "") -> Path:
 def has_header(header: str, compiler: str) -> bool:
     """Return whether a compiler finds a header."""
     source = f"#include <{header}>\n".encode()
-    # A header of a library may include another that only a further option finds: only the first one counts.
+    # A header of a library may include others that need further options: only the first one counts.
     run = subprocess.run(
         [compiler, "-E", "-M", "-MG", "-x", "c", "-"], input=source, capture_output=True, check=False
     )
@@ -152,12 +152,12 @@ class Firmware:
     """
 
     def __init__(self, target: str, program: Path, *, processor: int | None = None) -> None:
-        """Choose; `start` or a `with` runs it.
+        """Choose a program; `start` or a `with` runs it.
 
         Args:
             target: name of the port.
-            program: as `build` has returned it.
-            processor: number of the processor that it has to keep to.
+            program: the result of `build`.
+            processor: number of the only processor to run it on.
         """
         self.target = TARGETS[target]
         self.path = ""
@@ -170,9 +170,9 @@ class Firmware:
         """Run it and return the path of its serial line.
 
         Raises:
-            RuntimeError: it ended, or named no path.
+            RuntimeError: it ended, or did not print a path.
         """
-        with on_processor(self.processor):  # the child begins where its parent is
+        with on_processor(self.processor):  # the child inherits it from its parent
             self._process = subprocess.Popen(
                 [*_guarded(), *self._command],
                 stdin=subprocess.DEVNULL,
@@ -181,7 +181,7 @@ class Firmware:
             )
         try:
             self.path = self._told_path(self._process.stdout)
-            # Held open, so that nobody at the other end sees an end of the line between two users.
+            # Held open, so that the other end sees no hang-up between two users.
             self._line = os.open(self.path, os.O_RDWR | os.O_NOCTTY)
         except BaseException:
             self.stop()
@@ -193,19 +193,19 @@ class Firmware:
         said, end = b"", time.monotonic() + HANGS
         while not (found := _PATH.search(said)):
             if not select.select([output], (), (), max(0.0, end - time.monotonic()))[0]:
-                raise RuntimeError(f"{self._command} named no serial line in {HANGS:.0f} s; it said {said!r}")
+                raise RuntimeError(f"{self._command} named no serial line in {HANGS:.0f} s; output: {said!r}")
             if not (more := os.read(output.fileno(), 4096)):
-                raise RuntimeError(f"{self._command} ended before it named its line; it said {said!r}")
+                raise RuntimeError(f"{self._command} ended before it named its line; output: {said!r}")
             said += more
         return found[1].decode()
 
     @property
     def running(self) -> bool:
-        """Whether the process is there."""
+        """Whether the process runs."""
         return self._process is not None and self._process.poll() is None
 
     def stop(self) -> int | None:
-        """End it. Returns its exit status, negative for a signal; None where it was never started."""
+        """End it. Returns its exit status, negative for a signal; None if it was never started."""
         if self._line is not None:
             os.close(self._line)
             self._line = None
@@ -233,14 +233,14 @@ class Firmware:
 
 
 def _guarded() -> tuple[str, ...]:
-    """Return what makes a program end with the one that has started it, also where that one is killed."""
-    setpriv = shutil.which("setpriv")  # of util-linux; without it `stop` alone has to do
+    """Return a command prefix that ends a program with its parent, even if that is killed."""
+    setpriv = shutil.which("setpriv")  # of util-linux; without it only `stop` ends the program
     return (setpriv, "--pdeathsig", "KILL", "--") if setpriv else ()
 
 
 @contextlib.contextmanager
 def on_processor(processor: int | None) -> Iterator[None]:
-    """Keep this thread to one processor meanwhile; None leaves it free."""
+    """Run this thread on one processor meanwhile; None does not restrict it."""
     if processor is None:
         yield
         return

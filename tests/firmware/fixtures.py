@@ -1,4 +1,4 @@
-"""Fixtures for tests of the firmware, in whatever folder: import them into its conftest."""
+"""Fixtures for tests of the firmware: import them into the conftest of the folder."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["BuildFirmware", "FirmwareLines", "build_firmware", "firmware_line"]
 
 #: Builds an application for a port and returns the program: build_firmware("posix", "trio_keypad").
 BuildFirmware = Callable[..., Path]
-#: Gives the line to the running Q.link node of a port.
+#: Returns the line to the running Q.link node of a port.
 FirmwareLines = Callable[[str], FirmwareLine]
 
 
@@ -28,7 +28,7 @@ def build_firmware(
     missing_tool: Callable[..., NoReturn],
     shared: Path,
 ) -> BuildFirmware:
-    """Return a function that builds, once for all workers, or skips where a tool is missing."""
+    """Return a function that builds, once for all workers, or skips if a tool is missing."""
 
     def make(target: str, app: str = "qlink_node", options: str = "") -> Path:
         for tool, package in (("make", "make"), *TARGETS[target].tools):
@@ -52,7 +52,7 @@ class Running:
 
     @property
     def usable(self) -> bool:
-        """Whether it is as a test wants it."""
+        """Whether a test can use it."""
         return self.firmware.running and not self.line.broken
 
     def stop(self) -> None:
@@ -63,10 +63,10 @@ class Running:
 
 @pytest.fixture(scope="module")
 def firmware_line(build_firmware: BuildFirmware) -> Iterator[FirmwareLines]:
-    """Return a function that gives the line to the Q.link node of a port.
+    """Return a function that returns the line to the Q.link node of a port.
 
-    It runs once for each module of tests, for all of them: a test configures it first. It ends with the
-    module, as an idle emulator takes processor time from other tests.
+    One process for each module of tests: each test configures it first. It ends with the module, since an
+    idle emulator takes processor time from other tests.
     """
     running: dict[str, Running] = {}
 
@@ -86,7 +86,7 @@ def firmware_line(build_firmware: BuildFirmware) -> Iterator[FirmwareLines]:
 
 
 def _own_processor() -> int | None:
-    """Return a processor for this worker; None where the system does not let it choose."""
+    """Return a processor for this worker; None if the system has no choice."""
     if not hasattr(os, "sched_getaffinity"):
         return None
     mine = sorted(os.sched_getaffinity(0))

@@ -1,4 +1,4 @@
-"""The serial line to a running firmware, byte for byte, without a master's runtime between."""
+"""The serial line to a running firmware, byte for byte, without a master's runtime."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from tests.firmware.diagnostics import MARK, Diagnostics, Op
 from tests.firmware.firmware import HANGS
 
 M = TypeVar("M", bound=qlink.Message)
-#: Seconds of silence after which it is worth asking whether an answer will come at all.
+#: Seconds of silence after which the tests check whether an answer will follow.
 SILENCE = 0.03
-#: Seconds until a firmware that does not answer yet is asked again.
+#: Seconds between requests to a firmware that does not answer yet.
 UP = 0.1
 
 
 class Garbage(AssertionError):
-    """The firmware has sent something that is no answer of the protocol, byte for byte."""
+    """The firmware has sent bytes that are not an exact answer of the protocol."""
 
 
 class Answers:
-    """Cuts what a node sends into answers, and takes nothing but whole ones."""
+    """Splits the bytes of a node into answers, and accepts only whole ones."""
 
     def __init__(self) -> None:
         self._decoder = qlink.StreamDecoder("response")
@@ -31,10 +31,10 @@ class Answers:
         self._raw = b""
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Return the frames that are complete now.
+        """Return the frames complete by now.
 
         Raises:
-            Garbage: a byte that belongs to no answer, or one that is missing.
+            Garbage: a byte outside an answer, or a missing byte.
         """
         self._raw += data
         for event in self._decoder.feed(data):
@@ -42,24 +42,24 @@ class Answers:
                 raise Garbage(f"{self._raw.hex(' ')} was sent: {event}")
             self._frames.append(event.to_frame())
         whole = []
-        # An answer is told with its checksum; the byte inserted behind one that ends in A5 is waited for.
+        # An answer is decoded at its checksum; wait for the byte inserted after one that ends in A5.
         while self._frames and len(self._frames[0]) <= len(self._raw):
             frame = self._frames.popleft()
             if not self._raw.startswith(frame):
-                raise Garbage(f"{self._raw.hex(' ')} was sent; the answer in it is {frame.hex(' ')}")
+                raise Garbage(f"{self._raw.hex(' ')} was sent; it contains the answer {frame.hex(' ')}")
             self._raw = self._raw[len(frame) :]
             whole.append(frame)
         return whole
 
 
 class FirmwareLine:
-    """Sends to a firmware, and gives its answers one by one.
+    """Sends to a firmware, and returns its answers one by one.
 
     Attributes:
-        port: where it is.
-        broken: it has sent garbage or does not answer: it is of no more use.
-        number: node number under which it is asked for diagnostics.
-        diagnostics: looks inside, at once and past any bus.
+        port: its port.
+        broken: it has sent garbage or does not answer, and cannot be used any more.
+        number: node number for diagnostics.
+        diagnostics: reads its state, directly and without a bus.
     """
 
     def __init__(self, port: Port) -> None:
@@ -71,14 +71,14 @@ class FirmwareLine:
         self._whole: deque[bytes] = deque()
 
     def write(self, data: bytes) -> None:
-        """Send, whatever it is."""
+        """Send any bytes."""
         self.port.write(data)
 
     def next_answer(self, timeout: float) -> bytes | None:
-        """Return the next answer that has come or comes within `timeout` seconds, None where none does.
+        """Return the next answer received within `timeout` seconds, or None.
 
         Raises:
-            Garbage: what has come is no answer.
+            Garbage: the bytes received are not an answer.
         """
         end = time.monotonic() + timeout
         while not self._whole:
@@ -93,10 +93,10 @@ class FirmwareLine:
         return self._whole.popleft()
 
     def wait_until_up(self) -> None:
-        """Ask until there is an answer: what comes while the firmware still sets up its chip is lost.
+        """Send requests until there is an answer: bytes are lost while the firmware still sets up its chip.
 
         Raises:
-            Garbage: it never comes up.
+            Garbage: it does not answer.
         """
         end = time.monotonic() + HANGS
         ping = qlink.LoopBackRequest(node=self.number, data=b"up?").to_frame()
@@ -104,15 +104,15 @@ class FirmwareLine:
         while self.next_answer(UP) is None:
             if time.monotonic() > end:
                 self.broken = True
-                raise Garbage(f"node {self.number} has not come up in {HANGS:.0f} s")
+                raise Garbage(f"node {self.number} has not answered in {HANGS:.0f} s")
             self.write(ping)
-        self.settled()  # the answers to the others
+        self.settled()  # the answers to the other requests
 
     def settled(self) -> list[bytes]:
-        """Return the answers that were still to come for all that was sent.
+        """Return the outstanding answers to all requests sent.
 
-        Requests are handled in their order: what has not come before the answer to a diagnostic request will
-        never come, however slow this machine is.
+        Requests are handled in order: an answer not received before that to a diagnostic request will not
+        follow, however slow this machine is.
         """
         late, _ = self._exchange_behind(MARK + bytes((Op.STATE,)))
         return late
@@ -121,17 +121,18 @@ class FirmwareLine:
         late, answer = self._exchange_behind(data)
         if late:
             self.broken = True
-            raise Garbage(f"{[frame.hex(' ') for frame in late]} were sent, and nobody had asked")
+            raise Garbage(f"{[frame.hex(' ') for frame in late]} were sent without a request")
         return answer
 
     def _exchange_behind(self, data: bytes) -> tuple[list[bytes], bytes]:
-        """Make a diagnostic request; return what else came before its answer, and its answer."""
+        """Make a diagnostic request; return the other frames before its answer, and its answer."""
         came: list[bytes] = []
         self.write(qlink.MotorRequestRequest(node=self.number, motor_data=data).to_frame())
         self._collect(came, qlink.MotorRequestResponse)
         self.write(qlink.MotorResponsePollRequest(node=self.number).to_frame())
         told = self._collect(came, qlink.MotorResponsePollResponse)
-        # The last two belong to this; a request of the same kinds just before may have let this run ahead.
+        # The last two belong to this request; answers of the same kinds to an earlier one may have ended it
+        # early.
         late = came[:-2]
         return late, bytes(told.motor_data)
 

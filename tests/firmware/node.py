@@ -1,9 +1,9 @@
-"""A firmware as a station on a simulated line: what is on that line goes through its serial port.
+"""A firmware as a station on a simulated line: the bytes of that line go through its serial port.
 
-The line may have faults and other nodes, as with simulated slaves. What the firmware answers is on the line
-as soon as it has come; the clock of the line stands still meanwhile, and a firmware that says nothing is
-asked whether it is done. So a slow machine changes nothing, and a silence is a fact and not a guess. The
-firmware's own clock is the real one.
+The line may have faults and other nodes, as with simulated slaves. An answer of the firmware is on the line
+as soon as it is received; the clock of the line stops meanwhile, and a diagnostic request to a silent
+firmware tells whether it has finished. So results do not depend on the speed of the machine, and silence is
+certain. The firmware's own clock is real time.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from tests.firmware.line import SILENCE, FirmwareLine, Garbage
 
 
 class Summed:
-    """Words or bytes of which only the CRC is known, and perhaps the number; equal to what has the same.
+    """Words or bytes with a known CRC, and perhaps a known number; equal to those with the same.
 
     Attributes:
         crc: CRC-16/IBM-3740 of all of them, words with the high byte first.
         item: bytes of each.
-        size: how many there are, None where nobody has counted.
+        size: their number, or None if unknown.
     """
 
     __hash__ = None  # type: ignore[assignment]  # as a list
@@ -48,7 +48,7 @@ class Summed:
 
 
 class RealPauses(VirtualPort):
-    """The outside's port of a line with firmware on it: a pause passes for the firmware, too."""
+    """The outside's port of a line with firmware on it: a pause takes real time too."""
 
     def sleep(self, seconds: float) -> None:
         """Let time pass on both clocks."""
@@ -57,15 +57,15 @@ class RealPauses(VirtualPort):
 
 
 def backwards(data: bytes) -> bytes:
-    """What a motor answers that turns its requests round: the last 25 bytes, the last one first."""
+    """The answer of a motor that reverses its requests: the last 25 bytes, the last one first."""
     return data[::-1][:MOST_DATA]
 
 
-#: Bytes that every port's receive buffer can take while it does something else.
+#: Bytes that fit into the receive buffer of every port.
 UNREAD = 64
-#: What the motor behind a firmware can answer, by the number of it.
+#: Answers of the motor of a firmware, by the number of the motor.
 MOTORS: list[Callable[[bytes], bytes]] = [echo, backwards]
-#: How a node is after power-up unless a setting says otherwise.
+#: Default settings of a node after power-up.
 _USUAL: dict[str, Any] = {
     "capacity": 48,
     "rate": 1000,
@@ -79,14 +79,14 @@ _USUAL: dict[str, Any] = {
 
 
 class FirmwareNode:
-    """The engine of a station whose node is a firmware, and a look into that node.
+    """The engine of a station whose node is a firmware, and access to the state of that node.
 
     Attributes:
-        engine: what a line attaches.
-        capacity: words that its FIFO holds.
-        heard: requests that were for it, in their order.
-        mute: so many answers are lost from now on.
-        deaf: so many requests are lost from now on.
+        engine: to be attached to a line.
+        capacity: of its FIFO in words.
+        heard: requests to it, in order.
+        mute: number of answers to be lost from now on.
+        deaf: number of requests to be lost from now on.
     """
 
     def __init__(
@@ -98,14 +98,14 @@ class FirmwareNode:
         unsupported: Iterable[str] = (),
         **settings: Any,
     ) -> None:
-        """Let the firmware be as after power-up.
+        """Put the firmware in the state after power-up.
 
         Args:
-            line: leads to it.
+            line: the line to it.
             number: node number, 1..16.
             motor: one of `MOTORS`.
             unsupported: commands that it does not answer.
-            settings: others of `VirtualNode`, as far as `Diagnostics.configure` knows them.
+            settings: others of `VirtualNode`, as far as `Diagnostics.configure` supports them.
         """
         self._line = line
         self._inside = line.diagnostics
@@ -118,12 +118,12 @@ class FirmwareNode:
         line.number = number
         self._inside.disable(self._unsupported)
         self._inside.choose_motor(MOTORS.index(motor))
-        self._inside.force_inputs(0, power_up=True)  # a board's own pins stay out of it
+        self._inside.force_inputs(0, power_up=True)  # replaces the pins of the board
         self.engine = FirmwareEngine(line, self)
 
     @property
     def number(self) -> int:
-        """Node number that it answers to."""
+        """Node number."""
         return self._line.number
 
     @number.setter
@@ -133,7 +133,7 @@ class FirmwareNode:
     # The station --------------------------------------------------------------------------------------------
 
     def handle(self, request: qlink.Message, now: float) -> qlink.Message | None:
-        """Let the firmware do what a request says; see `VirtualNode.handle`."""
+        """Let the firmware handle a request; see `VirtualNode.handle`."""
         if self.deaf:
             self.deaf -= 1
             self.engine.lose()
@@ -153,7 +153,7 @@ class FirmwareNode:
     def _answer_to(self, request: qlink.Message) -> qlink.Message | None:
         command = qlink.COMMANDS[request.NAME.partition(".")[0]]
         if command.response is None:
-            return None  # an answer in spite of this is found in the way of the next one
+            return None  # an unexpected answer is found before the next one
         frame = self._line.next_answer(SILENCE)
         if frame is None:
             frame = next(iter(self._line.settled()), None)
@@ -169,7 +169,7 @@ class FirmwareNode:
 
     @property
     def words(self) -> Summed:
-        """Words that it has queued."""
+        """Words queued so far."""
         crc, count = self._inside.words()
         return Summed(crc, 2, count)
 
@@ -181,7 +181,7 @@ class FirmwareNode:
 
     @property
     def stored(self) -> int:
-        """Bytes that the program has put into memory."""
+        """Size of the program in memory."""
         return self._inside.program().size
 
     def memory(self, size: int) -> bytes:
@@ -190,7 +190,7 @@ class FirmwareNode:
 
     @property
     def statistics(self) -> Counters:
-        """What it has counted."""
+        """Its counters."""
         return self._inside.counters()
 
     @property
@@ -210,7 +210,7 @@ class FirmwareNode:
 
     @property
     def position(self) -> int:
-        """Where the motor is."""
+        """Position of the motor."""
         return self._inside.state().position
 
     @position.setter
@@ -219,7 +219,7 @@ class FirmwareNode:
 
     @property
     def inputs(self) -> int:
-        """The 24 inputs; before anything was heard, setting them sets the levels at power-up."""
+        """The 24 inputs; before the first byte on the line, setting them sets the levels at power-up."""
         return self._inside.state().inputs
 
     @inputs.setter
@@ -237,7 +237,7 @@ class FirmwareNode:
         return self._inside.state().milliseconds / 1000
 
     def check(self) -> None:
-        """Ask for what nobody has asked for.
+        """Check for unexpected answers and lost bytes.
 
         Raises:
             AssertionError: the firmware has sent too much, or has lost bytes.
@@ -247,13 +247,13 @@ class FirmwareNode:
 
 
 class FirmwareEngine(SlaveEngine):
-    """Hands everything that is on the line to the firmware as well."""
+    """Passes all bytes on the line to the firmware as well."""
 
     def __init__(self, line: FirmwareLine, node: FirmwareNode) -> None:
         super().__init__(qlink, node)
         self._line = line
         self._passing = b""
-        self._unread = 0  # bytes that the firmware may not have looked at yet, at most
+        self._unread = 0  # most bytes that the firmware may not have read yet
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes that are on the line."""
@@ -265,26 +265,26 @@ class FirmwareEngine(SlaveEngine):
             self._wait()
 
     def _wait(self) -> None:
-        """Let the firmware keep up: no baud rate holds back what others say, and its buffer is small."""
+        """Wait for the firmware: no baud rate slows down the bytes of others, and its buffer is small."""
         self._line.diagnostics.state()
         self._unread = 0
 
     @property
     def _ends(self) -> int:
-        """Frames that have ended. Behind one a diagnostic request tears no other apart."""
+        """Number of ended frames. A diagnostic request after the end of one does not split another."""
         return self.counters.foreign + sum(self.counters.damaged.values())
 
     def pass_on(self) -> None:
-        """Let the firmware have what has come and what it has not got."""
+        """Send the firmware all bytes received and not passed on yet."""
         if self._passing:
             self._line.write(self._passing)
             self._unread += len(self._passing)
             self._passing = b""
 
     def lose(self) -> None:
-        """Let the firmware never have it."""
+        """Drop the bytes not passed on yet."""
         self._passing = b""
 
     def answered(self) -> None:
-        """It has read all that came before its answer."""
+        """It has read all bytes before its answer."""
         self._unread = 0

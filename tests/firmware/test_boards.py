@@ -1,7 +1,7 @@
-"""The ARM boards: baud rates that they can make, instructions from the last byte of a request to the answer.
+"""The ARM boards: possible baud rates, and instructions from the last byte of a request to the answer.
 
-QEMU has no baud rate and no cycles of a processor, so it cannot tell how long an answer takes on a chip. It
-can tell every instruction executed, and every access to the UART. The first are counted between two of these.
+QEMU simulates neither baud rate nor processor cycles, so it cannot measure the time of an answer on a chip.
+It traces every instruction and every access to the UART: the tests count instructions between two accesses.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ BAUD = round(10 / TIMING.byte_time)
 
 @dataclass(frozen=True)
 class Board:
-    """A chip, and what its time is reckoned from.
+    """A chip, and the data to compute its time.
 
     Attributes:
-        cpu: as the compiler calls it.
+        cpu: the compiler's name of it.
         clock: Hz.
-        cycles: of an instruction in the mean, assumed. The Cortex-M0 at 16 MHz needs no wait states; by the
-            table of its technical reference manual it takes 1.7 for what is counted here. The Cortex-M3 takes
-            fewer, but its flash waits at 50 MHz.
-        read: how QEMU tells that a byte has been taken out of the UART.
-        written: the same of one that is to be sent.
+        cycles: assumed average per instruction. The Cortex-M0 at 16 MHz needs no wait states; by the table of
+            its technical reference manual it takes 1.7 for the code counted here. The Cortex-M3 takes fewer,
+            but its flash has wait states at 50 MHz.
+        read: QEMU's trace of a byte read from the UART.
+        written: QEMU's trace of a byte written to the UART.
     """
 
     cpu: str
@@ -49,7 +49,7 @@ class Board:
 
     @property
     def traces(self) -> tuple[str, ...]:
-        """What makes QEMU tell both."""
+        """QEMU's options for both traces."""
         return ("-trace", self.read.split()[0], "-trace", self.written.split()[0])
 
 
@@ -57,9 +57,9 @@ BOARDS = {
     "lm3s6965evb": Board("cortex-m3", 50e6, 3.0, "pl011_read addr 0x00000000", "pl011_write addr 0x00000000"),
     "microbit": Board("cortex-m0", 16e6, 1.8, "nrf51_uart_read addr 0x518", "nrf51_uart_write addr 0x51c"),
 }
-#: Instructions that can come in front: a pass of the main loop that the byte interrupts, and a tick.
+#: Instructions possible before that: a pass of the main loop interrupted by the byte, and a tick.
 IN_FRONT = 250
-#: Those with the longest requests and answers, stuffed where they can be.
+#: The longest requests and answers, stuffed if possible.
 REQUESTS: tuple[qlink.Message, ...] = (
     qlink.LoopBackRequest(node=1, data=b"\xa5" * 25),
     qlink.ReadRequest(node=1, size=25),
@@ -67,10 +67,10 @@ REQUESTS: tuple[qlink.Message, ...] = (
     qlink.MotionRequest(node=1, segments=[0xA5A5] * 12),
     qlink.NodeInfoRequest(node=1),
 )
-#: Functions: what a byte calls, and where the node sleeps.
+#: Functions: the one called by a byte, and the one in which the node sleeps.
 HANDLER, ASLEEP = "uart0_interrupt", "board_wait"
-#: Seconds between the last byte but one and the last. The node has to be asleep by then, and is not always
-#: where this machine is busy: such an answer does not count, and the next time there is more.
+#: Seconds before the last byte. The node has to be asleep by then, but is not always on a busy machine: such
+#: an answer does not count, and the next pause is longer.
 PAUSES = (0.01, 0.05, 0.2, 0.8, 3.0, 12.0)
 
 
@@ -121,7 +121,7 @@ def test_the_answer_begins_before_the_deadline(
     port: str, build_firmware: BuildFirmware, tmp_path: Path
 ) -> None:
     board, program = BOARDS[port], build_firmware(port, "qlink_node", "-DBOARD_TURNAROUND_US=0")
-    turnaround = -(-1e6 // BAUD) / 1e6 + 1e-6  # one bit, and a step of the clock that tells it
+    turnaround = -(-1e6 // BAUD) / 1e6 + 1e-6  # one bit, and a step of the measuring clock
     for request in REQUESTS:
         count = counted(port, program, request, tmp_path / "executed")
         taken = (count + IN_FRONT) * board.cycles / board.clock + turnaround
@@ -132,7 +132,7 @@ def test_the_answer_begins_before_the_deadline(
 
 
 def counted(port: str, program: Path, request: qlink.Message, log: Path) -> int:
-    """Return how many instructions a node takes until it answers a request."""
+    """Return the number of instructions until a node answers a request."""
     for pause in PAUSES:
         with traced(port, program, log) as line:
             line.write(request.to_frame()[:-1])
@@ -148,11 +148,11 @@ def counted(port: str, program: Path, request: qlink.Message, log: Path) -> int:
 
 @contextlib.contextmanager
 def traced(port: str, program: Path, log: Path) -> Iterator[FirmwareLine]:
-    """Run a firmware that tells each of its instructions; give its line when it answers."""
+    """Run a firmware with each instruction traced; yield its line when it answers."""
     with open_pty() as ours:
         command = [*TARGETS[port].command[:-1], str(program)]
         command[command.index("pty")] = ours.path
-        # The clock of the board goes with its instructions: else it would tick while they are written down.
+        # The clock of the board counts instructions: else it would tick while the trace is written.
         command += [*one_by_one(command[0]), "-icount", "shift=7", "-d", "exec,nochain", "-D", str(log)]
         process = subprocess.Popen([*command, *BOARDS[port].traces], stderr=subprocess.DEVNULL)
         try:
@@ -165,13 +165,13 @@ def traced(port: str, program: Path, log: Path) -> Iterator[FirmwareLine]:
 
 
 def one_by_one(qemu: str) -> tuple[str, ...]:
-    """Return how this QEMU is told to tell each instruction, and not only where a jump leads."""
+    """Return the option of this QEMU to trace each instruction instead of each block."""
     told = subprocess.run([qemu, "-help"], capture_output=True, text=True, check=True).stdout
     return ("-singlestep",) if "-singlestep" in told else ("-accel", "tcg,one-insn-per-tb=on")
 
 
 def wait_until_up(line: FirmwareLine) -> None:
-    """Ask until the latest question is answered: those before were as well, or were lost."""
+    """Send requests until the latest is answered: the earlier ones were answered as well, or lost."""
     for number in range(round(HANGS / UP)):
         asked = number.to_bytes(2, "big")
         line.write(qlink.LoopBackRequest(node=1, data=asked).to_frame())
@@ -184,7 +184,7 @@ def wait_until_up(line: FirmwareLine) -> None:
 def instructions(log: Iterable[str], board: Board) -> Iterator[int | None]:
     """Yield for each answer the instructions from the interrupt of the last byte to its first byte.
 
-    None where it does not count: more bytes were waiting than the last one, or the node was not asleep.
+    None if it does not count: several bytes were waiting, or the node was not asleep.
     """
     executed = begun = bytes_read = 0
     handler, function, asleep, asked = "", "", False, False
@@ -201,6 +201,6 @@ def instructions(log: Iterable[str], board: Board) -> Iterator[int | None]:
             bytes_read += 1
             asked = True
         elif line.startswith(board.written) and asked:
-            # An interrupt may find nothing, since the one before it has taken its byte as well.
+            # An interrupt may find no byte, since the previous one has read it too.
             yield executed - begun if asleep and bytes_read == 1 else None
             asked = False

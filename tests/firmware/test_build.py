@@ -1,4 +1,4 @@
-"""The firmware builds where it was copied to, by make and by CMake, without Python; or says what is wrong."""
+"""A copy of the firmware builds with make and CMake, without Python; or reports the error."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from tests.support.sharing import made_once
 Tool = Callable[..., str]
 GENERATED = ROOT / "generated" / "c"
 QLINKGEN = (sys.executable, "-m", "qlinkgen")
-#: Compiler and Debian package of each port, and the applications that it carries.
+#: Compiler and Debian package of each port, and its applications.
 PORTS = {
     "posix": ("cc", "gcc", {"qlink_node", "trio_keypad"}),
     "lm3s6965evb": ("arm-none-eabi-gcc", "gcc-arm-none-eabi", {"qlink_node", "trio_keypad"}),
     "microbit": ("arm-none-eabi-gcc", "gcc-arm-none-eabi", {"qlink_node"}),
     "atmega328p": ("avr-gcc", "gcc-avr", {"qlink_node"}),
 }
-#: What every port chooses of the header: the fast form of the CRC, once.
+#: CRC options of every port: the fast form, with one table.
 TABLE = "-DQLINK_CRC_FORM=QLINK_CRC_FORM_TABLE -DQLINK_CRC_SHARED_TABLE"
-# A make that has started the tests must not tell the one in here how to work, nor a user's flags.
+# Options of an outer make, and a user's flags, must not affect make in the tests.
 _OUTSIDE = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS", "CFLAGS", "CPPFLAGS", "LDFLAGS", "PYTHONPATH"}
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in _OUTSIDE}
 
 
 def run(*command: str | Path, **changes: str) -> subprocess.CompletedProcess[str]:
-    """Run a command; both outputs come together."""
+    """Run a command; both outputs are combined."""
     return subprocess.run(
         [str(part) for part in command],
         env={**ENVIRONMENT, "LC_ALL": "C", **changes},
@@ -45,7 +45,7 @@ def run(*command: str | Path, **changes: str) -> subprocess.CompletedProcess[str
 
 
 def sure(*command: str | Path, **changes: str) -> str:
-    """Run a command that has to work without a warning; what it said."""
+    """Run a command that must succeed without a warning; return its output."""
     done = run(*command, **changes)
     assert done.returncode == 0, done.stdout
     assert "warning" not in done.stdout.lower(), done.stdout
@@ -54,7 +54,7 @@ def sure(*command: str | Path, **changes: str) -> str:
 
 @pytest.fixture
 def copied(tmp_path: Path) -> Path:
-    """The folder as a user copies it, with the headers beside the Makefile."""
+    """The folder as a user copies it, with the headers next to the Makefile."""
     folder = tmp_path / "firmware"
     shutil.copytree(SOURCES, folder, ignore=shutil.ignore_patterns("build"))
     for header in ("qlink.h", "trio.h"):
@@ -63,7 +63,7 @@ def copied(tmp_path: Path) -> Path:
 
 
 def path_without(folder: Path, *beginnings: str) -> str:
-    """A PATH with every program of the present one but those whose names start with a beginning."""
+    """A PATH with all programs of the present one except those whose names begin with `beginnings`."""
     with made_once(folder) as first:
         programs = [path for place in ENVIRONMENT["PATH"].split(os.pathsep) for path in Path(place).glob("*")]
         for program in programs if first else ():
@@ -76,7 +76,7 @@ def path_without(folder: Path, *beginnings: str) -> str:
 
 @pytest.fixture
 def without_python(shared: Path) -> str:
-    """A PATH with every program but Python and qlinkgen."""
+    """A PATH with all programs except Python and qlinkgen."""
     path = path_without(shared / "without-python", "python", "pip", "qlinkgen", "pypy")
     assert not shutil.which("python3", path=path)
     return path
@@ -218,7 +218,7 @@ def test_options_do_what_they_say(copied: Path, require_tool: Tool) -> None:
         assert (told.t1_delay, told.t2_delay, told.serial_number) == (0.3, 25.5, 4294967295)
         moving = node.motion(segments=[1, 2])
         assert (moving.fifo_space, moving.motor_status) == (7, 3)  # started, and words wait at rate 0
-        node.motor_request(motor_data=b"\x7e\xd1\x07")  # no diagnostics: the motor's, like anything else
+        node.motor_request(motor_data=b"\x7e\xd1\x07")  # no diagnostics: it goes to the motor
         assert node.motor_response_poll().motor_data == b"\x7e\xd1\x07"
 
 
@@ -235,10 +235,10 @@ def test_a_header_for_slaves_is_enough(copied: Path, tmp_path: Path, require_too
 
 
 WRONG = {
-    "port": ("", "PORT=moon is not a folder with a port.mk; there are: atmega328p ", ("PORT=moon",)),
-    "app": ("", "APP=radio does not run on posix; there: qlink_node trio_keypad", ("APP=radio",)),
+    "port": ("", "PORT=moon: no moon/port.mk; ports: atmega328p ", ("PORT=moon",)),
+    "app": ("", "APP=radio does not run on posix; applications: qlink_node trio_keypad", ("APP=radio",)),
     "app of another port": ("", "does not run on microbit", ("PORT=microbit", "APP=trio_keypad")),
-    "header": ("", "no qlink.h: copy it beside this Makefile, or say HEADERS=folder", ("HEADERS=/nowhere",)),
+    "header": ("", "no qlink.h: copy it next to this Makefile, or set HEADERS=folder", ("HEADERS=/nowhere",)),
     "no header at all": ("", "no qlink.h and no trio.h", ("all", "HEADERS=/nowhere")),
     "compiler": ("", "no compiler sdcc-of-old for posix: see posix/README.md", ("CC=sdcc-of-old",)),
     "long FIFO": ("cc gcc", "NODE_FIFO must be 1 to 255", ("CPPFLAGS=-DNODE_FIFO=256",)),
@@ -282,8 +282,8 @@ def test_make_says_what_is_wrong(case: str, copied: Path, require_tool: Tool) ->
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (("-DPORT=moon",), "PORT=moon is not a folder with a port.mk; there are:"),
-        (("-DHEADERS=/nowhere",), "copy qlink.h beside CMakeLists.txt, or say -DHEADERS=folder"),
+        (("-DPORT=moon",), "PORT=moon: no moon/port.mk; ports:"),
+        (("-DHEADERS=/nowhere",), "copy qlink.h next to CMakeLists.txt, or set -DHEADERS=folder"),
     ],
 )
 def test_cmake_says_what_is_wrong(
@@ -305,8 +305,8 @@ def test_cmake_keeps_a_folder_to_one_port(copied: Path, require_tool: Tool) -> N
     assert done.returncode != 0
     said = " ".join(done.stdout.split())
     assert "PORT=microbit, but" in said
-    assert "was begun for PORT=posix" in said
-    assert "take another folder (-B), or delete this one" in said
+    assert "is configured for PORT=posix" in said
+    assert "use another folder (-B), or delete this one" in said
     sure(*configure, "-DPORT=posix")
 
 

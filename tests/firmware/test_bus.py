@@ -1,4 +1,4 @@
-"""The master's runtime on the serial port of each firmware, beside the same calls to a virtual node."""
+"""The master's runtime on the serial port of each firmware, compared with a virtual node."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.firmware.node import FirmwareNode
 from tests.qlink.behaviour_drivers import AsBlocking
 
 ROUNDS = 12
-#: Seconds of host slack on the real port: nothing is late there, however busy this machine is.
+#: Seconds of host slack on the real port: no answer is late, however busy this machine is.
 SLACK = 5.0
 SETTINGS: dict[str, Any] = {
     "capacity": 40,
@@ -35,7 +35,7 @@ HEX = b":04000000A5A500FFB3\r\n:00000001FF\r\n"
 
 
 def session(bus: Bus, seed: int) -> Iterator[object]:
-    """Call every command; the results depend only on the node."""
+    """Call everything; the results depend only on the node."""
     chance = random.Random(seed)
     yield bus.node_setup(1, node_number=4, t1_delay=1.5, t2_delay=25.5, position_type=2)
     yield bus.node_setup(4, node_number=3, t1_delay=0.0, t2_delay=0.0, position_type=2)

@@ -1,4 +1,4 @@
-"""What the tests of the firmware stand on: one build for all workers, and no process that stays."""
+"""The support code of the firmware tests: one build for all workers, and no process left running."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.firmware.line import Answers, Garbage
 
 @pytest.fixture
 def sources(tmp_path: Path, require_tool: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A Makefile in the place of the real one: it takes its time, and writes down that it ran."""
+    """A Makefile in place of the real one: it is slow, and logs each run."""
     require_tool("make", package="make")
     (tmp_path / "Makefile").write_text(
         "program:\n\tsleep 0.2; echo $(CPPFLAGS) >> log\n"
@@ -50,7 +50,7 @@ def test_a_firmware_ends_when_it_is_told_to(target: str, build_firmware: BuildFi
     with Firmware(target, build_firmware(target, "qlink_node", TARGETS[target].options)) as running:
         assert running.running
         assert Path(running.path).is_char_device()
-        # Until QEMU listens to the signal it is ended by it, which is an end as well.
+        # Until QEMU handles the signal, the signal itself ends it.
         assert running.stop() in {0, -signal.SIGTERM}
     assert not running.running
 
@@ -88,7 +88,7 @@ def test_a_firmware_does_not_outlive_who_started_it(
 
 
 class TestAnswers:
-    """Nothing but whole answers is let through."""
+    """Only whole answers are accepted."""
 
     @staticmethod
     def frames() -> tuple[bytes, bytes]:

@@ -1,4 +1,4 @@
-"""The ports that are a process on a pty: masters come and go, nothing is busy, and a signal is the end."""
+"""The ports that run as a process on a pty: several masters in turn, no busy waiting, end by a signal."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def processor_seconds(process: subprocess.Popen[str]) -> float:
 
 
 def simulator(folder: Path, require_tool: Tool, missing_tool: Missing) -> Path:
-    """Build what runs an AVR."""
+    """Build the simulator of the AVR."""
     require_tool("cc", package="gcc")
     if not SIMAVR.exists():
         missing_tool("simavr's library", package="libsimavr-dev")
@@ -53,7 +53,7 @@ def simulator(folder: Path, require_tool: Tool, missing_tool: Missing) -> Path:
 
 
 def answer_of(port: Port, expected: bytes, seconds: float = HANGS) -> bytes:
-    """As many bytes as are expected, fewer where they do not come."""
+    """Read as many bytes as expected, or fewer after a timeout."""
     answer = b""
     while len(answer) < len(expected) and (more := port.read(seconds)):
         answer += more
@@ -72,7 +72,7 @@ def test_lives_until_a_signal(port: str, copied: Path, require_tool: Tool, missi
             copied / "build" / "atmega328p-qlink_node.elf",
         ]
     with running(*command) as (process, path):
-        for _ in range(3):  # meanwhile the line is free
+        for _ in range(3):  # the line is closed meanwhile
             with Bus.open(path, slack=HANGS, echo="none") as bus:
                 assert bus.node(1).loop_back(data=b"\x00\xa5\x00").data == b"\x00\xa5\x00"
         if Path("/proc/self/stat").exists():
@@ -85,7 +85,7 @@ def test_lives_until_a_signal(port: str, copied: Path, require_tool: Tool, missi
 
 
 def test_an_answer_waits_for_the_inserted_byte(copied: Path, require_tool: Tool) -> None:
-    # At one bit a second a byte lasts for ten: so long the node waits for what the master still has to send.
+    # At one bit a second a byte takes ten seconds: the node waits so long for the master's inserted byte.
     require_tool("cc", package="gcc")
     sure("make", "-C", copied, "CPPFLAGS=-DBOARD_BAUD=1")
     requests = (
@@ -108,7 +108,7 @@ FIRST, SECOND = (
 
 
 def test_a_node_that_hears_itself_drops_its_answers(copied: Path, require_tool: Tool) -> None:
-    # At one bit a second it waits for its echo for longer than a busy machine ever stops us.
+    # At one bit a second it waits for its echo longer than a busy machine delays the test.
     require_tool("cc", package="gcc")
     sure("make", "-C", copied, "CPPFLAGS=-DBOARD_HEARS_ITSELF=1 -DBOARD_BAUD=1")
     with running(copied / "build" / "posix-qlink_node") as (_, path), open_port(path) as port:
@@ -118,7 +118,7 @@ def test_a_node_that_hears_itself_drops_its_answers(copied: Path, require_tool: 
             port.write(wire)  # /RE is tied low
         port.write(SECOND)
         assert answer_of(port, SECOND) == SECOND
-        # Another byte ends the echo: the bytes after it are a request.
+        # A different byte ends the echo: the bytes after it are a request.
         port.write(b"\0" + FIRST)
         assert answer_of(port, FIRST) == FIRST
         port.write(FIRST)
@@ -131,7 +131,7 @@ def test_a_node_that_does_not_hear_itself_after_all_gives_up_waiting(
     require_tool("cc", package="gcc")
     sure("make", "-C", copied, "CPPFLAGS=-DBOARD_HEARS_ITSELF=1 -DBOARD_BAUD=1000")
     with running(copied / "build" / "posix-qlink_node") as (_, path), open_port(path) as port:
-        for _ in range(20):  # a busy machine may make a pause too short for the node, but not each time
+        for _ in range(20):  # on a busy machine a pause may be too short for the node, but not each time
             port.write(FIRST)
             answer_of(port, FIRST, 1.0)
             time.sleep(0.1)
@@ -186,7 +186,7 @@ def test_settings_may_outlive_the_power(copied: Path, require_tool: Tool) -> Non
         assert (told.t1_delay, told.t2_delay, told.position_type) == (0.3, 2.5, 1)
 
 
-#: Sends nothing, and then what it finds in the registers of its pins.
+#: Sends no bytes, and then the registers of its pins.
 PINS = """
 #include "board.h"
 #ifdef __AVR__
@@ -233,7 +233,7 @@ def test_sending_nothing_does_not_hang(
         expected = b"\x01\x04"  # RXD has its pull-up; the direction is an output, and low
         answers: list[bytes] = []
         while not answers or (not answers[-1] and len(answers) < HANGS):
-            line.write(b"?")  # lost where the chip has not started
+            line.write(b"?")  # lost if the chip has not started
             answers.append(answer_of(line, expected, 1.0))
         assert answers[-1] == expected
 

@@ -1,4 +1,4 @@
-"""The CMake function qlinkgen_generate: headers follow schema and options, and nothing is done twice."""
+"""The CMake function qlinkgen_generate: headers follow schema and options, without unnecessary work."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if(CMAKE_C_COMPILER)
   target_link_libraries(node PRIVATE bus)
 endif()
 """
-#: Says the baud rate of the header, and whether it has the last command.
+#: Prints the baud rate of the header, and whether it has the last command.
 MAIN = """
 #include <stdio.h>
 #include "qlink.h"
@@ -47,7 +47,7 @@ int main(void)
 
 @dataclass
 class Project:
-    """A project of a user, with a schema of its own."""
+    """A project of a user, with its own schema."""
 
     folder: Path
     executable: tuple[str, ...]
@@ -84,7 +84,7 @@ class Project:
         sure(*self.command(), PYTHONPATH=str(ROOT))
 
     def complaint(self, **changes: str) -> str:
-        """What CMake says where it has to fail, in one line."""
+        """The message of CMake, which must fail, in one line."""
         done = run(*self.command(), PYTHONPATH=str(ROOT), **changes)
         assert done.returncode != 0, done.stdout
         return " ".join(done.stdout.split())
@@ -98,7 +98,7 @@ class Project:
 
 @pytest.fixture
 def project(tmp_path: Path, require_tool: Tool) -> Project:
-    """One that has not been configured."""
+    """A project that is not configured yet."""
     require_tool("cmake", package="cmake")
     require_tool("cc", package="gcc")
     made = Project(tmp_path / "project", QLINKGEN)
@@ -122,7 +122,7 @@ def test_follows_the_schema_and_only_the_schema(project: Project) -> None:
     changed = project.stamp.stat().st_mtime_ns
     assert changed != before
 
-    project.schema.touch()  # newer, and the same: what is made stays, and is not compiled again
+    project.schema.touch()  # newer, but unchanged: the outputs stay, and are not compiled again
     assert "Building" not in project.build()
     assert project.stamp.stat().st_mtime_ns != changed
 
@@ -159,9 +159,9 @@ def test_follows_its_options(project: Project) -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        ("FILE bus.h TARGET bus SCHEMA bus.yaml", "no argument is called FILE;bus.h; there are TARGET,"),
-        ("TARGET bus", "say TARGET, the name of the library to make, and SCHEMA"),
-        ("SCHEMA bus.yaml", "say TARGET, the name of the library to make, and SCHEMA"),
+        ("FILE bus.h TARGET bus SCHEMA bus.yaml", "unknown argument FILE;bus.h; arguments: TARGET,"),
+        ("TARGET bus", "give TARGET, the name of the library to make, and SCHEMA"),
+        ("SCHEMA bus.yaml", "give TARGET, the name of the library to make, and SCHEMA"),
         ("TARGET bus SCHEMA train.yaml", "train.yaml"),
         ("TARGET bus SCHEMA bus.yaml ONLY radio", "radio"),
         ("TARGET bus SCHEMA bus.yaml ROLE guard", "guard"),
@@ -192,7 +192,7 @@ def test_says_what_to_install(project: Project, without_python: str) -> None:
 def test_the_example_makes_its_headers(tmp_path: Path, project: Project) -> None:
     build = tmp_path / "build"
     options = ("-DQLINKGEN_REGENERATE=ON", f"-DQLINKGEN_EXECUTABLE={';'.join(project.executable)}")
-    # Where it was copied to there is no folder of schemas: those that come with qlinkgen serve.
+    # The copy has no folder of schemas: those shipped with qlinkgen are used.
     sure("cmake", "-S", SOURCES, "-B", build, *options, "-DSCHEMAS=/nowhere", PYTHONPATH=str(ROOT))
     sure("cmake", "--build", build, PYTHONPATH=str(ROOT))
     assert programs(build) == {"qlink_node", "trio_keypad"}

@@ -1,4 +1,4 @@
-"""What a firmware does in time, by its own clock: between two looks at it something has happened or not."""
+"""Timed behaviour of a firmware, by its own clock: an event occurs between two reads of its state."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from tests.firmware.fixtures import FirmwareLines
 from tests.firmware.line import FirmwareLine
 from tests.firmware.node import FirmwareNode
 
-#: Words a second: no whole number of milliseconds for one, so that rounding would add up.
+#: Words a second, without a whole number of milliseconds per word, so that rounding errors would add up.
 RATE = 333
 WORDS = 252
-#: Looks after which nothing will come any more.
+#: Reads of the state after which no event will follow.
 MOST = 200_000
 
 
 class Between(NamedTuple):
-    """Something happened behind the first of these milliseconds, and not behind the last."""
+    """An event after the first of these milliseconds, and not after the last."""
 
     after: int
     before: int
 
     def takes(self, earlier: Between, milliseconds: int) -> bool:
-        """Whether so much time can lie between an earlier event and this one."""
+        """Whether `milliseconds` can be the time between an earlier event and this one."""
         return self.after - earlier.before <= milliseconds <= self.before - earlier.after
 
 
@@ -40,7 +40,7 @@ def line(request: pytest.FixtureRequest, firmware_line: FirmwareLines) -> Firmwa
 def looks(line: FirmwareLine) -> Iterator[State]:
     for _ in range(MOST):
         yield line.diagnostics.state()
-    raise AssertionError(f"{MOST} looks, and it has not happened")
+    raise AssertionError(f"no event in {MOST} reads of the state")
 
 
 def ask(line: FirmwareLine, request: qlink.Message) -> qlink.Message:
@@ -51,14 +51,14 @@ def ask(line: FirmwareLine, request: qlink.Message) -> qlink.Message:
 
 
 def when(line: FirmwareLine, action: Callable[[], object]) -> Between:
-    """Do something; return when."""
+    """Do the action; return its time."""
     first = line.diagnostics.state()
     action()
     return Between(first.milliseconds, line.diagnostics.state().milliseconds)
 
 
 def until_output_1(line: FirmwareLine, level: int, last: int) -> Between:
-    """Look until output 1 has a level that it had not at the millisecond `last`; return when it got it."""
+    """Read the state until output 1 has a level unlike at the millisecond `last`; return the time."""
     for state in looks(line):
         if state.outputs == level:
             return Between(last, state.milliseconds)
@@ -67,7 +67,7 @@ def until_output_1(line: FirmwareLine, level: int, last: int) -> Between:
 
 
 def switch_input_1(line: FirmwareLine, level: int) -> Between:
-    """Put a level on input 1; return when."""
+    """Put a level on input 1; return its time."""
     return when(line, lambda: line.diagnostics.force_inputs(level, power_up=False))
 
 
@@ -81,7 +81,7 @@ def test_the_motor_takes_words_at_its_rate(line: FirmwareLine) -> None:
         assert done == state.position
         if not state.waiting:
             break
-        # Millisecond and word are both the ones begun, not those completed.
+        # Millisecond and word are those begun, not those completed.
         assert (state.milliseconds - start.before - 1) * RATE / 1000 - 1 <= done
         assert done <= (state.milliseconds - start.after + 1) * RATE / 1000
     assert state.milliseconds - start.after >= (WORDS * 1000) // RATE
@@ -99,7 +99,7 @@ def test_output_1_follows_input_1_by_t1_and_t2(line: FirmwareLine) -> None:
 def test_a_pulse_shorter_than_t1_never_reaches_output_1(line: FirmwareLine) -> None:
     FirmwareNode(line, t1_delay=0.2, t2_delay=0.1)
     risen, fallen = switch_input_1(line, 1), switch_input_1(line, 0)
-    while fallen.before - risen.after >= 200:  # somebody held us up in the middle of the pulse
+    while fallen.before - risen.after >= 200:  # the test was delayed during the pulse
         FirmwareNode(line, t1_delay=0.2, t2_delay=0.1)
         risen, fallen = switch_input_1(line, 1), switch_input_1(line, 0)
     for state in looks(line):

@@ -1,4 +1,4 @@
-"""Thousands of mixed transactions with each firmware: every answer, and the state, held against a model."""
+"""Thousands of mixed transactions with each firmware: every answer and the state compared with a model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.soak.firmware_page import TITLE, as_text, put_into
 from tests.soak.firmware_run import Result, Soak, WrongAnswer
 from tests.soak.firmware_traffic import REQUESTS, Traffic, Unit
 
-#: `make soak` makes ten times as many.
+#: `make soak` runs ten times as many.
 TRANSACTIONS = 2_000
 
 
@@ -37,7 +37,7 @@ def test_mixed_transactions_among_damage_strays_and_noise(target: str, firmware_
 
 
 def unit_stream(seed: int, count: int) -> tuple[list[Unit], Model]:
-    """What a seed makes, without a firmware."""
+    """The units of a seed, without a firmware."""
     model = Model(PROGRAM_SIZE, number=3, rate=0)
     traffic = Traffic(random.Random(seed), PROGRAM_SIZE, delays=True)
     units = []
@@ -73,11 +73,11 @@ def test_the_mix_has_what_it_is_to_have() -> None:
     assert {"crc", "length", "stuffing", "unknown"} <= set(decoder.counters.faults)
 
 
-# The soak finds what is wrong ------------------------------------------------------------------------------
+# The soak finds errors -------------------------------------------------------------------------------------
 
 
 class Faulty(FirmwareLine):
-    """A line that does something wrong at one request, but not at what asks for diagnostics."""
+    """A line with an error at one request, but not at diagnostic ones."""
 
     BEHIND = 200
     written = 0
@@ -92,9 +92,7 @@ class Faulty(FirmwareLine):
             self.inside = False
 
     def write(self, data: bytes) -> None:
-        self.written += (
-            not self.inside
-        )  # how often a motor is asked whether it has come to rest, time decides
+        self.written += not self.inside  # the number of requests until a motor is at rest depends on time
         if self.written >= self.BEHIND and not self.inside and not self.done and self.is_request(data):
             self.done = True
             data = self.instead_of(data)
@@ -105,12 +103,12 @@ class Faulty(FirmwareLine):
         return any(isinstance(event, qlink.Message) and event.node == self.number for event in events)
 
     def instead_of(self, data: bytes) -> bytes:
-        """What is sent in the place of this."""
+        """The bytes to send instead."""
         return data
 
 
 class Changed(Faulty):
-    """An answer has another bit."""
+    """A bit of an answer is changed."""
 
     def next_answer(self, timeout: float) -> bytes | None:
         answer = super().next_answer(timeout)
@@ -120,7 +118,7 @@ class Changed(Faulty):
 
 
 class Secret(Faulty):
-    """A damaged frame has been taken for a sync."""
+    """A damaged frame is handled as a sync."""
 
     def instead_of(self, data: bytes) -> bytes:
         return data + qlink.NodeSyncRequest(node=0, counter=77).to_frame()
@@ -145,7 +143,7 @@ class Lost(Faulty):
     [
         (Changed, "the answer was .*; .* was due"),
         (Secret, "counters: .*syncs="),
-        (Talkative, "the answer was .*; .* was due|nobody had asked"),
+        (Talkative, "the answer was .*; .* was due|without a request"),
         (Lost, "no answer in|counters: .*requests=|did not answer"),
     ],
 )
@@ -157,7 +155,7 @@ def test_what_is_wrong_is_found_and_shown(
     usual = firmware_line("posix")
     line = kind(usual.port)
     line.number = usual.number
-    usual.broken = True  # whatever comes of this, the next test has a new one
+    usual.broken = True  # the next test gets a new one in any case
     with pytest.raises(WrongAnswer, match=complaint) as caught:
         Soak("posix", line, seed=1).run(600)
     assert str(caught.value).startswith("posix, seed 1, after ")
@@ -169,7 +167,7 @@ def test_what_is_wrong_is_found_and_shown(
 
 @pytest.fixture
 def posix(build_firmware: BuildFirmware) -> list[str]:
-    """Arguments for the port that is a process, as it was built for the other tests."""
+    """Arguments for the posix port, as built for the other tests."""
     program = build_firmware("posix", "qlink_node", TARGETS["posix"].options)
     return ["--targets", "posix", "--build", str(program.parent)]
 

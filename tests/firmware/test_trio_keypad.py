@@ -1,6 +1,6 @@
-"""The Trio keypad of the example firmware, driven by a Motion Coordinator and judged by the keypad in Python.
+"""The Trio keypad of the example firmware with a Motion Coordinator, compared with the keypad in Python.
 
-What it shows and counts is read by variables that a real keypad ignores (trio_keypad/diagnostics.h).
+Its display and counters are read by variables that a real keypad ignores (trio_keypad/diagnostics.h).
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from tests.firmware.firmware import HANGS, Firmware
 from tests.firmware.fixtures import BuildFirmware
 
 TARGETS = ("posix", "lm3s6965evb")
-#: Lets a keypad tell what is inside.
+#: Option for diagnostics.
 DIAGNOSTIC = "-DKEYPAD_DIAGNOSTICS=1"
-#: The program that tests talk to waits for longer than a busy machine ever stops it for.
+#: Options of the program: its timeout is longer than the delays of a busy machine.
 PATIENT = f"{DIAGNOSTIC} -DKEYPAD_PATIENCE=20000"
 MESSAGES = 300
 KEYPAD = 10  # the next node along the ring
-#: Ends a message that was found broken after its head had gone.
+#: Ends a message found broken after its head was forwarded.
 CUT = b"\x80"
 
 # trio_keypad/diagnostics.h
@@ -49,16 +49,16 @@ LOOKS = (
 
 @dataclass
 class Line:
-    """A Motion Coordinator whose next node and only other one is the keypad."""
+    """A Motion Coordinator whose only other node is the keypad."""
 
     mc: MotionCoordinator
 
     def ask(self, operation: int, operand: int = 0, *, node: int = KEYPAD, answer: int = 1) -> None:
-        """Send a diagnostic; the answer goes so many nodes along from the keypad."""
+        """Send a diagnostic; the answer goes `answer` nodes along from the keypad."""
         self.mc.send(node, 1, DIAGNOSTICS + 16 * operation + answer, operand)
 
     def look(self, name: str, **where: int) -> int:
-        """Return what the keypad has counted."""
+        """Return a counter or another value of the keypad."""
         number, vr = LOOKS.index(name), self.mc.vr
         vr[number] = -1
         self.ask(LOOK, number, **where)
@@ -66,7 +66,7 @@ class Line:
         return int(vr[number])
 
     def rows(self, **where: int) -> list[str]:
-        """Return what the keypad shows, without the blanks at the ends."""
+        """Return the rows of the display, without trailing blanks."""
         found = []
         for row in range(ROWS):
             self.ask(ROW, row, **where)
@@ -92,7 +92,7 @@ def line(path: str) -> Iterator[Line]:
 
 
 def random_text(rng: random.Random, most: int = 30) -> str:
-    """Text for a display: mostly what it shows, and everything that moves its cursor."""
+    """Text for a display: mostly printable characters, and all that move its cursor."""
     pieces = [chr(rng.randrange(128)) for _ in range(rng.randint(1, most))]
     if rng.random() < 0.5:
         pieces += CURSOR(rng.randrange(128)), rng.choice("\r\n\x0c\x0e")
@@ -126,7 +126,7 @@ def test_key_up_is_sent_in_mode_on_off(line: Line) -> None:
     for mode, expected in (
         (trio.KeypadModeEnum.ON_OFF, [5, 5 + KEY_UP]),
         (trio.KeypadModeEnum.ON_ONLY, [5]),
-        (77, [5]),  # means nothing, and changes nothing
+        (77, [5]),  # without a meaning and an effect
     ):
         mc.keypad_mode(KEYPAD, mode)
         for _ in range(3):
@@ -148,7 +148,7 @@ def test_keys_go_as_far_as_the_offset_says(path: str) -> None:
 
 def test_keys_are_debounced_inputs(line: Line) -> None:
     mc = line.mc
-    assert line.look("early_keys") == 0, "nothing is pressed where nobody presses anything"
+    assert line.look("early_keys") == 0, "no key is pressed at the start"
     mc.send(KEYPAD, 2, 10)
     for lines, mode, expected in (
         (0x400000, trio.KeypadModeEnum.ON_ONLY, [22]),
@@ -173,7 +173,7 @@ def test_own_messages_wait_until_a_message_to_others_has_passed(path: str) -> No
         port.write(diagnostic(INPUTS, 0xFFFFE0))  # on QEMU the others are down from the start
         port.write(text[:-1])
         came = read(port, len(passed) - 1)
-        time.sleep(0.05)  # the keys are there by now, on a machine that is not too busy
+        time.sleep(0.05)  # the keys are detected by now, unless the machine is very busy
         came += port.read(0.0)
         port.write(text[-1:])
         came += read(port, len(passed) + len(b"".join(keys)) - len(came))
@@ -224,7 +224,7 @@ def test_a_message_to_others_goes_on_while_it_still_comes(path: str) -> None:
 
 
 class NoisyPort(Port):
-    """A port before whose writes stand bytes that are no message."""
+    """A port that writes noise before each message."""
 
     def __init__(self, port: Port, rng: random.Random) -> None:
         self.name, self.baud, self.capabilities = port.name, port.baud, port.capabilities
@@ -248,7 +248,7 @@ class NoisyPort(Port):
 
 
 def noise(rng: random.Random) -> bytes:
-    """Bytes that are no message and that spoil none behind them."""
+    """Bytes outside messages that do not damage those after them."""
     text = trio.CharacterTransfer(address=1, characters="wrong").to_frame()
     variable = trio.DirectVariableTransfer(address=1, number=3, value=Decimal(7)).to_frame()
     flipped = bytearray(variable)
@@ -303,7 +303,7 @@ def test_it_does_with_any_bytes_what_the_keypad_in_python_does(path: str) -> Non
             port.write(data)
             expected = judged(judge, data)
             assert read(port, len(expected)) == expected
-        # Ends whatever is under way, and turns on what is asked for below.
+        # Ends any current message, and sets the state for the messages below.
         end = trio.KeypadOffset(address=1, offset=1).to_frame()
         port.write(end)
         left = judged(judge, end)
@@ -321,14 +321,14 @@ def test_it_does_with_any_bytes_what_the_keypad_in_python_does(path: str) -> Non
 
 
 def judged(judge: KeypadNode, data: bytes) -> bytes:
-    """Return what the keypad in Python sends on, taking each byte for itself, as the firmware does."""
+    """Return the bytes forwarded by the keypad in Python, fed byte by byte as the firmware is."""
     for byte in data:
         judge.link.receive(bytes((byte,)), 0.0)
     return judge.link.bytes_to_send(0.0)
 
 
 def damaged_messages(rng: random.Random) -> bytes:
-    """Some messages, to the keypad and past it, and damage of every kind in half of them."""
+    """Messages to and past the keypad, half of them with damage of every kind."""
     data = bytearray()
     for _ in range(rng.randint(1, 6)):
         frame = bytearray(random_message(rng).to_frame())
@@ -416,7 +416,7 @@ def test_the_two_keypads_of_the_document(build_firmware: BuildFirmware) -> None:
 
 
 def read(port: Port, size: int) -> bytes:
-    """Return so many bytes as soon as they have come."""
+    """Read `size` bytes."""
     return collect(port, lambda data: len(data) >= size)
 
 
@@ -429,15 +429,15 @@ def collect(port: Port, enough: Callable[[bytes], bool]) -> bytes:
 
 
 def diagnostic(operation: int, operand: int = 0) -> bytes:
-    """The frame of a diagnostic whose answer comes back here."""
+    """The frame of a diagnostic with its answer to the coordinator."""
     number = DIAGNOSTICS + 16 * operation + 1
     return trio.DirectVariableTransfer(address=1, number=number, value=Decimal(operand)).to_frame()
 
 
 def wake(path: str) -> None:
-    """Wait until a keypad hears what is sent to it, as it does when its UART is set up; then restart it.
+    """Wait until the UART of a keypad is set up and it answers; then restart it.
 
-    Answers come in the order of the questions: behind the one to the last question there is none.
+    Answers have the order of the requests: the one to the last request is the last.
     """
     heard, limit = trio.StreamDecoder(), time.monotonic() + HANGS
     with open_port(path) as port:

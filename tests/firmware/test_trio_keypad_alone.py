@@ -1,4 +1,4 @@
-"""The Trio keypad of the example firmware without a board, where the time is what the test says."""
+"""The Trio keypad of the example firmware without a board, with the time set by the test."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from qlinkgen.protocols.trio.display import COLUMNS, ROWS
 from qlinkgen.protocols.trio.facts import KEY_UP
 from tests.firmware.firmware import SOURCES
 
-#: Looks at keys when it is told to: <inputs> <milliseconds>, a line each.
+#: Scans the keys for each line of input: <inputs> <milliseconds>.
 LOOKING = """
 #include <stdio.h>
 #include "board.h"

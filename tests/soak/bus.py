@@ -1,8 +1,8 @@
 """Soak the Q.link master: `python -m tests.soak.bus [--transactions N] [--pty-transactions N] [--seed N]`.
 
 A random mix of all commands goes to five simulated nodes over a line with faults of every kind, and a plain
-model says what each node must hold and what the master must have been told. With `--output PATH` the figures
-become a page.
+model computes the expected state of each node and the expected answers. `--output PATH` writes the figures as
+a page.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tests.soak import bus_run as run
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run both soaks; 1 where something is wrong."""
+    """Run both soaks; 1 if a result is wrong."""
     options = _options(arguments)
     results, seconds = [], []
     for soak, count in ((run.virtual, options.transactions), (run.pty, options.pty_transactions)):

@@ -1,4 +1,4 @@
-"""The account of a soak: what was injected, who has counted it, and what must be equal to what."""
+"""The account of a soak: injected faults, their counters, and the sums that must be equal."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from qlinkgen.sim.faults import TO_SLAVES, Injected
 from qlinkgen.sim.wire import LINE, OUTSIDE
 from tests.soak.bus_ledger import FORGED, STALE, Ledger, Station
 
-#: Seconds for which a fault may go on to disturb: noise that comes alone does so within 10 ms, an extra copy
-#: within 1 ms, and a frame takes up to 6 ms more.
+#: Seconds for which a fault can have an effect: separate noise follows within 10 ms, an extra copy within 1
+#: ms, and a frame takes up to 6 ms more.
 LINGERS = 0.02
-#: Transactions, and seconds, after which a fault must have shown.
+#: Transactions, and seconds, after which a fault must have been counted.
 _SHOWN_WITHIN = 4
 _SHOWN_AFTER = 0.5
-#: Requests that nobody answers: that one is lost is seen by the node alone, if at all.
+#: Requests without an answer: only the node can notice the loss of one, if at all.
 _UNANSWERED = {0x03, 0x04, 0x05}
 #: motor_request and node_sync, which must not be repeated.
 _ONCE = {0x16, 0x05}
-#: node_program_load, for which an answer has 10 ms more.
+#: node_program_load, whose answer may take 10 ms more.
 _PATIENT = 0x06
 
 
@@ -38,10 +38,10 @@ class Equation(NamedTuple):
     """Two sums that must be equal.
 
     Attributes:
-        left: what the left one is.
-        right: what the right one is.
+        left: name of the left sum.
+        right: name of the right sum.
         values: both.
-        doubt: how much they may differ.
+        doubt: the allowed difference.
     """
 
     left: str
@@ -59,24 +59,24 @@ class Equation(NamedTuple):
 
 
 class Account:
-    """Watches a bus, and adds up.
+    """Watches a bus, and keeps the sums.
 
     Attributes:
         transactions: calls to the bus, refused ones included.
         outcomes: how they ended.
-        wrong: answers accepted that were none: given to another question.
-        forged: answers accepted that nobody gave; they have passed the CRC by chance.
+        wrong: accepted answers that belong to another request.
+        forged: accepted answers without a sender; they have passed the CRC by chance.
         slowest: longest call, as a part of its worst case.
         unexplained: timeouts without a cause.
-        unseen: faults that nobody has counted, by kind.
+        unseen: faults not counted, by kind.
         injected: faults that were injected, by kind.
-        heard: bytes that the line brought to the master.
+        heard: bytes received by the master.
         decoded: bytes of them that are in frames, good and damaged.
-        inserted: frames behind which a byte was inserted, since their checksum ends in A5, near to damage.
-            Behind a damaged frame it belongs to nothing, and it may be missing behind a good one.
-        pieces: transmissions that arrived, by source.
-        unheard: faults that befell a request that nothing answers.
-        told: requests sent that nothing answers.
+        inserted: frames near to damage with a byte inserted after them, since their checksum ends in A5.
+            After a damaged frame it belongs to no frame, and it may be missing after a good one.
+        pieces: transmissions received, by source.
+        unheard: faults in requests without an answer.
+        told: requests sent without an answer.
     """
 
     def __init__(self, plan: FaultPlan, wire: Wire, ledger: Ledger, stations: list[Station]) -> None:
@@ -111,17 +111,17 @@ class Account:
 
     @property
     def digest(self) -> str:
-        """Of everything that was sent and heard, with its times."""
+        """Digest of all frames sent and received, with their times."""
         return self._digest.hexdigest()[:16]
 
     @property
     def asked(self) -> int:
-        """Transactions that were more than refused."""
+        """Transactions except the refused ones."""
         return self.transactions - self.outcomes["refused"]
 
     @property
     def paced(self) -> bool:
-        """Bytes take their time, and it is the virtual one."""
+        """Whether bytes take time on the virtual clock."""
         return bool(self._wire.baud)
 
     def _hear(self, _now: float, source: str, data: bytes) -> None:
@@ -132,7 +132,7 @@ class Account:
     # Events of the engine -----------------------------------------------------------------------------------
 
     def watch(self, skipped: Callable[[], int]) -> None:
-        """Learn how to ask for the bytes that were in no frame."""
+        """Set the function that returns the number of bytes outside frames."""
         self._skipped = skipped
 
     def event(self, event: events.Event) -> None:
@@ -168,7 +168,7 @@ class Account:
     # Transactions -------------------------------------------------------------------------------------------
 
     def begin(self, request: qlink.Message) -> tuple[int, int, int]:
-        """A call begins; what the simulation has counted so far tells what happened during it."""
+        """A call begins; returns the counts of the simulation so far."""
         self._ledger.begin(request.to_frame())
         self._before = self._trouble + self._elsewhere
         return self._simulated()
@@ -180,11 +180,11 @@ class Account:
         """A call has ended.
 
         Args:
-            before: what `begin` gave.
+            before: result of `begin`.
             outcome: name of the error, "answered", or "told".
-            response: the answer that was accepted, None where there is none.
-            part: the time that it took, as a part of its worst case.
-            at: when, seconds.
+            response: the accepted answer, or None.
+            part: the duration, as a part of its worst case.
+            at: time in seconds.
         """
         self.transactions += 1
         self.outcomes[outcome] += 1
@@ -201,13 +201,11 @@ class Account:
         answer = response.to_frame()
         verdict = self._ledger.judge(answer)
         if verdict == STALE:
-            self.wrong.append(
-                f"transaction {self.transactions}: {response} is the answer to another question"
-            )
+            self.wrong.append(f"transaction {self.transactions}: {response} is the answer to another request")
         self.forged += verdict == FORGED
 
     def _explain(self, before: tuple[int, int, int]) -> None:
-        """Every timeout has a cause: a fault, a collision, or a node that is away or must not answer."""
+        """Check the cause of every timeout: a fault, a collision, or a node that is absent or silent."""
         if not self._timeouts:
             return
         timeouts, self._timeouts = self._timeouts, []
@@ -224,7 +222,7 @@ class Account:
                 )
 
     def _follow(self, faults: list[Injected], at: float) -> None:
-        """Every fault is counted: by a timeout, a stray, a damaged frame, or bytes outside frames."""
+        """Check that every fault is counted as a timeout, stray, damaged frame or bytes outside frames."""
         if not faults and not self._open:
             return
         now = self._trouble + self._counted_elsewhere()
@@ -245,22 +243,22 @@ class Account:
         self._open = still
 
     def _counted_elsewhere(self) -> int:
-        """What no event tells: bytes outside frames at the master, and what the nodes have counted."""
+        """Counts without an event: bytes outside frames at the master, and the counters of the nodes."""
         nodes = sum(_repeated(each) for each in self._stations)
         return nodes + self._skipped()
 
     def _harmless(self, fault: Injected) -> bool:
-        """Nobody notices: it comes in time all the same, or what is lost is a request that nobody answers."""
+        """Whether a fault has no visible effect: the answer is in time, or the lost request has no answer."""
         code = self._ledger.frame[3]
         if fault.direction == TO_SLAVES and code in _UNANSWERED:
             return fault.kind not in {"stray", "noise"}
         return fault.kind == "delay" or (fault.kind == "late" and code == _PATIENT)
 
     def complaints(self) -> list[str]:
-        """What must not be, a few of each sort."""
-        unseen = [f"{count} {kind} were counted by nobody" for kind, count in self.unseen.items()]
+        """Errors found, a few of each kind."""
+        unseen = [f"{count} {kind} were not counted" for kind, count in self.unseen.items()]
         found = [*self.wrong[:5], *unseen]
-        if self.paced:  # in real time others may have the processor: that is no fault of the bus
+        if self.paced:  # in real time other programs may have the processor
             found += self.unexplained[:5]
             found += [f"a call took {self.slowest:.3f} of its worst case"] if self.slowest > 1 else []
         return found
@@ -268,7 +266,7 @@ class Account:
     # The end ------------------------------------------------------------------------------------------------
 
     def equations(self, total: LinkCounters) -> list[Equation]:
-        """What must be equal once the line is quiet."""
+        """The sums that must be equal once the line is quiet."""
         counts = self._plan.counts
         master, slaves = counts.to_master, counts.to_slaves
         refused = self.outcomes["refused"]
@@ -280,7 +278,7 @@ class Account:
         return [
             *([sent] if self.paced else []),  # without baud two requests may arrive as one
             Equation(
-                "requests sent that something answers",
+                "requests sent that require an answer",
                 "answers + timeouts",
                 (total.requests - self.told, total.answers + total.timeouts),
             ),
@@ -303,11 +301,11 @@ class Account:
             ),
             Equation(
                 "strays + noise injected",
-                "transmissions of nobody on the line",
+                "transmissions without a sender on the line",
                 (counts["stray"] + counts["noise"], self.pieces[LINE]),
             ),
             Equation(
-                "bytes that the line brought to the master",
+                "bytes received by the master",
                 "bytes of answers, strays and damaged frames + bytes outside frames",
                 (self.heard, self.decoded + total.skipped),
                 self.inserted,

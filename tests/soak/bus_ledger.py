@@ -1,7 +1,7 @@
-"""What really happened on a bus, noted where it happened: by the nodes themselves.
+"""A record of the answers on a bus, made by the nodes themselves.
 
-The master sees frames; whether the frame that it took for an answer is one can only be said by who sent it.
-So each node writes down every answer that it gives, with the request that it gave it to.
+Only the sender can tell whether a frame accepted by the master is an answer to the request. So each node
+records every answer with its request.
 """
 
 from __future__ import annotations
@@ -14,22 +14,22 @@ from qlinkgen.link import SlaveEngine
 from qlinkgen.link.codec import Codec
 from qlinkgen.protocols.qlink import VirtualNode
 
-#: Requests that are remembered: a copy of one arrives within a few of them, or never.
+#: Number of requests kept: a copy of one arrives within a few of them, or never.
 _SENT = 64
-#: Answers that are remembered, to tell an old one from one that nobody gave.
+#: Number of answers kept, to distinguish an old one from one without a sender.
 _TOLD = 4096
 
 TRUE, STALE, FORGED = "true", "stale", "forged"
 
 
 class Ledger:
-    """The question under way, and every answer that a node has given to it.
+    """The current request, and every answer of a node to it.
 
     Attributes:
-        frame: the question, as it is on the wire.
-        strays: answers that came unasked.
-        forged: requests that a node has read out of damaged bytes or strays, and that nobody has sent. They
-            pass the CRC by chance, one in 65536 of the badly damaged. The node does not get them.
+        frame: the wire bytes of the request.
+        strays: answers without a request.
+        forged: requests that a node has decoded from damaged bytes or strays, without a sender. They pass the
+            CRC by chance, one in 65536 of the badly damaged. They are not passed to the node.
     """
 
     def __init__(self) -> None:
@@ -41,14 +41,14 @@ class Ledger:
         self._told: deque[bytes] = deque(maxlen=_TOLD)
 
     def begin(self, frame: bytes) -> None:
-        """The master asks this now."""
+        """The master sends this request now."""
         self._told.extend(answer for _, answer in self._answers)
         self._answers = []
         self.frame = frame
         self._sent.append(frame)
 
     def asked(self, frame: bytes) -> bool:
-        """Whether the master has sent this lately."""
+        """Whether the master has sent this recently."""
         return frame in self._sent
 
     def answered(self, frame: bytes, answer: bytes) -> None:
@@ -56,9 +56,10 @@ class Ledger:
         self._answers.append((frame, answer))
 
     def judge(self, answer: bytes) -> str:
-        """Say what the frame is that the master takes for the answer.
+        """Classify the frame accepted by the master as the answer.
 
-        TRUE: a node gave it to this question. STALE: to another, or it is a stray. FORGED: nobody sent it.
+        TRUE: a node's answer to this request. STALE: to another request, or a stray. FORGED: it has no
+            sender.
         """
         if (self.frame, answer) in self._answers:
             return TRUE
@@ -67,14 +68,14 @@ class Ledger:
 
 
 class WitnessNode(VirtualNode):
-    """A virtual node that notes what it was asked and what it said."""
+    """A virtual node that records its requests and answers."""
 
     def __init__(self, ledger: Ledger, number: int, **settings: Any) -> None:
         super().__init__(number, record=True, **settings)
         self._ledger = ledger
 
     def handle(self, request: qlink.Message, now: float) -> qlink.Message | None:
-        """As a virtual node, for requests that somebody has sent."""
+        """Handle a request as a virtual node, if it has a sender."""
         frame = request.to_frame()
         if not self._ledger.asked(frame):
             self._ledger.forged += 1
@@ -89,10 +90,10 @@ class Station(SlaveEngine):
     """A node's place on the line, where its cable can be cut.
 
     Attributes:
-        node: who is there.
-        cut: the node hears nothing.
-        mute: the node hears, but nobody hears it.
-        muted: answers that nobody has heard for that reason.
+        node: the node.
+        cut: the node receives nothing.
+        mute: the node receives, but its answers are lost.
+        muted: number of answers lost in that way.
     """
 
     node: WitnessNode

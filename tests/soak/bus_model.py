@@ -1,7 +1,7 @@
-"""What a node must hold after all that was asked of it: the plainest model that can be.
+"""The expected state of a node after all calls: a simple model.
 
-A call that ended well has one outcome. One that failed may have reached the node or not: then both outcomes
-are possible, until the next call that ends well says more.
+A successful call has one outcome. A failed one may have reached the node or not: both outcomes are possible
+until the next successful call.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ Settings = tuple[float, float, int]
 
 
 class Mismatch(AssertionError):
-    """A node holds what it must not, or the master was told what is not so."""
+    """A node, or an answer, differs from the model."""
 
 
 class Held:
-    """What one node must hold.
+    """The expected state of one node.
 
     Attributes:
-        node: the node itself, looked at and never asked.
-        outputs: the values that its 24 outputs can have.
-        settings: what node_setup can have left there: T1, T2, position type.
+        node: the node itself, read directly.
+        outputs: the possible values of its 24 outputs.
+        settings: the possible settings by node_setup: T1, T2, position type.
         motor: data of the motor requests that can be the last one.
-        space: words that fit into its FIFO for certain.
-        certain: words of path that the node has acknowledged.
-        reached: motor requests that reached the node at least, ...
-        sent: ... and at most.
+        space: words that certainly fit into its FIFO.
+        certain: words of path acknowledged by the node.
+        reached: lowest number of motor requests that reached the node.
+        sent: highest number of them.
     """
 
     def __init__(self, node: WitnessNode) -> None:
@@ -44,7 +44,7 @@ class Held:
     # Words of path ------------------------------------------------------------------------------------------
 
     def words(self, sure: list[int], doubtful: list[int]) -> None:
-        """The node has acknowledged some words; behind them others may follow, which stay in doubt."""
+        """The node has acknowledged the words in `sure`; it may also have queued some of `doubtful`."""
         assert self.node.record is not None
         fresh = self.node.record.words[self._looked_at :].tolist()
         if fresh[: len(sure)] != sure or fresh[len(sure) :] not in ([], doubtful):
@@ -55,7 +55,7 @@ class Held:
         self.certain += len(sure)
 
     def words_dropped(self, doubtful: list[int]) -> None:
-        """Words in doubt were given up: the node took them before, or never will."""
+        """Words in doubt were dropped: the node has taken them already, or never will."""
         self.words([], doubtful)
         assert self.node.record is not None
         self._looked_at = len(self.node.record.words)
@@ -69,7 +69,7 @@ class Held:
         self.check()
 
     def wrote_perhaps(self, *outputs: int) -> None:
-        """Each of these may have been written to outputs 1 to 8, by a motion that is in doubt."""
+        """Each of these may have been written to outputs 1 to 8, by a motion in doubt."""
         self.outputs |= {each & ~0xFF | value for each in self.outputs for value in outputs}
         self.check()
 
@@ -91,14 +91,14 @@ class Held:
         self.motor = {data} if surely else self.motor | {data}
 
     def told_info(self, info: qlink.NodeInfoResponse) -> None:
-        """The node has told its settings."""
+        """The node has reported its settings."""
         told = (info.t1_delay, info.t2_delay, int(info.position_type))
         if told not in self.settings or info.serial_number != self.node.serial_number:
             raise Mismatch(f"node {self.node.number}: {info}, must be one of {self.settings}")
         self.settings = {told}
 
     def told_motor(self, answer: qlink.MotorResponsePollResponse) -> None:
-        """The node has told what its motor has completed."""
+        """The node has reported the completed motor request."""
         data = bytes(answer.motor_data)
         if answer.last_completion and (answer.last_completion != 0x16 or data not in self.motor):
             raise Mismatch(f"node {self.node.number}: {answer}, must be one of {self.motor}")
@@ -115,6 +115,6 @@ class Held:
         if path.queued != path.drained + path.dropped + path.waiting or path.queued != node.statistics.words:
             raise Mismatch(f"node {node.number}: its path has lost or invented words")
         if node.statistics.overruns:
-            raise Mismatch(f"node {node.number}: was given more words than it had room for")
+            raise Mismatch(f"node {node.number}: received more words than it had room for")
         if not self.reached <= node.statistics.motor_requests:
             raise Mismatch(f"node {node.number}: has taken fewer motor requests than it has acknowledged")

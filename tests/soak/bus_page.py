@@ -1,4 +1,4 @@
-"""What a soak has found, as text for the terminal and as docs/soak.md."""
+"""The results of a soak, as text for the terminal and as docs/soak.md."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from qlinkgen.sim.fault_kinds import KINDS
 from tests.soak.bus_run import LATE, PTY_LATE, PTY_SLACK, SHARE, SLACK, Result
 
 _SEEN_AS = {
-    "drop": "a timeout; of a request that nothing answers, not at all",
+    "drop": "a timeout; of a request without an answer, not at all",
     "flip": "a damaged frame, or bytes outside frames, and a timeout",
     "truncate": "a damaged frame, or bytes outside frames, and a timeout",
-    "delay": "nothing: the answer is right and in time",
+    "delay": "nothing: the answer is correct and in time",
     "late": "a timeout, and a late stray while the line is watched",
     "duplicate": "a collision and a timeout, or a stray",
     "stray": "a stray, or a collision",
     "noise": "bytes outside frames, or a damaged frame",
-    "silent": "timeouts, one for each answer that was swallowed",
+    "silent": "timeouts, one for each lost answer",
 }
 
 
@@ -39,7 +39,7 @@ def _figures(result: Result) -> list[tuple[str, str]]:
     return [
         ("transactions", _n(account.asked)),
         ("... answered", _n(account.outcomes["answered"])),
-        ("... that nothing answers", _n(account.outcomes["told"])),
+        ("... of commands without an answer", _n(account.outcomes["told"])),
         ("... failed with a LinkError", _n(total.failures)),
         ("refused, since the node was offline", _n(account.outcomes["refused"])),
         ("requests on the line, repeats among them", f"{_n(total.requests)}, {_n(total.repeats)}"),
@@ -49,14 +49,14 @@ def _figures(result: Result) -> list[tuple[str, str]]:
         ("timeouts", _n(total.timeouts)),
         ("damaged frames, strays, late among these", f"{_n(damaged)}, {_n(total.strays)}, {_n(total.late)}"),
         ("wrong answers accepted", _n(len(account.wrong))),
-        ("frames that nobody sent and that passed the CRC", _n(account.forged + result.forged_requests)),
+        ("frames without a sender that passed the CRC", _n(account.forged + result.forged_requests)),
         ("words of path queued, lost or queued twice", f"{_n(result.words)}, {none}"),
         ("pieces of programs stored, lost or stored twice", f"{_n(result.pieces)}, {none}"),
-        ("repeats that a node recognised and did not take again", _n(result.repeats)),
-        ("faults that nobody has counted", _n(account.unseen.total())),
+        ("repeats recognised by a node and not taken again", _n(result.repeats)),
+        ("faults not counted", _n(account.unseen.total())),
         ("timeouts without a cause", _n(len(account.unexplained))),
-        ("longest call, of its worst case", f"{100 * account.slowest:.1f} %"),
-        ("digest of the log", account.digest if account.paced else "not the same twice: real time"),
+        ("longest call, share of its worst case", f"{100 * account.slowest:.1f} %"),
+        ("digest of the log", account.digest if account.paced else "differs between runs: real time"),
     ]
 
 
@@ -94,80 +94,73 @@ def as_page(results: Sequence[Result], seconds: Sequence[float], command: str) -
 _PAGE = """\
 # Soak: a million transactions on a bad line
 
-Five simulated nodes on one line, one of them with a cut cable every now and then (it hears nothing, or
-nobody hears it), one that does not support every command, and a master that asks all commands of the
-document in random order: motions and streams of motion, loads of programs, settings, new node numbers,
-inputs and outputs, resets, questions to nodes that are not there. Each transmission meets each of the nine
-kinds of faults with a chance of {share} %, so that 5 % of the answers are hit.
+Five simulated nodes on one line, one of them at times with a cut cable (it receives nothing, or its answers
+are lost), one without support for some commands, and a master that sends all commands of the document in
+random order: motions and streams of motion, loads of programs, settings, new node numbers, inputs and
+outputs, resets, requests to nodes that do not exist. Each transmission is hit by each of the nine kinds of
+faults with a chance of {share} %, so that 5 % of the answers are hit.
 
-`make soak` runs it and writes this page; the last time it was
+`make soak` runs it and writes this page; the last run:
 
 ```
 {command}
 ```
 
-({took}). The tests run the same code, shorter.
+({took}). The tests run the same code, with fewer transactions.
 
 ## Figures
 
 {figures}
 
-What each row stands on:
+How the rows are checked:
 
-- *Wrong answers accepted*: each node writes down what it answers to which question. An answer that the
-  master takes has to be one that was given to this very question, and its values have to be those of the
-  model.
-- *Words*: the words that a node has queued are compared with those that the calls have handed over, after
-  every call. After a call that failed, those that are `pending` may have been queued or not; the next call
-  has to settle it.
-- *Pieces*: after a load the node holds the text, byte for byte; after one that failed, a beginning of it.
-- *Frames that nobody sent*: a CRC of 16 bits lets one in 65536 of the badly damaged frames pass, whoever
-  looks. The nodes of the soak recognise such a request and ignore it, and such an answer is counted here,
-  not as a wrong one.
-- *Longest call*: the time that each call took, divided by `Timing.worst_case` of its command.
-- *Digest*: of every frame sent and heard, with its time. On the virtual clock a seed always gives the same
-  one.
+- *Wrong answers accepted*: each node records its answers with their requests. An answer accepted by the
+  master has to be one given to this request, and its values have to be those of the model.
+- *Words*: after every call, the words queued by a node are compared with those passed to the calls. After a
+  failed call, the `pending` words may have been queued or not; the next call has to settle it.
+- *Pieces*: after a load the node holds the text, byte for byte; after a failed one, a beginning of it.
+- *Frames without a sender*: one in 65536 badly damaged frames passes a CRC of 16 bits. The nodes of the soak
+  recognise such a request and ignore it; such an answer is counted here, not as a wrong one.
+- *Longest call*: the duration of each call, divided by `Timing.worst_case` of its command.
+- *Digest*: of every frame sent and received, with its time. On the virtual clock it depends only on the seed.
 
 ## Every fault is counted
 
 {faults}
 
-For each fault that was injected the soak waits for something to be counted, at the latest four transactions
-later: a timeout, a stray, a damaged frame, bytes outside frames, or a repeat that a node has recognised.
-Exempt are `delay`, `late` where the answer of a node_program_load is still in time, and the loss of
-requests that nothing answers (node_start, node_stop, node_sync), which a master cannot notice. The other
-way round each timeout has to have a cause: a fault, a collision, a node that is not there or does not
-answer this.
+Each injected fault must be counted within four transactions: as a timeout, a stray, a damaged frame, bytes
+outside frames, or a repeat recognised by a node. Exempt are `delay`, `late` if the answer of a
+node_program_load is still in time, and the loss of requests without an answer (node_start, node_stop,
+node_sync), which a master cannot notice. Conversely each timeout must have a cause: a fault, a collision, a
+node that does not exist or does not answer this command.
 
 These sums have to be equal at the end:
 
 {equations}
 
-The last one may differ by the byte that is inserted behind a checksum ending in A5 where the frame in front
-of it is damaged: it belongs to no frame then. Over a pty there is no baud rate, so two requests may arrive
-in one piece and the transmissions of the master are not compared; and since other programs may have the
-processor, a timeout needs no other cause there, and no call has to be in time.
+The last sums may differ by the bytes inserted after checksums ending in A5: after a damaged frame such a byte
+belongs to no frame. A pty has no baud rate, so two requests may arrive in one piece, and the transmissions of
+the master are not compared; since other programs may have the processor, a timeout over the pty may have no
+other cause, and calls have no time limit.
 
-## What no master can tell apart
+## Answers that a master cannot distinguish
 
-An answer to a question carries the node and the command. Only motion and node_program_load repeat the
-number of the question as well, loop_back its data and read, in a way, its size. So an answer to
-motor_position that comes when the same node has been asked motor_position *again* cannot be told from the
-answer to the second question: by no master, as the bytes are the same. What the master does about it is
-time. After a timeout it wants the line to be quiet for three byte times and the host slack before it asks
-again, so an answer that is late by less than deadline + quiet is heard as a stray. The host slack here is
-{slack} ms on the virtual clock and {pty_slack} ms over the pty, and `late` answers are {late} ms late,
-{pty_late} ms over the pty: too late for the deadline, and within the silence. An answer that is later still
-meets the next attempt of the same call, for which it is right, or a question of its own kind: then a
-position may be an old one. Words and programs stay safe even then, since a node takes a number once and the
-master goes on only with the answer to that number; tests/qlink/test_late.py proves it with answers that are
-late by any time.
+An answer carries the node and the command. Only motion and node_program_load repeat the number of the request
+as well, loop_back its data, and read indirectly its size. So an answer to motor_position that is received
+after the same node was sent motor_position *again* cannot be distinguished from the answer to the second
+request: the bytes are the same. The master uses time instead. After a timeout it waits until the line is
+quiet for three byte times plus the host slack before the next request, so an answer that is late by less than
+deadline + quiet is counted as a stray. The host slack here is {slack} ms on the virtual clock and {pty_slack}
+ms over the pty, and `late` answers are {late} ms late, {pty_late} ms over the pty: too late for the deadline,
+and within the silence. An even later answer is accepted by the next attempt of the same call, for which it is
+correct, or by a request of the same kind: then a position may be old. Words and programs are safe even then,
+since a node takes a number once and the master continues only with the answer to that number;
+tests/qlink/test_late.py proves it with answers of any delay.
 
-For the same reason a copy of a transmission follows at once: a copy of a request that came behind the
-next request would be done after it, and no slave could know.
+For the same reason a copy of a transmission follows at once: a node would carry out a copy of a request
+received after the next request, and could not detect it.
 
-Strays are valid answers that are not an answer to the question under way, for the same reason. None of them
-is a frame that a node could take for a request: nothing in a frame tells the two apart, and an answer to
-clear_fifo, node_reset, write_read, loop_back or the opening of a load *is* a request for its node, to the
-last bit.
+For the same reason strays are valid answers, but not to the current request. None of them could be read as a
+request by a node: frames do not show their direction, and an answer to clear_fifo, node_reset, write_read,
+loop_back or the opening of a load is identical to a request for its node.
 """

@@ -1,4 +1,4 @@
-"""One soak: a bus, its nodes, faults, traffic, and the account of it all."""
+"""One soak: a bus, its nodes, faults, traffic, and the account."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from qlinkgen.transport import Port, open_port
 from tests.soak.bus_account import Account, Equation
 from tests.soak.bus_ledger import Ledger, Station, WitnessNode
 from tests.soak.bus_model import Held, Mismatch
-from tests.soak.bus_traffic import NOBODY, NUMBERS, UNSUPPORTED, Traffic
+from tests.soak.bus_traffic import ABSENT, NUMBERS, UNSUPPORTED, Traffic
 
 #: Numbers of the nodes at the beginning.
 NODES = (1, 2, 3, 4, 5)
-#: Seconds that the host may add: more than the longest answer takes, so what is late is so for every command.
+#: Host slack in seconds: longer than the longest answer, so a late one is late for every command.
 SLACK = 0.012
-#: Seconds: later than any deadline but that of node_program_load, and within the silence that is waited for.
+#: Seconds: later than any deadline except that of node_program_load, and within the silence before a repeat.
 LATE = (0.018, 0.024)
-#: On a pty the simulator may not run for a while, and only the slack makes up for it.
+#: On a pty the simulator may not run for a while; the slack has to cover that.
 PTY_SLACK = 0.05
-#: What is late then: so much later than the slack.
+#: Late answers over a pty: seconds later than the slack.
 PTY_LATE = (0.012, 0.035)
 #: Chance of each kind of fault in one transmission: nine of them hit 5 % of the answers.
 SHARE = 0.05 / 9
 #: Share of the damaged frames that may pass the CRC; by chance it is one in 65536.
 BY_CHANCE = 16 / 65536
-#: Seconds after which nothing is on its way any more.
+#: Seconds after which no bytes are in transit.
 SETTLES = 0.3
 
 
 class SoakBus(Bus):
-    """A bus whose every transaction goes into the account."""
+    """A bus that passes every transaction to the account."""
 
     def __init__(self, port: Port, account: Account, slack: float) -> None:
         super().__init__(port, echo="none", slack=slack, on_event=account.event)
@@ -71,7 +71,7 @@ class SoakBus(Bus):
 
 @dataclass
 class Result:
-    """What came of a soak."""
+    """The result of a soak."""
 
     name: str
     seed: int
@@ -98,9 +98,9 @@ class Soak:
     def __init__(
         self, rates: Mapping[str, RateLike], *, baud: int | None, seed: int, steady: bool = False
     ) -> None:
-        """Faults happen at these rates; `baud` None is a line on which bytes take no time.
+        """Faults occur at these rates; with `baud` None bytes take no time.
 
-        On a `steady` bus no cable is cut, and nobody is asked who is not there.
+        On a `steady` bus no cable is cut, and no absent node gets a request.
         """
         self.seed = seed
         self._steady = steady
@@ -128,13 +128,13 @@ class Soak:
         return Station(qlink, node)
 
     def _stray(self, chance: random.Random) -> bytes:
-        """A valid answer, but not to what is asked: from a node that there is not, or of another command.
+        """A valid answer, but not to the request: from an absent node, or to another command.
 
         No slave can take it for a request. On a line without baud nothing keeps a stray from meeting the next
         question, so there a node's own strays are all motions with another counter.
         """
         if chance.random() < 0.3:
-            return qlink.MotionResponse(node=chance.choice(NOBODY), counter=chance.randrange(256)).to_frame()
+            return qlink.MotionResponse(node=chance.choice(ABSENT), counter=chance.randrange(256)).to_frame()
         asked = self.ledger.frame
         node = asked[4] if chance.random() < 0.5 and asked[4] in NUMBERS else chance.choice(NUMBERS)
         counter = self._counters(node) + 100 & 0xFF
@@ -156,7 +156,7 @@ class Soak:
         return frame
 
     def run(self, name: str, port: Port, slack: float, transactions: int) -> Result:
-        """Use the bus until so many transactions are done, then let it get quiet, and add up."""
+        """Use the bus until `transactions` are done, wait until it is quiet, and compare the sums."""
         bus = SoakBus(port, self.account, slack)
         self._counters = lambda number: bus.state.motions[number].counter
         held = {number: Held(station.node) for number, station in self.stations.items()}
@@ -173,9 +173,7 @@ class Soak:
         complaints += self.account.complaints()
         forged = self.account.forged + self.ledger.forged
         if forged > BY_CHANCE * sum(bus.engine.total.damaged.values()) + 2:
-            complaints.append(
-                f"{forged} frames that nobody sent have passed the CRC: more than chance allows"
-            )
+            complaints.append(f"{forged} frames without a sender have passed the CRC: more than by chance")
         equations = [] if complaints else self.account.equations(bus.engine.total)
         complaints += [str(each) for each in equations if not each.holds]
         statistics = [each.node.statistics for each in held.values()]
@@ -203,13 +201,13 @@ class Soak:
         )
 
     def _settle(self, bus: SoakBus, traffic: Traffic) -> None:
-        """No more faults: every node must be there, and hold what it must."""
+        """Without faults: check that every node answers and agrees with the model."""
         traffic.mend()
         self.wire.faults = None
         bus.port.sleep(SETTLES)
         found = [each.node for each in bus.scan(sorted(traffic.nodes) if self._steady else NUMBERS)]
         if found != sorted(traffic.nodes):
-            raise Mismatch(f"nodes {found} are there, must be {sorted(traffic.nodes)}")
+            raise Mismatch(f"nodes {found} answer, must be {sorted(traffic.nodes)}")
         traffic.finish()
 
 
@@ -231,7 +229,7 @@ def pty(transactions: int, seed: int, slack: float = PTY_SLACK) -> Result:
 def faults(late: tuple[float, float]) -> dict[str, RateLike]:
     """Faults of all kinds, so many that they hit 5 % of the answers.
 
-    A copy follows at once: a copy of a request that came behind the next one would be done after it.
+    A copy follows at once: a node would carry out a copy of a request received after the next request.
     """
     rates: dict[str, RateLike] = dict.fromkeys(KINDS, SHARE)
     return {**rates, "late": (SHARE, *late), "silent": (SHARE, 0.02, 0.2), "duplicate": (SHARE, 0.0, 0.0)}

@@ -1,4 +1,4 @@
-"""A random mix of everything that can be asked of a bus, each outcome held against the model."""
+"""A random mix of all operations of a bus, each outcome compared with the model."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from qlinkgen.transport import Ability
 from tests.soak.bus_ledger import Station
 from tests.soak.bus_model import Held, Mismatch
 
-#: Numbers that the nodes take in turn, and one that stays free for a node to move to; nobody has the others.
+#: Numbers of the nodes, and free ones for a node to move to; the absent numbers are never used.
 NUMBERS = range(1, 9)
-NOBODY = range(9, 17)
-#: What the third node cannot do.
+ABSENT = range(9, 17)
+#: Commands that the third node does not support.
 UNSUPPORTED = ("write_read", "loop_back")
 
 
@@ -24,7 +24,7 @@ class Traffic:
     """The user of the bus.
 
     Attributes:
-        bus: what is used.
+        bus: the bus in use.
         nodes: model of each node, by its number.
         failed: operations that ended in a LinkError.
     """
@@ -48,23 +48,21 @@ class Traffic:
             self._pause: 2,
         }  # fmt: skip
         if bus.port.capabilities.paced is not Ability.YES:
-            del weights[
-                self._again
-            ]  # in real time an answer may be later than any silence that is waited for
+            del weights[self._again]  # in real time an answer may be later than the silence before a repeat
         if steady:
             del weights[self._absent], weights[self._move]
         for operation, weight in weights.items():
             self._operations += [operation] * weight
 
     def step(self) -> None:
-        """One operation on one node."""
+        """Do one operation on one node."""
         if not self._steady:
             self._cut()
         number = self._random.choice(sorted(self.nodes))
         self._random.choice(self._operations)(number, self.nodes[number])
 
     def _cut(self) -> None:
-        """Every now and then the cable of one node is cut for a while, or the wire on which it sends."""
+        """At times cut the cable of one node for a while, or only the wire on which it sends."""
         self._cut_for -= 1
         if self._cut_for == 0:
             self.mend()
@@ -75,7 +73,7 @@ class Traffic:
             station.mute = not station.cut
 
     def mend(self) -> None:
-        """All cables are whole."""
+        """Repair all cables."""
         for station in self._stations.values():
             station.cut = station.mute = False
 
@@ -87,7 +85,7 @@ class Traffic:
             self.failed += 1
 
     def _number(self, bits: int) -> int:
-        # Many bytes of 0xA5: those are stuffed, and make beginnings of frames out of damage.
+        # Many bytes of 0xA5: they are stuffed, and damage turns them into beginnings of frames.
         return self._random.choice((self._random.getrandbits(bits), 0xA5A5_A5A5 & ((1 << bits) - 1)))
 
     def _bytes(self, most: int) -> bytes:
@@ -95,7 +93,7 @@ class Traffic:
         return self._random.choice((self._random.randbytes(size), b"\xa5" * size))
 
     def finish(self) -> None:
-        """Settle what is in doubt, and compare everything once more."""
+        """Settle all doubts, and compare everything once more."""
         for number, held in self.nodes.items():
             held.space = 0
             before = self.failed
@@ -104,7 +102,7 @@ class Traffic:
             self._position(number, held)
             held.check()
             if self.failed != before:
-                raise Mismatch(f"node {number} does not answer, although nothing disturbs it")
+                raise Mismatch(f"node {number} does not answer, although the line has no faults")
 
     # Path ---------------------------------------------------------------------------------------------------
 
@@ -209,10 +207,10 @@ class Traffic:
                 raise Mismatch(f"node {number}: read {data.hex()}, inputs are {held.node.inputs:06x}")
 
     def _again(self, number: int, held: Held) -> None:
-        """The same question again and again, while its answer changes: no old one may be taken.
+        """Repeat the same request while its answer changes: no old answer may be accepted.
 
-        Each is asked once, so that a late answer comes when the question is given up. A copy of an answer
-        gets the time that it takes: to a question that was lost it would be as good as the answer.
+        Each has one attempt, so that a late answer arrives after the call. Time is left for a copy of an
+        answer: it would pass for the answer to a lost request.
         """
         for _ in range(4):
             held.node.inputs = self._number(24) & ~1
@@ -290,7 +288,7 @@ class Traffic:
         return surely
 
     def _move(self, number: int, held: Held) -> None:
-        """Give a node another number. When no answer comes it may have either: look for it."""
+        """Give a node another number. Without an answer it may have either: search for it."""
         if self.bus.state.motions[number].pending is not None:
             return
         new = self._random.choice([each for each in NUMBERS if each not in self.nodes])
@@ -346,7 +344,7 @@ class Traffic:
             return
         image = held.node.program
         if image is None or image.text != text:
-            raise Mismatch(f"node {number}: holds another program than it was given")
+            raise Mismatch(f"node {number}: holds another program than the loaded one")
 
     def _program(self) -> bytes:
         lines = []
@@ -361,9 +359,9 @@ class Traffic:
         self.bus.node_sync()
 
     def _absent(self, number: int, held: Held) -> None:
-        nobody = self._random.choice(NOBODY)
+        absent = self._random.choice(ABSENT)
         with self._may_fail():
-            raise Mismatch(f"node {nobody} does not exist: {self.bus.motor_position(nobody)}")
+            raise Mismatch(f"node {absent} does not exist: {self.bus.motor_position(absent)}")
 
     def _pause(self, number: int, held: Held) -> None:
         self.bus.port.sleep(self._random.uniform(0.0, 0.02))

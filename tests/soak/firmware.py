@@ -1,8 +1,8 @@
 """Soak the example firmware: `python -m tests.soak.firmware [--transactions N] [--targets NAME...]`.
 
 Each port of the Q.link node is built, runs as a process or on an emulator, and gets a random mix of all
-requests among damaged frames, foreign ones and noise; every answer has to be that of a model. With
-`--output PATH` the figures become a section of that page.
+requests among damaged frames, foreign ones and noise; every answer has to be that of a model. `--output PATH`
+writes the figures as a section of that page.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from tests.soak import firmware_run as run
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the soak on each port; 1 where something is wrong, 2 where a tool is missing."""
+    """Run the soak on each port; 1 if a result is wrong, 2 if a tool is missing."""
     options = _options(arguments, list(firmware.TARGETS))
     if options.output and not Path(options.output).exists():
         print(
-            f"soak.firmware: {options.output} is not there; it has to have a page to put into",
+            f"soak.firmware: {options.output} does not exist; name an existing page to update",
             file=sys.stderr,
         )
         return 2

@@ -1,4 +1,4 @@
-"""What a firmware has to answer and to be: a virtual node that is told the same."""
+"""The expected answers and state of a firmware: a virtual node that receives the same bytes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from qlinkgen.protocols.qlink.hex_image import BrokenRecord, HexReader
 from qlinkgen.protocols.qlink.program_store import ProgramStore
 from tests.firmware.diagnostics import Counters, Diagnostics, ProgramState
 
-#: Seconds that pass for the model where the firmware is given the time to come to rest.
+#: Seconds that pass for the model while the soak waits until the firmware is at rest.
 REST = 10.0
 _INIT = 0xFFFF
 
 
 class SmallReader(HexReader):
-    """Reads programs for a memory of so many bytes from address 0 on."""
+    """Reads programs for a memory of `size` bytes from address 0 on."""
 
     def __init__(self, size: int) -> None:
         super().__init__()
@@ -33,7 +33,7 @@ class SmallReader(HexReader):
 
 
 class SmallStore(ProgramStore):
-    """Takes no more than a memory of so many bytes holds."""
+    """A program store of `size` bytes."""
 
     def __init__(self, node: VirtualNode, size: int) -> None:
         super().__init__(node.statistics)
@@ -45,7 +45,7 @@ class SmallStore(ProgramStore):
 
     @property
     def state(self) -> ProgramState:
-        """How far the load has come."""
+        """The progress of the load."""
         if self._reader is None:
             return ProgramState.NONE
         if self.fault:
@@ -55,7 +55,7 @@ class SmallStore(ProgramStore):
 
 @dataclass(frozen=True)
 class Look:
-    """A node from inside, as far as two can be compared that do not share a clock."""
+    """The internal state of a node, as far as nodes with different clocks can be compared."""
 
     counters: Counters
     words: tuple[int, int]
@@ -71,16 +71,16 @@ class Look:
     lost: int
 
     def differences(self, other: Look) -> list[str]:
-        """Return what is different, in words."""
+        """Return the differences as text."""
         return [
-            f"{name}: {mine}, and it ought to be {theirs}"
+            f"{name}: {mine}, must be {theirs}"
             for name in (each.name for each in fields(self) if each.compare)
             if (mine := getattr(self, name)) != (theirs := getattr(other, name))
         ]
 
 
 def look_into(inside: Diagnostics, places: Iterable[tuple[int, int]]) -> Look:
-    """Look into a firmware; of the program's memory, at these places (address, size)."""
+    """Read the state of a firmware; of the program's memory, `places` (address, size)."""
     program, state = inside.program(), inside.state()
     return Look(
         inside.counters(),
@@ -96,11 +96,11 @@ class Model:
 
     Attributes:
         node: the node.
-        requests: requests to the node that were on the line.
+        requests: requests to the node on the line.
     """
 
     def __init__(self, program_size: int, **settings: Any) -> None:
-        """Make it as after power-up, with the settings of `VirtualNode`."""
+        """Begin in the state after power-up, with the settings of `VirtualNode`."""
         self.node = VirtualNode(record=True, **settings)
         self.node.store = self._store = SmallStore(self.node, program_size)
         self._engine = SlaveEngine(qlink, self.node)
@@ -108,28 +108,28 @@ class Model:
 
     @property
     def requests(self) -> int:
-        """Requests to the node that were on the line."""
+        """Requests to the node on the line."""
         return self.node.statistics.requests
 
     @property
     def motion_counter(self) -> int | None:
         """Counter of the motion taken last."""
-        return self.node._motion_counter  # what a master would know
+        return self.node._motion_counter  # known to a master too
 
     @property
     def places(self) -> list[tuple[int, int]]:
-        """Address and size of everything that the loaded program has put into memory."""
+        """Address and size of all pieces of the loaded program in memory."""
         image = self.node.program
         return [(start, len(data)) for start, data in image.segments] if image is not None else []
 
     def hear(self, data: bytes) -> bytes:
-        """Return what has to be answered to what is on the line, b"" for nothing."""
+        """Return the answer to these bytes, b"" if there is none."""
         self._engine.receive(data, self._now)
         due = self._engine.next_timer()
         return b"" if due is None else self._engine.bytes_to_send(due)
 
     def rest(self) -> None:
-        """Let so much time pass that nothing moves any more, unless nothing ever does."""
+        """Let time pass until the motor is at rest, if it can be."""
         self._now += REST
         self.node.advance(self._now)
 
@@ -138,7 +138,7 @@ class Model:
         self.node.set_inputs(inputs, self._now)
 
     def look(self) -> Look:
-        """Look into it."""
+        """Read its state."""
         node, counts = self.node, self.node.statistics
         words = node.record.words if node.record is not None else []
         image = node.program

@@ -1,4 +1,4 @@
-"""What the soak of the firmware has found, as text for the terminal and as a section of docs/soak.md."""
+"""The results of the firmware soak, as text for the terminal and as a section of docs/soak.md."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def _figures(result: Result) -> list[tuple[str, str]]:
         ("runs as", _BORN[result.target]),
         ("transactions", _n(result.transactions)),
         ("... answered", _n(result.answered)),
-        ("requests damaged on purpose", _n(sent["corrupted"])),
-        ("frames with a right checksum and anything in them", _n(sent["malformed"])),
-        ("requests to other nodes, and answers of them", _n(sent["stray"])),
+        ("deliberately damaged requests", _n(sent["corrupted"])),
+        ("frames with a correct checksum and any contents", _n(sent["malformed"])),
+        ("requests to other nodes, and their answers", _n(sent["stray"])),
         ("noise, 1 to 20 bytes", _n(sent["noise"])),
-        ("of these four: broadcasts, or requests after all", _n(result.effective)),
+        ("of these four: broadcasts, or valid requests", _n(result.effective)),
         ("comparisons of the whole state", _n(result.comparisons)),
-        ("wrong answers, answers that nobody asked for, wrong states", "1" if result.complaint else "0"),
+        ("wrong answers, answers without a request, wrong states", "1" if result.complaint else "0"),
         ("transactions a second", _n(round(result.rate))),
     ]
 
@@ -47,7 +47,7 @@ def _n(number: int) -> str:
 
 
 def put_into(page: str, results: Sequence[Result]) -> str:
-    """Return a page with this section, in the place of the one that it had or at its end."""
+    """Return a page with this section, in place of the old one or at the end."""
     section = "\n\n" + as_section(results).rstrip("\n")
     if _SECTION.search(page):
         return _SECTION.sub(lambda _: section, page).rstrip("\n") + "\n"
@@ -74,12 +74,12 @@ _PAGE = """\
 {title}
 
 The slave of examples/firmware on each of its ports, over the serial line of its process or emulator. Each
-gets a random mix of all commands, with many bytes of A5 and 00, repeated and wrong counters, full FIFOs, and
-programs right and broken; between them come damaged requests, frames that are not for it, and noise. A
-virtual node is told the same bytes: each answer of the firmware has to be that of the virtual node, byte for
-byte, and where that one is silent so has to be the firmware. Every {compared} transactions the two are
-compared from inside: all counters, outputs, inputs, FIFO, position, path words, program. Every {phase} the
-node is configured anew. The last time it was
+receives a random mix of all commands, with many bytes of A5 and 00, repeated and wrong counters, full FIFOs,
+and correct and broken programs; between them damaged requests, frames for other nodes, and noise. A virtual
+node receives the same bytes: each answer of the firmware has to be that of the virtual node, byte for byte,
+and the firmware must not answer if the virtual node does not. Every {compared} transactions the two are
+compared internally: all counters, outputs, inputs, FIFO, position, path words, program. Every {phase} the
+node is configured anew. The last run:
 
 ```
 python -m tests.soak.firmware --transactions {count} --seed {seed} --output docs/soak.md
@@ -87,8 +87,8 @@ python -m tests.soak.firmware --transactions {count} --seed {seed} --output docs
 
 {figures}
 
-Time stands still for both: a motor that moves is waited for, and delays from input 1 to output 1 are 0 where
-input 1 changes. What takes time is tested by the behaviours that firmware and simulated nodes share. The
-emulators hold bytes back while a receive buffer is full, so nothing is said here about overruns, and the
-speed is that of the emulator.
+Results do not depend on time: the soak waits for a moving motor, and delays from input 1 to output 1 are 0
+while input 1 changes. Timed behaviour is tested by the behaviours shared by firmware and simulated nodes. The
+emulators hold bytes back while a receive buffer is full, so overruns are not tested here, and the speed is
+that of the emulator.
 """

@@ -1,4 +1,4 @@
-"""Texts of programs, right ones and broken ones, and the requests that load them."""
+"""Texts of programs, correct and broken, and the requests that load them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Texts:
             self._wrong_size,
             self._text_between,
             self._after_the_end,
-            self._after_the_end,  # twice: all of the text before it has to be loaded
+            self._after_the_end,  # listed twice: it needs all of the text before it loaded
         )
 
     def right(self) -> bytes:
@@ -40,7 +40,7 @@ class Texts:
         return self._joined(self._records())
 
     def broken(self) -> bytes:
-        """Return a text that a node must not believe in."""
+        """Return a text that a node must reject."""
         records = self._records()[-self._random.randint(1, 3) :]  # a short one, so that its fault is reached
         self._random.choice(self._spoilers)(records)
         return self._joined(records)
@@ -111,7 +111,7 @@ class Texts:
 
 
 class Loader:
-    """Loads one program after the other, as a master would and sometimes as none should."""
+    """Loads one program after the other, sometimes with errors in the sequence."""
 
     def __init__(self, chance: random.Random, size: int) -> None:
         self._random = chance
@@ -123,7 +123,7 @@ class Loader:
         self._pending = (0, 0)
 
     def request(self, node: int) -> qlink.Message:
-        """Return what is sent next."""
+        """Return the next request."""
         chance = self._random.random()
         piece = self._text[self._at : self._at + self._random.choice((1, 7, 24, 25))]
         self._pending = (0, 0)
@@ -146,7 +146,7 @@ class Loader:
         return qlink.NodeProgramLoadRequest(node=node)
 
     def told(self, *, acknowledged: bool) -> None:
-        """Learn what became of the last request."""
+        """Take the result of the last request."""
         if acknowledged:
             self._at += self._pending[0]
             self._counter = (self._counter + self._pending[1]) % 256

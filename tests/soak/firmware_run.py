@@ -1,4 +1,4 @@
-"""Sends a random mix to a firmware, and holds every answer and its state against a model."""
+"""Sends a random mix to a firmware, and compares every answer and its state with a model."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ from tests.soak.firmware_traffic import ALWAYS, REQUESTS, Traffic, Unit
 #: Transactions until the node is configured anew, and until its state is compared.
 PHASE = 500
 COMPARED = 50
-#: Chance that the levels at the inputs change behind a transaction.
+#: Chance that the levels at the inputs change after a transaction.
 INPUTS = 0.04
-#: Path words a second of a motor that moves.
+#: Path words a second of a moving motor.
 FAST = 50_000
-#: Bytes that may be sent behind the last answer. The smallest receive buffer holds twice as many, so that a
-#: request to which an answer is certain still fits.
+#: Bytes that may be sent after the last answer. The smallest receive buffer holds twice as many, so that a
+#: request with a certain answer still fits.
 UNREAD = 64
-#: Seconds until a motor answers that is not to answer.
+#: Response time in seconds of a motor that must not answer during the soak.
 NEVER = 65.0
 #: Commands that every node supports: those that carry diagnostics, and the one that is always answered.
 KEPT = {"motor_request", "motor_response_poll", ALWAYS}
 PROGRAM_LOAD = REQUESTS["node_program_load"].NAME
-#: Units that a failure shows.
+#: Number of units shown by a failure.
 SHOWN = 8
 
 
 class WrongAnswer(AssertionError):
-    """The firmware did something else than the model; the text shows the last bytes sent."""
+    """The firmware differs from the model; the text shows the last bytes sent."""
 
 
 @dataclass
 class Result:
-    """What a soak has found.
+    """The result of a soak.
 
     Attributes:
         target: port of the firmware.
         seed: of all random numbers.
-        wanted: transactions that were to be done at least.
+        wanted: lowest number of transactions to do.
         asked: transactions by command.
         sent: units by kind.
         answered: transactions with an answer.
-        effective: disturbances that were requests after all, and answered like them.
-        comparisons: how often the whole state was compared.
-        seconds: how long it took.
+        effective: disturbances that were valid requests, and answered like them.
+        comparisons: number of comparisons of the whole state.
+        seconds: duration.
         digest: CRC-32 of all bytes sent.
-        complaint: what was wrong, empty where nothing was.
+        complaint: the error, or empty.
     """
 
     target: str
@@ -83,7 +83,7 @@ class Soak:
     """One firmware under test.
 
     Attributes:
-        result: what was found so far.
+        result: the result so far.
     """
 
     # What belongs to the settings of a phase.
@@ -99,10 +99,10 @@ class Soak:
         self._unread = 0
 
     def run(self, transactions: int) -> Result:
-        """Do so many.
+        """Do at least `transactions`.
 
         Raises:
-            WrongAnswer: at the first thing that is wrong.
+            WrongAnswer: at the first difference.
         """
         began, self.result.wanted = time.monotonic(), transactions
         try:
@@ -115,7 +115,7 @@ class Soak:
         return self.result
 
     def _configure(self) -> None:
-        """Let firmware and model be as after power-up, with other settings than before."""
+        """Put firmware and model in the state after power-up, with new settings."""
         chance = self._random
         delays, number, motor = chance.random() < 0.5, chance.randint(1, 16), chance.choice(MOTORS)
         gone = chance.sample([each for each in REQUESTS if each not in KEPT], chance.choice((0, 0, 1, 3)))
@@ -123,7 +123,7 @@ class Soak:
         self._moves = settings["rate"] > 0
         self._traffic = Traffic(chance, PROGRAM_SIZE, delays=delays)
         FirmwareNode(self._line, number, motor=motor, unsupported=gone, **settings)
-        # What never happens while the soak lasts must not happen in the model when its time jumps either.
+        # Events later than the end of the soak must not occur in the model either when its time jumps.
         settings["motor_seconds"] *= 1e9
         self._model = Model(PROGRAM_SIZE, number=number, motor=motor, unsupported=gone, **settings)
 
@@ -141,7 +141,7 @@ class Soak:
         }
 
     def _phase(self, transactions: int) -> None:
-        """Do so many with the same settings."""
+        """Do `transactions` with the same settings."""
         end, compared = self.result.transactions + transactions, self.result.transactions
         while self.result.transactions < end:
             for unit in self._traffic.disturbances(self._model.node):
@@ -188,7 +188,7 @@ class Soak:
         if unit.kind == "request":
             result.asked[unit.name.partition(".")[0]] += 1
             if requests != 1:
-                self._fail("the codec does not recognise the intact request that was sent last")
+                self._fail("the codec does not recognise the intact request sent last")
         else:
             result.effective += requests
 
@@ -203,12 +203,12 @@ class Soak:
     def _set_inputs(self) -> None:
         node, inputs = self._model.node, self._random.getrandbits(24)
         if node.t1_delay or node.t2_delay:
-            inputs = inputs & ~1 | node.inputs & 1  # a delay that runs is nothing that two clocks agree on
+            inputs = inputs & ~1 | node.inputs & 1  # no running delay: the two clocks differ
         self._line.diagnostics.force_inputs(inputs, power_up=False)
         self._model.set_inputs(inputs)
 
     def _rest(self) -> None:
-        """Wait until the motor has done its words."""
+        """Wait until the motor has finished its words."""
         end = time.monotonic() + HANGS
         while self._line.diagnostics.state().running:
             if time.monotonic() > end:
@@ -227,5 +227,5 @@ class Soak:
         sent = "\n".join(f"  {unit}" for unit in self._shown)
         raise WrongAnswer(
             f"{self.result.target}, seed {self.result.seed}, after {self.result.transactions} transactions: "
-            f"{text}\nThe last that was sent, with the newest at the end:\n{sent}"
+            f"{text}\nThe last units sent, newest last:\n{sent}"
         )

@@ -1,4 +1,4 @@
-"""What is sent to a firmware: a random mix of all requests, and everything else that may be on a line."""
+"""The traffic to a firmware: a random mix of all requests, and other bytes that may be on a line."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ REQUESTS = {name: command.request for name, command in qlink.COMMANDS.items()}
 ANSWERS = [command.response for command in qlink.COMMANDS.values() if command.response is not None]
 NODES = range(qlink.BUS.first_node or 1, (qlink.BUS.last_node or 0) + 1)
 PREAMBLE = b"\xa5"
-#: How often a command is asked, of all.
+#: Weight of each command.
 WEIGHTS = {
     "motion": 22, "node_program_load": 20, "node_setup": 4, "node_info": 4, "node_start": 3, "node_stop": 2,
     "node_sync": 6, "node_reset": 1, "motor_response_poll": 4, "motor_request": 4, "motor_position": 4,
     "clear_fifo": 3, "preset_motor_position": 4, "read": 6, "write": 6, "write_read": 6, "set_outputs": 4,
     "clear_outputs": 4, "loop_back": 4,
 }  # fmt: skip
-#: A command that every node of the soak supports: its answer shows that the node has read all before it.
+#: A command supported by every node of the soak: its answer shows that the node has read all bytes before it.
 ALWAYS = "loop_back"
-#: Chance that something else comes before a request, and the kinds of it.
+#: Chance of disturbances before a request, and their kinds.
 DISTURBED = 0.3
 DISTURBANCES: tuple[Kind, ...] = ("corrupted", "corrupted", "malformed", "stray", "noise")
-#: Most disturbances in a row: no baud rate holds them back, and a receive buffer is small.
+#: Most disturbances in a row: no baud rate slows them down, and a receive buffer is small.
 IN_A_ROW = 2
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Bytes that are sent in one go, and what they are."""
+    """Bytes sent at once, with kind and name."""
 
     kind: Kind
     name: str
@@ -47,15 +47,15 @@ class Unit:
 
 
 class Traffic:
-    """Makes units for a node, which is asked for nothing but what a master knows: number and counters."""
+    """Makes units for a node; reads only its number and counters, which a master knows too."""
 
     def __init__(self, chance: random.Random, program_size: int, *, delays: bool) -> None:
         """Begin with a node after power-up.
 
         Args:
-            chance: where random numbers come from.
-            program_size: bytes of a program that the node can hold.
-            delays: whether node_setup gives delays from input 1 to output 1; else they are always 0.
+            chance: source of random numbers.
+            program_size: size of the node's program memory in bytes.
+            delays: whether node_setup sets delays from input 1 to output 1; else they are always 0.
         """
         self.loader = Loader(chance, program_size)
         self._random = chance
@@ -70,7 +70,7 @@ class Traffic:
         )
 
     def request(self, node: VirtualNode, motion_counter: int | None) -> Unit:
-        """Return an intact request to a node, any of all commands."""
+        """Return an intact request to a node, with any command."""
         name = self._random.choice(self._names)
         if name == "motion":
             message = self._motion(node, motion_counter)
@@ -83,12 +83,12 @@ class Traffic:
         return Unit("request", message.NAME, message.to_frame())
 
     def always(self, node: VirtualNode) -> Unit:
-        """Return a request that is answered by every node in every state."""
+        """Return a request that every node answers in every state."""
         message = self._any(REQUESTS[ALWAYS], node.number)
         return Unit("request", message.NAME, message.to_frame())
 
     def disturbances(self, node: VirtualNode) -> list[Unit]:
-        """Return what comes before a request: mostly nothing."""
+        """Return the disturbances before a request: mostly none."""
         if self._random.random() >= DISTURBED:
             return []
         count = self._random.randint(1, IN_A_ROW)
@@ -163,17 +163,17 @@ class Traffic:
 
     @staticmethod
     def _is_nearly_whole(data: bytearray) -> bool:
-        """Whether the A5 that begins the next frame makes a whole one of it.
+        """Whether the A5 that begins the next frame completes it.
 
-        A checksum that ends in A5 completes a frame before the inserted byte has come. Then a node may answer
-        while somebody else sends; which of both answers it gives depends on time.
+        A checksum that ends in A5 completes a frame before the inserted byte is received. Then a node may
+        answer while the sender still sends; which of both answers it gives depends on time.
         """
         return any(
             isinstance(event, qlink.Message) for event in qlink.StreamDecoder("request").feed(data + PREAMBLE)
         )
 
     def _malformed(self, number: int) -> Unit:
-        """A frame with a right checksum, and in it anything: unknown commands, wrong sizes, wrong numbers."""
+        """A frame with a correct checksum and any contents: unknown commands, wrong sizes, wrong numbers."""
         known = [message.ID for message in REQUESTS.values()]
         command = self._random.choice((*known, self._byte()))
         node = self._random.choice((number, number, number, 0, self._byte()))

@@ -1,8 +1,8 @@
 """Mutated frames of the shipped protocols, as each output sees them: ``python -m tests.soak.frames``.
 
-Each frame is that of a random message with bytes changed, lost or added, or a right frame around a payload
-that is wrong. The interpreter of the plan, the generated Python, the C header and the implementation of the
-tests that reads the YAML itself must make the same values or the same kind of fault of it.
+Each frame is that of a random message with bytes changed, lost or added, or a correct frame around a wrong
+payload. The interpreter of the plan, the generated Python, the C header and the tests' own implementation,
+which reads the YAML itself, must return the same values or the same kind of fault.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.special import Packets
 from tests.support.whole.targets import CTarget, InterpreterTarget, PythonTarget, Target, printed_codec
 
-#: Frames that one process compares before it reports.
+#: Frames per batch of one process.
 _BATCH = 50_000
 _MOST_SHOWN = 20
 
 _PAGE = """\
 # Soak: mutated frames
 
-Random messages of the shipped protocols, their frames with bytes changed, lost or added, and right frames
+Random messages of the shipped protocols, their frames with bytes changed, lost or added, and correct frames
 around wrong payloads. The generated Python, the C header (gcc -O1), the interpreter of the plan and an
 independent implementation that reads the YAML itself decode each, and must return the same values or the
 same kind of fault. Written by `make soak-frames`; the last run:
@@ -63,19 +63,19 @@ class Trial:
 
 @dataclass
 class Tally:
-    """What became of frames: how many gave a message or each kind of fault, and where outputs differ."""
+    """Counts of frames by message or kind of fault, and the differences between outputs."""
 
     found: Counter[str] = field(default_factory=Counter)
     differences: list[str] = field(default_factory=list)
 
     def add(self, other: Tally) -> None:
-        """Count those of another batch too."""
+        """Add another batch."""
         self.found += other.found
         self.differences += other.differences
 
 
 def mutated(reference: Reference, rng: random.Random) -> Iterator[tuple[Message, bytes, bytes]]:
-    """Endless frames, each with the message that it was made from and the request that it answers."""
+    """Endless frames, each with its original message and its request."""
     mark = 0xA5
     if isinstance(reference.frame, Frame) and reference.frame.stuffing:
         mark = reference.frame.stuffing.after[0]
@@ -128,7 +128,7 @@ def run(trial: Trial) -> Tally:
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run what the command line asks for; 1 if outputs differ."""
+    """Run the soak; 1 if outputs differ."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--frames", type=int, default=1_000_000, help="for each protocol")
     parser.add_argument("--jobs", type=int, default=2)

@@ -2,7 +2,7 @@
 
 A random session over a line with faults of every kind, against a plain model of the registers: host and chip
 set must agree at the end, and no call may have sent an action twice. Once with a chip set that waits for the
-rest of a packet for ever, and once with one that forgets it after a silence.
+rest of a packet for ever, and once with one that drops it after a silence.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import time
 from qlinkgen.sim import FaultPlan
 from tests.soak.host_run import Result, Session
 
-#: Seconds of silence after which the second chip set forgets.
+#: Seconds of silence after which the second chip set drops an incomplete packet.
 FORGETS = 0.005
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run both sessions; 1 where something is wrong."""
+    """Run both sessions; 1 if a result is wrong."""
     options = _options(arguments)
     complaints = []
     for title, forgets in (("chip set that never forgets", 0.0), ("chip set that forgets", FORGETS)):
@@ -45,10 +45,10 @@ def as_text(title: str, result: Result, seconds: float) -> str:
         "packets filled up": count["completed"],
         "repeats": count["repeats"],
         "calls that failed": result.failed,
-        "times that one call sent an action, at most": result.most_sent,
+        "most times that one call sent an action": result.most_sent,
         "packets carried out and never sent": result.made_up,
         "of these not noticed": result.unnoticed,
-        "wrong values with a right checksum": result.wrong_reads,
+        "wrong values with a correct checksum": result.wrong_reads,
         "registers written again": result.rewritten,
     }
     lines = [f"{title}: {result.commands} commands in {seconds:.0f} s ({result.seconds:.0f} s on the line)"]

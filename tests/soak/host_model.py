@@ -1,4 +1,4 @@
-"""What a chip set must hold after commands that arrived: a plain model of its registers, nothing else."""
+"""The expected state of a chip set after received commands: a simple model of its registers."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ _VALUES = {
     for name, command in mc1231a.COMMANDS.items()
     if name.startswith("set_") and command.request.FIELDS and command.attributes["axis"] == "current"
 }
-#: Registers that are written, and read back as they are. The manual motor command depends on the loop.
+#: Registers that are written, and read back unchanged. The manual motor command depends on the loop.
 REGISTERS = tuple(name for name in _VALUES if f"get_{name}" in mc1231a.COMMANDS and name != "mtr_cmd")
 BUFFERED = tuple(name for name in REGISTERS if _VALUES[name].attributes["double_buffered"] is True)
 #: Field of a register's request and response.
 FIELD = {name: _VALUES[name].request.FIELDS[0] for name in REGISTERS}
-#: Commands that choose one of several states, by what they choose; no source says how to read them back.
+#: Commands that choose one of several states, by the choice; no source says how to read them back.
 CHOICES = {
     "profile": ("set_prfl_trap", "set_prfl_vel", "set_prfl_s_crv", "set_prfl_gear"),
     "auto_stop": ("set_auto_stop_off", "set_auto_stop_on"),
@@ -31,7 +31,7 @@ CHOOSES = {command: choice for choice, commands in CHOICES.items() for command i
 
 
 class ModelAxis:
-    """Registers and choices of one axis, which is not serviced, so that nothing moves."""
+    """Registers and choices of one axis, which is not serviced, so that it does not move."""
 
     def __init__(self) -> None:
         self.values: dict[str, Any] = dict.fromkeys(REGISTERS, 0)
@@ -40,7 +40,7 @@ class ModelAxis:
         self.chosen = {choice: commands[0] for choice, commands in CHOICES.items()}
 
     def update(self) -> None:
-        """Take over what waits."""
+        """Take over the buffered values."""
         self.active = {name: self.values[name] for name in BUFFERED}
 
 
@@ -52,7 +52,7 @@ class Model:
         self.output = mc1231a.OutputMode.PWM
 
     def differences(self, chip: Any) -> list[str]:
-        """Where a simulated chip set holds something else."""
+        """The differences to a simulated chip set."""
         found = []
         for number, axis in self.axes.items():
             there = chip.axes[number]

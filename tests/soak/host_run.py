@@ -1,11 +1,10 @@
-"""One session of a host with a simulated chip set over a bad line, and the account of it.
+"""One session of a host with a simulated chip set over a bad line, and its account.
 
-A line without frames can turn a packet into others that nobody sent; the host notices by the checksum, and
-cannot undo it. So the session does what a careful program does: it calls again what has failed, and where the
-host was out of step it reads every register back, writes those that differ, and chooses all that cannot be
-read once more. What is known here and nowhere else, each packet sent and carried out, says whether the host
-was right: no call may have sent an action twice, and nothing may be wrong but for a packet that the line has
-made.
+Without frames, faults on the line can turn a packet into other packets; the host notices by the checksum, and
+cannot undo it. So the session does what a careful program does: it repeats failed calls, and if the host was
+out of step it reads every register back, writes those that differ, and makes all choices again that cannot be
+read. The session records each packet sent and carried out, and checks the host with them: no call may have
+sent an action twice, and only packets made by the line may have a wrong effect.
 """
 
 from __future__ import annotations
@@ -23,16 +22,16 @@ from qlinkgen.sim import FaultPlan, VirtualPort
 from qlinkgen.sim.chip_bus import chip_wire
 from tests.soak.host_model import AXES, CHOOSES, FIELD, REGISTERS, Model
 
-#: Seconds that the host may add.
+#: Host slack in seconds.
 SLACK = 0.002
-#: Calls after which one that fails again and again has failed.
+#: Attempts of a call until it counts as failed.
 PATIENCE = 200
-#: Commands after which a session looks after itself if it has to.
+#: Commands between audits, if one is needed.
 AUDIT_EVERY = 500
 UNSAFE = {command.id for command in mc1231a.COMMANDS.values() if not command.repeat_safe}
 _SIZES = {command.id: command.request.MAX_WIRE_SIZE for command in mc1231a.COMMANDS.values()}
 _RULES = {name: mc1231a.COMMANDS[f"set_{name}"].request.RULES[0] for name in REGISTERS}
-#: What a session does, and how often.
+#: Operations of a session, with their weights.
 WEIGHTS = {"write": 45, "read": 30, "choose": 10, "act": 12, "global": 2, "reset": 0.3}
 ACTIONS = ("update", "multi_update", "clr_status", "rst_status", "rst_intrpt", "get_capt", "init_phase")
 
@@ -46,27 +45,27 @@ class Tap(VirtualPort):
 
     def write(self, data: bytes) -> None:
         """As a port."""
-        if data[0] in _SIZES:  # else it is a byte to fill up
+        if data[0] in _SIZES:  # else it is a filling byte
             self.sent.append(bytes(data))
         super().write(data)
 
 
 @dataclass
 class Result:
-    """What came of a session.
+    """The result of a session.
 
     Attributes:
         commands: calls of the session itself.
-        failed: how many of them failed and were made again.
-        most_sent: how often one call sent an action that must not be repeated, at most.
-        made_up: packets that were carried out and never sent: what the line made of others.
-        unnoticed: how many of these the host has noticed neither in their call nor at the next one.
-        wrong_reads: values that the line had changed without a trace in the checksum.
-        explained: values that were read after a packet nobody had sent, before the next look.
-        rewritten: registers that were found changed, and written again.
-        complaints: what must not be.
+        failed: calls that failed and were repeated.
+        most_sent: most times that one call sent an action that must not be repeated.
+        made_up: packets carried out but never sent: made by the line from others.
+        unnoticed: those of them that the host has noticed neither in their call nor at the next one.
+        wrong_reads: values changed by the line with a correct checksum.
+        explained: wrong values read after a packet made by the line, before the next audit.
+        rewritten: registers found changed, and written again.
+        complaints: errors found.
         counters: those of the host.
-        faults: faults that were injected.
+        faults: injected faults.
         seconds: on the virtual clock.
     """
 
@@ -85,7 +84,7 @@ class Result:
 
 
 class Session:
-    """A host, a chip set, and the model that knows what the one must have made of the other."""
+    """A host, a chip set, and the model of the expected state."""
 
     def __init__(self, faults: FaultPlan, *, seed: int = 1, forgets: float = 0.0) -> None:
         self.chip = ChipSet()
@@ -96,12 +95,12 @@ class Session:
         self.model = Model()
         self.result = Result()
         self._random = random.Random(f"session {seed}")
-        self._dirty = False  # what the host knows: something did not fit since the last look
-        self._unseen = 0  # packets that were not sent, and may be noticed at the next call
-        self._ghosts = False  # what only we know: something was carried out that was not sent
+        self._dirty = False  # seen by the host: a mismatch since the last audit
+        self._unseen = 0  # packets made by the line that may be noticed at the next call
+        self._ghosts = False  # seen only here: a packet was carried out that was not sent
 
     def run(self, commands: int) -> Result:
-        """Do so many commands, then bring host and chip set together, and compare."""
+        """Do `commands`, then synchronise host and chip set, and compare."""
         result = self.result
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UnconfirmedCommand)
@@ -120,7 +119,7 @@ class Session:
     # One call -----------------------------------------------------------------------------------------------
 
     def call(self, name: str, *axis: int, **arguments: Any) -> Any:
-        """Call until it does not fail: for each command here, twice has the same end as once."""
+        """Call until it succeeds: each command here is idempotent."""
         for _ in range(PATIENCE):
             engine = self.host.engine
             before, known = engine.count.out_of_step, not engine.in_step
@@ -136,7 +135,7 @@ class Session:
         raise AssertionError(f"{name} failed {PATIENCE} times")
 
     def _account(self, name: str, *, noticed: bool) -> None:
-        """Compare what was sent and what was carried out."""
+        """Compare the packets sent and carried out."""
         sent = Counter(self.port.sent)
         record = self.engine.record
         assert record is not None
@@ -154,7 +153,7 @@ class Session:
             self._ghosts = True
             self.result.made_up += made_up.total()
 
-    # What a session does ------------------------------------------------------------------------------------
+    # Operations of a session --------------------------------------------------------------------------------
 
     def _begin(self) -> None:
         self.call("reset")
@@ -174,7 +173,7 @@ class Session:
         self.model.axes[axis].values[name] = value
 
     def _value(self, name: str) -> Any:
-        """A value that the register takes; no acceleration below 0, since a profile refuses that."""
+        """A valid value of the register; no acceleration below 0, since a profile refuses that."""
         rule = _RULES[name]
         if scale := getattr(rule, "scale", None):
             low = 0 if name == "acc" else scale.low
@@ -246,12 +245,12 @@ class Session:
         self._begin()
         self.model = Model()
 
-    # Looking after everything -------------------------------------------------------------------------------
+    # Audit --------------------------------------------------------------------------------------------------
 
     def audit(self) -> bool:
-        """Read back everything that can be read, put right what differs, choose again what cannot be read.
+        """Read back all readable registers, correct those that differ, and repeat all other choices.
 
-        True where nothing differed, and the host was in step all the time.
+        True if nothing differed, and the host was in step all the time.
         """
         self._dirty = False
         agreed = True
@@ -270,7 +269,7 @@ class Session:
         return agreed and not self._dirty
 
     def _finish(self) -> None:
-        """Look until nothing is wrong and nothing has happened meanwhile; then compare with the chip set."""
+        """Audit until nothing differs and no event occurs meanwhile; then compare with the chip set."""
         for _ in range(PATIENCE * 10):
             for axis in AXES:
                 self.call("update", axis)
@@ -278,5 +277,5 @@ class Session:
             if self.audit():
                 break
         else:
-            self.result.complaints.append("host and chip set did not come together")
+            self.result.complaints.append("host and chip set do not agree after all audits")
         self.result.complaints += self.model.differences(self.chip)

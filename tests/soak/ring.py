@@ -1,9 +1,9 @@
-"""Messages round a simulated ring of 15 nodes with faults on every hop, each one accounted for.
+"""Messages round a simulated ring of 15 nodes with faults on every hop; each message is accounted for.
 
-Run as `python -m tests.soak.ring [--messages N] [--seed S]`. Every variable and every text that is sent
-names itself, so what arrives is held against what was sent: to the right node, once, and unchanged. What is
-lost or changed must be explained by a fault that was injected, and a fault that a node can see must be in its
-counters. A message that was dropped as a whole leaves no trace on any node; only the simulation counts it.
+Run as `python -m tests.soak.ring [--messages N] [--seed S]`. Every variable and text identifies itself, so
+the received ones are compared with the sent ones: at the right node, once, and unchanged. Each loss or change
+must be explained by an injected fault, and a fault visible to a node must be in its counters. A message
+dropped as a whole is not visible to any node; only the simulation counts it.
 
 Faults that send a message twice are left out: the protocol has no sequence numbers, so a node cannot know.
 """
@@ -30,16 +30,16 @@ from qlinkgen.sim.ring import RingWire
 RING = ("coordinator", "coordinator", "keypad", "coordinator", "coordinator") * 3
 #: 2 % of all transmissions over a hop.
 FAULTS = "drop=0.005,flip=0.008,truncate=0.004,noise=0.003"
-#: Kinds that a node can see; of a whole message that is missing it sees nothing.
+#: Kinds visible to a node; the loss of a whole message is not.
 VISIBLE = ("flip", "truncate", "noise")
-#: Messages under way at the same time, at most.
+#: Most messages in transit at the same time.
 BURST = 4
 VARIABLES = 251
 
 
 @dataclass
 class Entry:
-    """A message that names itself."""
+    """A message that identifies itself."""
 
     sent_to: int
     message: trio.Message
@@ -48,22 +48,22 @@ class Entry:
 
 @dataclass
 class Account:
-    """What became of everything that was sent.
+    """The results of all messages sent.
 
     Attributes:
         sent: messages.
         delivered: of them, those that arrived at their node unchanged.
-        lost: those that did not.
-        twice: deliveries of what had been delivered before.
-        misdelivered: intact messages at another node: header and end byte were hit alike.
-        altered: what arrived changed where no checksum is sent, or under another type.
-        missed: variables that arrived changed although their checksum was right.
-        wrong: variables that arrived changed although their checksum was wrong. Must be none.
-        unexplained: bursts with a loss, a change or a fault at a node for which no fault was injected, or
-            with a visible fault that no node has counted. Must be none.
+        lost: of them, those that did not arrive.
+        twice: repeated deliveries of a message.
+        misdelivered: intact messages at another node: header and end byte were changed alike.
+        altered: messages changed without a checksum, or received under another type.
+        missed: changed variables received with a correct checksum.
+        wrong: changed variables received with a wrong checksum. Must be 0.
+        unexplained: bursts with a loss, a change or a fault at a node without an injected fault, or with a
+            visible fault that no node has counted. Must be 0.
         injected: faults by kind.
         seen: faults that nodes have counted, by kind.
-        netstat: how many nodes have which status bit at the end.
+        netstat: number of nodes with each status bit at the end.
     """
 
     sent: int = 0
@@ -81,7 +81,7 @@ class Account:
 
     @property
     def clean(self) -> bool:
-        """Nothing happened that must not."""
+        """Whether the run has no errors."""
         balanced = self.delivered + self.lost == self.sent
         return balanced and not (self.twice or self.wrong or self.unexplained)
 
@@ -110,7 +110,7 @@ class Soak:
         self._number = 0
 
     def run(self, messages: int) -> Account:
-        """Send so many messages, in bursts, and settle after each burst."""
+        """Send `messages`, in bursts, and settle after each burst."""
         while self.account.sent < messages:
             self._burst(self._random.randint(1, min(BURST, messages - self.account.sent)))
         self.account.injected = {kind: self.plan.counts[kind] for kind in self.plan.rates}
@@ -129,7 +129,7 @@ class Soak:
         account.delivered += delivered
         account.lost += size - delivered
         injected = {kind: self.plan.counts[kind] - count for kind, count in before.items()}
-        # A changed byte is seen by the receiver, unless the message is dropped before it gets there.
+        # The receiver sees a changed byte, unless the message is dropped before.
         visible = any(injected[kind] for kind in VISIBLE if kind != "flip" or not injected["drop"])
         odd = changes or seen or delivered < size
         if (odd and not any(injected.values())) or (visible and not changes and not seen):
@@ -148,7 +148,7 @@ class Soak:
             message = trio.CharacterTransfer(address=address, characters=text)
         link = self._links[source]
         if not link.send(message, self._wire.now):
-            raise AssertionError("the transmit buffer of a node that was idle has no room")
+            raise AssertionError("the transmit buffer of an idle node is full")
         self._wire.wake(link)
         return Entry((source + address) % len(RING), message)
 
@@ -156,7 +156,7 @@ class Soak:
         return (type(message), *(getattr(message, name) for name in message.FIELDS))
 
     def _collect(self, entries: dict[tuple[Any, ...], Entry]) -> tuple[int, int]:
-        """Hold what has arrived against what was sent; return the changes, and the faults seen by nodes."""
+        """Compare received and sent messages; return the changes, and the faults seen by nodes."""
         changes = seen = 0
         for place, link in enumerate(self._links):
             seen += link.counters.skipped
@@ -198,7 +198,7 @@ def _node(kind: str, baud: int | None) -> Node:
 
 
 def sent_crc(payload: bytes) -> bytes:
-    """The two bytes that are sent of a CRC-16/IBM-3740, worked out bit by bit apart from the codec."""
+    """The two bytes sent of a CRC-16/IBM-3740, computed bit by bit, independent of the codec."""
     register = 0xFFFF
     for byte in payload:
         register ^= byte << 8
@@ -212,7 +212,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--messages", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--faults", default=FAULTS, help=f"a fault plan (default: {FAULTS})")
-    parser.add_argument("--baud", type=int, help="let bytes take their time (slow: each byte is an event)")
+    parser.add_argument("--baud", type=int, help="simulate line time (slow: each byte is an event)")
     return parser.parse_args()
 
 
@@ -222,7 +222,7 @@ def main() -> int:
     start = time.monotonic()
     account = Soak(options.seed, options.faults, options.baud).run(options.messages)
     print(account)
-    print(f"{time.monotonic() - start:.0f} s; {'in order' if account.clean else 'NOT IN ORDER'}")
+    print(f"{time.monotonic() - start:.0f} s; {'no errors' if account.clean else 'ERRORS'}")
     return 0 if account.clean else 1
 
 

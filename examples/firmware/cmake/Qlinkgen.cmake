@@ -1,18 +1,18 @@
-# qlinkgen_generate: codecs that are made anew when their schema changes.
+# qlinkgen_generate: generates codecs again when their schema changes.
 #
 #   qlinkgen_generate(TARGET name SCHEMA file...
-#     [TARGETS c...]            what to make, c unless said otherwise
+#     [TARGETS c...]            targets of qlinkgen, c by default
 #     [ROLE slave|master|both]  leave out the other side
 #     [ONLY message...]         keep these commands or messages
 #     [SET crc=NAME...]         another algorithm of the check value
-#     [OUTPUT_DIRECTORY dir])   its own folder; <binary dir>/<name> unless given
+#     [OUTPUT_DIRECTORY dir])   its own folder; default: <binary dir>/<name>
 #
-# SCHEMA is a file, relative to the source folder, or the name of a schema that comes with qlinkgen. `name` becomes an
-# interface library: target_link_libraries(firmware PRIVATE name) finds the headers, and makes them first. A build
-# after a change of the schema or of these options makes them anew, any other build does not, and only what has really
-# changed is compiled again.
+# SCHEMA is a file, relative to the source folder, or the name of a schema shipped with qlinkgen. `name` becomes an
+# interface library: target_link_libraries(firmware PRIVATE name) adds the headers, and generates them first. Only a
+# build after a change of the schema or of these options generates them again, and only sources with changed headers
+# are compiled again.
 #
-# QLINKGEN_EXECUTABLE says what to run, where `qlinkgen` is not on the path. It may be a list: python3;-m;qlinkgen.
+# QLINKGEN_EXECUTABLE is the command to run if `qlinkgen` is not on the path. It may be a list: python3;-m;qlinkgen.
 
 function(qlinkgen_generate)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "TARGET;ROLE;OUTPUT_DIRECTORY" "SCHEMA;TARGETS;ONLY;SET")
@@ -42,8 +42,8 @@ function(qlinkgen_generate)
   endforeach()
   _qlinkgen_list_outputs(outputs ${command})
 
-  # qlinkgen leaves files alone whose text stays the same, so it is the stamp that tells when it has run. That other
-  # options are another command is seen by make and by Ninja.
+  # qlinkgen does not touch files with unchanged text, so the stamp records its last run. make and Ninja see changed
+  # options as a changed command.
   set(stamp "${CMAKE_CURRENT_BINARY_DIR}/${arg_TARGET}.stamp")
   add_custom_command(
     OUTPUT "${stamp}"
@@ -62,25 +62,25 @@ endfunction()
 
 macro(_qlinkgen_check_arguments)
   if(arg_UNPARSED_ARGUMENTS)
-    message(FATAL_ERROR "qlinkgen_generate: no argument is called ${arg_UNPARSED_ARGUMENTS}; there are TARGET, SCHEMA, "
+    message(FATAL_ERROR "qlinkgen_generate: unknown argument ${arg_UNPARSED_ARGUMENTS}; arguments: TARGET, SCHEMA, "
       "TARGETS, ROLE, ONLY, SET and OUTPUT_DIRECTORY")
   endif()
   if(NOT arg_TARGET OR NOT arg_SCHEMA)
-    message(FATAL_ERROR "qlinkgen_generate: say TARGET, the name of the library to make, and SCHEMA")
+    message(FATAL_ERROR "qlinkgen_generate: give TARGET, the name of the library to make, and SCHEMA")
   endif()
 endmacro()
 
 function(_qlinkgen_find)
   if(NOT QLINKGEN_EXECUTABLE) # find_program would make paths of the items of a list
-    find_program(QLINKGEN_EXECUTABLE qlinkgen DOC "qlinkgen, or what to run in its place")
+    find_program(QLINKGEN_EXECUTABLE qlinkgen DOC "qlinkgen, or the command to run instead")
   endif()
   if(NOT QLINKGEN_EXECUTABLE)
     message(FATAL_ERROR "qlinkgen was not found, and is needed to generate headers. Install it (pip install qlinkgen), "
-      "or say where it is: -DQLINKGEN_EXECUTABLE=/path/to/qlinkgen. Headers that are already made need none of this.")
+      "or set -DQLINKGEN_EXECUTABLE=/path/to/qlinkgen. Existing headers do not need it.")
   endif()
 endfunction()
 
-# Files with their whole path; the name of a schema that comes with qlinkgen as it is.
+# Files as absolute paths; names of schemas shipped with qlinkgen unchanged.
 function(_qlinkgen_schemas schemas_out files_out)
   foreach(schema IN LISTS ARGN)
     get_filename_component(file "${schema}" ABSOLUTE)
@@ -91,7 +91,7 @@ function(_qlinkgen_schemas schemas_out files_out)
       list(APPEND schemas "${schema}")
     endif()
   endforeach()
-  # What a schema is called decides on the names of the outputs.
+  # The names of the outputs depend on the name of the schema.
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${files})
   set(${schemas_out} ${schemas} PARENT_SCOPE)
   set(${files_out} ${files} PARENT_SCOPE)

@@ -3,6 +3,6 @@ CC = arm-none-eabi-gcc
 SIZE = arm-none-eabi-size
 PORT_FLAGS = -mcpu=cortex-m3 -mthumb
 PORT_SOURCES = lm3s6965evb/board.c lm3s6965evb/startup.c
-# newlib gives memcpy and memset where the compiler calls them, and nothing else.
+# newlib is used only for the compiler's calls of memcpy and memset.
 PORT_LDFLAGS = -nostartfiles --specs=nano.specs -T lm3s6965evb/lm3s6965.ld
 APPS = qlink_node trio_keypad

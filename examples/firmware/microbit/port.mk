@@ -3,6 +3,6 @@ CC = arm-none-eabi-gcc
 SIZE = arm-none-eabi-size
 PORT_FLAGS = -mcpu=cortex-m0 -mthumb
 PORT_SOURCES = microbit/board.c microbit/startup.c
-# newlib gives memcpy and memset where the compiler calls them, and nothing else.
+# newlib is used only for the compiler's calls of memcpy and memset.
 PORT_LDFLAGS = -nostartfiles --specs=nano.specs -T microbit/nrf51822.ld
 APPS = qlink_node

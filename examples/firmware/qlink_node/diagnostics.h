@@ -31,7 +31,7 @@ typedef enum diagnostics_operation {
     DIAGNOSTICS_IMAGE = 0x04,
     /* CRC u16 over all path words queued since power-up, each big-endian, and their number u32 */
     DIAGNOSTICS_WORDS = 0x05,
-    /* inputs u24, power-up u8: these replace the pins; with 1 the change does not count as an edge */
+    /* inputs u24, power-up u8: from now on these replace the pins; with 1 without an edge */
     DIAGNOSTICS_INPUTS = 0x06,
     /* outputs u24, inputs u24, position i32, waiting u8, started u8, running u8, milliseconds u32, lost bytes u16 */
     DIAGNOSTICS_STATE = 0x07,
