@@ -124,7 +124,7 @@ def message_goals(target: Target, protocol: str, messages: Messages) -> list[Goa
             Goal(f"{what}, {name}", messages.each[name].size.flash, limit, "bytes")
             for name in above or [largest]
         ),
-        Goal(f"{what}, all messages, for each of them", messages.mean, limit, "bytes"),
+        Goal(f"{what}, average of all messages", messages.mean, limit, "bytes"),
     ]
 
 
@@ -174,7 +174,7 @@ def each_message(target: Target, protocol: str, messages: Messages) -> list[Goal
         for name, each in messages.each.items()
     ]
     mean = sum(goal.limit for goal in found) / len(found)
-    return [*found, Goal(f"{what}: all messages, for each of them", messages.mean, mean, "bytes")]
+    return [*found, Goal(f"{what}: average of all messages", messages.mean, mean, "bytes")]
 
 
 def complaints(measured: Measured) -> list[str]:

@@ -123,7 +123,7 @@ def _messages(measured: Measured, protocol: str) -> str:
         [name, *(cell for target, each in costs.items() for cell in _message(target, each, name))]
         for name in costs[AVR].framed.each
     ]
-    together, mean = ["all together"], ["... for each of them"]
+    together, mean = ["total"], ["... per message"]
     for each in costs.values():
         together += [str(each.fields.together.flash), str(each.framed.together.flash), "", ""]
         mean += [number(each.fields.mean), number(each.framed.mean), "", ""]

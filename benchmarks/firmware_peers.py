@@ -137,7 +137,7 @@ def _download(apt: str, place: Path) -> None:
     )
     plain = [line for line in site.splitlines() if "-" not in line.split()[-1]]
     if not plain:
-        raise RuntimeError("apt knows no repository with a component main: run apt-get update")
+        raise RuntimeError("apt lists no repository with a component main: run apt-get update")
     (place / "sources.list").write_text(f"deb-src {plain[0]} main\n")
     own = {
         "Dir::Etc::SourceList": place / "sources.list",

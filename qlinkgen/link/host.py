@@ -111,7 +111,7 @@ class HostEngine:
 
     @property
     def busy(self) -> bool:
-        """A transaction is under way."""
+        """A transaction is in progress."""
         return self._state is not State.IDLE
 
     @property
@@ -310,7 +310,8 @@ class HostEngine:
             self._out_of_step(now, None, "unsolicited bytes", received=data)
         quiet = self.timing.quiet
         if self._state is State.GUARD and now - min(self._quiet_at, self._give_up_at) > quiet:
-            # A late caller: its process did not run and reads old bytes. Only what follows tells of the line.
+            # A late caller: its process did not run and reads old bytes. Only later bytes show the state of
+            # the line.
             self._give_up_at = max(self._give_up_at, now + self.timing.quiet_limit)
         self._quiet_at = max(self._quiet_at, now + quiet)
 

@@ -135,7 +135,7 @@ class MasterEngine:
 
     @property
     def busy(self) -> bool:
-        """A transaction is under way."""
+        """A transaction is in progress."""
         return self._state is not IDLE
 
     @property
@@ -306,7 +306,8 @@ class MasterEngine:
     def _disturbed(self, now: float) -> None:
         """Restart the wait for a quiet line; the limit too if the caller is late.
 
-        A process that did not run for some time reads old bytes now; only what follows tells of the line.
+        A process that did not run for some time reads old bytes now; only later bytes show the state of the
+        line.
         """
         if now - max(self._free_at, min(self._quiet_at, self._give_up_at)) > self._quiet:
             self._give_up_at = max(self._give_up_at, now + self._quiet_limit)

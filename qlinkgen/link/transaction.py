@@ -29,7 +29,7 @@ class Reply(NamedTuple):
     """The outcome of a successful transaction."""
 
     #: None for a request without a response.
-    response: Any  # the class that the request asks for; the calls of a generated bus module name it
+    response: Any  # of the request's response class; the calls of a generated bus module have its type
     #: Number of transmissions of the request.
     attempts: int
     #: Seconds from the call to the answer.

@@ -1,7 +1,7 @@
 """An MC1231A chip set on a simulated serial link: on a virtual clock, or on a pty.
 
 wire = chip_wire(ChipSet())
-host = Host(VirtualPort(wire))                    # on a clock of its own
+host = Host(VirtualPort(wire))                    # on a virtual clock
 with PtyBus(wire, link="chip") as bus: ...        # for any program, in real time
 """
 

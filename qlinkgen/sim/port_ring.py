@@ -118,7 +118,7 @@ class PortRing(PtyBus):
                 self._answer_calls()
 
     def _read(self) -> bool:
-        """Take what has come at the ports; False where nothing has."""
+        """Read the ports; False if no bytes were received."""
         found = False
         for place in self._places:
             if data := place.port.read(0.0):

@@ -147,7 +147,7 @@ class RingWire(Wire):
         """The current time of the simulation."""
         return self._now
 
-    # what is on a hop
+    # bytes on a hop
 
     def _send(self, station: Sender, data: bytes, now: float) -> None:
         if not station.route.hearers and not station.route.outside:

@@ -15,7 +15,7 @@ from qlinkgen.transport.port import Ability
 #: The kernel's list of terminals.
 SYSFS = Path("/sys")
 
-#: Description of the processor, which tells a virtual machine.
+#: Description of the processor, which identifies a virtual machine.
 CPUINFO = Path("/proc/cpuinfo")
 
 #: Major numbers of the slave ends of ptys: Unix98 and, long ago, BSD (Documentation/admin-guide/devices.txt).

@@ -52,7 +52,7 @@ class Asker(Protocol):
 
     @property
     def busy(self) -> bool:
-        """A transaction is under way."""
+        """A transaction is in progress."""
         ...
 
     @property

@@ -88,7 +88,7 @@ def link(target: str) -> Callable[[Path, Path], None]:
 FOREIGN: dict[str, Callable[[Path, Path], None]] = {
     "no banner": text(b"int tank;\n"),
     "read-only": text(b"int tank;\n", 0o444),
-    "nothing but a line end": text(b"\n"),
+    "only a line end": text(b"\n"),
     "no text": text(b"\xff\xfe\x00\x80"),
     "other tool": header("protoc 3.21 from tank.proto (0123456789ab)."),
     "banner without a hash": header("qlinkgen 0.1.0 from tank.yaml."),
@@ -314,7 +314,7 @@ def at_step(
 ) -> Callable[[], bool]:
     """Fail at one of the operations that change a folder; ``dead``: and at every later one.
 
-    Returns a function that says whether there were so many operations.
+    Returns a function that tells whether the failing operation was reached.
     """
     count = 0
 

@@ -102,7 +102,7 @@ def test_pauses_grow_up_to_the_longest() -> None:
         due = engine.health[3].next_trial
         end = drive(engine, ASK, now=due).end
         pauses.append(engine.health[3].next_trial - end)
-    least = (DEADLINE + 3 * BYTE + SLACK) / 0.02  # the silence that follows is part of what it costs
+    least = (DEADLINE + 3 * BYTE + SLACK) / 0.02  # the following silence is part of its cost
     assert pauses == pytest.approx([max(least, pause) for pause in (0.2, 0.4, 0.8, 1.6, 2, 2, 2, 2)])
 
 

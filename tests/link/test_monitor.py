@@ -295,7 +295,7 @@ def test_a_bad_line_does_not_stop_it() -> None:
         port.sleep(0.02)
     kinds = {type(each) for each in listener.heard}
     assert kinds == {Asked, Replied, Unanswered, Stray, Damaged}
-    assert len(listener._suspected) <= 1  # what is kept does not grow with time
+    assert len(listener._suspected) <= 1  # the list does not grow with time
 
 
 @pytest.mark.parametrize("name", ["modbus_rtu", "dynamixel", "kitchen_sink"])

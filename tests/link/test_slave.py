@@ -200,7 +200,7 @@ class TestFaults:
         with pytest.raises(qlink.EncodeError):
             engine.receive(ASK.to_frame(), 0.0)
         assert engine.bytes_to_send(0.0) == b""
-        engine.receive(qlink.NodeStartRequest(node=9).to_frame(), 0.0)  # and the engine goes on
+        engine.receive(qlink.NodeStartRequest(node=9).to_frame(), 0.0)  # and the engine continues
         assert engine.counters.foreign == 1
 
     def test_counters_show_themselves(self) -> None:

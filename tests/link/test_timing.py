@@ -18,7 +18,7 @@ LOAD = qlink.COMMANDS["node_program_load"]
 SYNC = qlink.COMMANDS["node_sync"]
 REQUEST = qlink.COMMANDS["motor_request"]  # must not be repeated
 
-#: A4's frame: preamble 2, then 30 bytes that may all be A5 but for the length: 2 + 1 + 2 * 29 = 61.
+#: A4's frame: preamble 2, then 30 bytes that may all be A5 except the length: 2 + 1 + 2 * 29 = 61.
 LONGEST = 61
 
 
@@ -66,7 +66,7 @@ def test_deadline(baud: int, command: Any, size: int | None, expected: float) ->
 
 
 def test_worst_case_by_hand() -> None:
-    # Before it a request that was given up: 2 * 61 bytes, 10 ms, 4 ms.
+    # Before it an abandoned request: 2 * 61 bytes, 10 ms, 4 ms.
     # Each attempt: quiet limit 67 bytes + 8 ms, deadline 29 bytes + 4 ms.
     byte = 10 / 115200
     terms = timing(slack=4 * MS)

@@ -129,7 +129,7 @@ class Session:
     baud=st.sampled_from([9600, 115200]),
     health=st.booleans(),
 )
-@example(  # the search for an echo is given up, and the line is noisy just as long as it may be
+@example(  # the search for an echo fails, and the line is noisy for the longest permitted time
     stream=[(0.00226, b"x")] * 4,
     calls=[(0, 0.0, None, 1), (0, 0.0, None, None)],
     echo="auto",
@@ -138,7 +138,7 @@ class Session:
     baud=115200,
     health=False,
 )
-@example(  # a long request with a long allowance is given up, and a short one follows
+@example(  # a long request with a long allowance is abandoned, and a short one follows
     stream=[],
     calls=[(3, 0.0, None, 1), (0, 0.0, 1, None), (7, 0.0, None, None), (0, 0.0, 1, None)],
     echo="none",

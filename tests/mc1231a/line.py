@@ -44,7 +44,7 @@ def on_axis(request: Any, axis: int = 1) -> Packet:
 
 
 def chip_device(engine: ChipEngine) -> Device:
-    """A simulated chip set; what it says comes when all bytes have had their time."""
+    """A simulated chip set; its answer is sent when all bytes have taken their line time."""
 
     def device(data: bytes, now: float) -> list[tuple[float, bytes]]:
         there = now + len(data) * BYTE

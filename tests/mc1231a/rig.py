@@ -1,7 +1,7 @@
 """A chip set to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over a pty.
 
-A behaviour is written once, for a `Rig`. It uses the host as a user would; what is wired to the chip set is
-done through the rig, in the thread that runs the chip set.
+A behaviour is written once, for a `Rig`. It uses the host as a user would; the rig changes the signals
+wired to the chip set, in the thread that runs the chip set.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ SETTINGS = [
 
 
 class Breaking(Port):
-    """A port that notes what is written, and changes it on its way when it is told to.
+    """A port that records the written bytes, and can change them.
 
     Attributes:
         sent: what the host has written, piece by piece.

@@ -274,7 +274,7 @@ def test_an_illegal_command(make: MakeRig) -> None:
 
 @pytest.mark.parametrize("place", range(5))
 def test_a_byte_lost_on_the_way_there(rig: Rig, place: int) -> None:
-    """The chip set never forgets what it has begun, and the host gets it back in step."""
+    """The chip set never drops an incomplete packet, and the host resynchronises it."""
     axis = rig.host.axis(1)
     axis.set_vel(value=1.5)
     rig.port.outward.append(lose(place))

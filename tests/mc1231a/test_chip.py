@@ -15,7 +15,7 @@ COMMANDS: dict[str, Any] = dict(mc1231a.COMMANDS)
 
 
 class Bench:
-    """A chip set that is told what to do, sample by sample."""
+    """A chip set driven by commands, sample by sample."""
 
     def __init__(self, **options: Any) -> None:
         self.chip = ChipSet(**options)

@@ -1,4 +1,4 @@
-"""The host engine alone: what it sends, waits for, repeats, and how it gets back in step."""
+"""The host engine alone: transmissions, waits, repeats, and resynchronisation."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def test_a_trapezoid_arrives_and_keeps_to_its_limits(destination: int, limit: in
     assert trajectory.velocity == 0
     speeds = [0, *steps(places)]
     assert max(map(abs, speeds)) <= max(limit, min(acceleration, abs(destination) << COUNTS))
-    assert all(abs(change) <= 2 * acceleration for change in steps(speeds))  # 2 where it lands
+    assert all(abs(change) <= 2 * acceleration for change in steps(speeds))  # 2 at the end
     assert sorted(places, reverse=destination < 0) == places  # it never turns back
 
 

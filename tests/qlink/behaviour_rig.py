@@ -1,8 +1,8 @@
 """A bus to try behaviours on: blocking or asyncio, on a virtual clock, in memory or over a pty, with faults.
 
-A behaviour is written once, for a `Rig`. It uses the bus as a user would, and says by `rig.sure` what a user
-would try again after a LinkError. It asks for its nodes by `Slave`; the first of them may be a firmware on an
-emulated chip.
+A behaviour is written once, for a `Rig`. It uses the bus as a user would, with `rig.sure` for calls that a
+user would repeat after a LinkError. It defines its nodes by `Slave`; the first of them may be a firmware on
+an emulated chip.
 """
 
 from __future__ import annotations
@@ -109,9 +109,9 @@ class Probe(VirtualNode):
 
     Attributes:
         heard: requests, in their order.
-        mute: so many answers are lost from now on.
-        deaf: so many requests are lost from now on.
-        old_number: it answers a node_setup with the number that it had.
+        mute: number of answers to be lost from now on.
+        deaf: number of requests to be lost from now on.
+        old_number: it answers a node_setup with its old number.
     """
 
     def __init__(self, number: int = 1, *, old_number: bool = False, **settings: Any) -> None:

@@ -183,7 +183,7 @@ class TestCounter:
         node.advance(0.24)
         assert node.position == 1, "with a beat of its own"
         node.advance(0.25)
-        assert node.position == 6, "from where it stood"
+        assert node.position == 6, "from its last position"
 
     def test_a_motion_without_words_only_reads(self) -> None:
         node = VirtualNode(capacity=0)
@@ -292,7 +292,7 @@ class TestConservation:
             assert fifo.queued == fifo.drained + fifo.dropped + fifo.waiting
             assert 0 <= fifo.waiting <= capacity
             done = queued[: len(queued) - fifo.waiting]
-            assert fifo.position == sum(map(signed_word, done)), "what is done moved it, in order"
+            assert fifo.position == sum(map(signed_word, done)), "the finished words moved it, in order"
         assert fifo.dropped == dropped
 
     @given(st.lists(st.floats(0.001, 0.7), min_size=1, max_size=30), st.integers(1, 48))

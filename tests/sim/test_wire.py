@@ -339,7 +339,7 @@ def test_detached_stations_are_silent_and_deaf() -> None:
     wire.attach(station)
     wire.attach(other)
     wire.transmit(REQUEST, 0.0)
-    wire.detach(station)  # while the request is under way
+    wire.detach(station)  # while the request is in transit
     wire.advance(1.0)
     assert station.heard == []
     wire.attach(station)

@@ -188,7 +188,7 @@ class Traffic:
         with self._may_fail():
             position = self.bus.motor_position(number).position
             if not held.node.position_valid and position:
-                raise Mismatch(f"node {number}: position {position}, but it knows none")
+                raise Mismatch(f"node {number}: position {position}, but it has none")
 
     def _start_stop(self, number: int, held: Held) -> None:
         whom = self._random.choice((0, number))

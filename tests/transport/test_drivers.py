@@ -30,7 +30,7 @@ from tests.transport.conftest import PATIENCE
 ASK = qlink.MotorPositionRequest(node=3)
 SILENT = qlink.MotorPositionRequest(node=9)
 ANSWER = qlink.MotorPositionResponse(node=3, position=3000)
-#: Seconds of slack where an answer comes, and where none does.
+#: Seconds of slack with an answer, and without one.
 AMPLE, SCANT = 10.0, 0.01
 
 
@@ -627,7 +627,7 @@ class TestEvents:
         with pytest.raises(ZeroDivisionError):
             client.transact(ASK)
         assert client.transact(ASK).response == ANSWER
-        assert calls == 4  # each event is told once
+        assert calls == 4  # each event is passed once
 
     def test_one_may_ask_in_its_turn(self) -> None:
         _, port, _ = bus(3)

@@ -140,7 +140,7 @@ def test_a_node_that_is_switched_off_opens_the_ring() -> None:
     clients[0].send(12, 1, 1, 1)
     ring.settle()
     assert clients[3].vr[1] == 1
-    assert clients[2].vr[3] == 0, "what it was to send is forgotten"
+    assert clients[2].vr[3] == 0, "its queue is dropped"
 
 
 def test_a_node_switched_off_in_the_middle_of_a_message_breaks_it() -> None:
@@ -148,7 +148,7 @@ def test_a_node_switched_off_in_the_middle_of_a_message_breaks_it() -> None:
     clients[0].send(12, 1, 1, 1)
     ring.sleep(0.08)
     ring.switch_off(1)
-    clients[2].send(10, 1, 2, 2)  # waits until the broken message is given up
+    clients[2].send(10, 1, 2, 2)  # waits until the broken message is abandoned
     ring.settle()
     assert clients[3].vr[1] == 0
     assert clients[3].vr[2] == 2

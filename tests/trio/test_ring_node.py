@@ -119,7 +119,7 @@ def test_what_stands_in_a_message_to_others_is_not_looked_at() -> None:
     assert line.node.netstat == 0
 
 
-# the priority of what is sent on
+# the priority of forwarded bytes
 
 
 def test_own_messages_wait_for_the_end_of_what_is_sent_on() -> None:

@@ -141,7 +141,7 @@ def test_a_ring_has_15_places() -> None:
         VirtualRing("coordinator").keypad(0)
 
 
-# latency on a line that takes its time
+# latency on a line with line time
 
 
 def way(address: int, *, cut_through: bool, message: str = "direct_variable_transfer") -> float:

@@ -31,7 +31,7 @@
 #define NODE_FIFO 48 /* capacity in path words, 1..255; two bytes of RAM each */
 #endif
 #if NODE_FIFO < 1 || NODE_FIFO > 255
-#error "NODE_FIFO must be 1 to 255: a byte of the motion's answer tells how many words are free"
+#error "NODE_FIFO must be 1 to 255: the motion's answer has one byte for the free words"
 #endif
 
 #ifndef NODE_RATE

@@ -59,7 +59,7 @@ static void take(ring_t *ring, uint8_t byte)
         ring->state = ((byte & RING_MARKER) != 0u) ? RING_CLOSED : RING_HUNTING;
         ++ring->frame_faults;
     } else {
-        /* the message goes on */
+        /* the message continues */
     }
 }
 

@@ -1,7 +1,7 @@
 """Reads and checks an Intel HEX file for the master, before anything is sent.
 
 The package `intelhex` (extra `load`) checks the records: form, count, type, checksum, size of the special
-records, overlapping data. This module also refuses what it accepts:
+records, overlapping data. This module also refuses these errors, which `intelhex` accepts:
 
 * a missing end record, and text after it (where it stops reading);
 * a program without data;

@@ -46,7 +46,7 @@ class KeypadNode:
         link: the engine: counters, events.
         display: the display.
         offset: number of nodes along the ring to the receiver of its keys, None until it is received.
-        mode: what it sends for a key.
+        mode: whether it sends keys pressed, or keys pressed and released.
         counters: counts of dropped keys and messages.
     """
 
