@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 
+from qlinkgen.model.integer import Chunk
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.framing import FramePlan, Hunt, Rescan
+from qlinkgen.plan.framing import FramePlan, Hunt, MarkPart, Rescan
 from qlinkgen.plan.transparency import FrameStuffing
 from qlinkgen.schema import loads
+from qlinkgen.schema.loader import load
 
+_ROOT = Path(__file__).resolve().parents[2]
 _SCHEMA = """
 qlinkgen: 1
 protocol: {name: shape, title: Shape, revision: "1", source: Tests, doc: A shape}
@@ -97,3 +101,32 @@ def test_a_length_later_in_the_frame_is_searched_for() -> None:
     parts = {name: _PARTS[name] for name in ("start", "id", "size", "node", "data", "check")}
     parts["check"] = parts["check"].replace("size, id", "id, size")
     assert isinstance(_frame(parts).receiver, Rescan)
+
+
+@pytest.mark.parametrize(
+    ("address", "number"),
+    [(Chunk(0, 4), Chunk(4, 3)), (Chunk(3, 4), Chunk(0, 3)), (Chunk(1, 2), Chunk(4, 2))],
+)
+def test_a_mark_holds_an_address_and_a_number(address: Chunk, number: Chunk) -> None:
+    header = MarkPart("header", 0x80, "node", address, "kind", number, end_id=None)
+    end = MarkPart("end", 0x80, "node", address, "kind", number, end_id=3)
+    for node in range(1 << address.bits):
+        for kind in range(1 << number.bits):
+            byte = header.byte(kind, node)
+            assert byte == 0x80 + (node << address.shift) + (kind << number.shift)
+            assert (header.id_of(byte), header.address_of(byte)) == (kind, node)
+            assert end.byte(kind, node) == header.byte(3, node)
+
+
+@pytest.mark.parametrize(
+    ("path", "bounds"),
+    [
+        ("schemas/qlink.yaml", (0, 26, 26)),
+        ("schemas/trio.yaml", (0, 256, 256)),
+        ("schemas/mc1231a.yaml", (0, 4, 4)),
+        ("tests/schemas/dynamixel.yaml", (0, 256, 341)),
+    ],
+)
+def test_the_bounds_of_a_payload(path: str, bounds: tuple[int, int, int]) -> None:
+    payload = plan_of(load(_ROOT / path)).frame.envelope.payload
+    assert (payload.least, payload.most, payload.most_sent) == bounds
