@@ -11,7 +11,16 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
-from qlinkgen.plan.framing import AddressPart, ByLength, CheckPart, ConstantPart, IdPart, LengthPart, MarkPart
+from qlinkgen.plan.framing import (
+    AddressPart,
+    ByLength,
+    ByMark,
+    CheckPart,
+    ConstantPart,
+    IdPart,
+    LengthPart,
+    MarkPart,
+)
 from qlinkgen.plan.payload import Member
 from qlinkgen.plan.reading import BadFrame
 from qlinkgen.plan.spans import Around, Dissection, Fault, Owner, Rule
@@ -72,11 +81,10 @@ def _check_place(found: Dissection, fault: Fault) -> None:
     what, wire, seen = (found.wire.hex(), fault), found.wire, fault.seen
     own = [place for span in found.spans if span.of is fault.of for place in span.places]
     rest = {span.of: span.places for span in found.spans if isinstance(span.of, Around)}
-    preamble = found.plan.frame.envelope.preamble
     match fault.rule:
         case Rule.BEGINNING:
             assert fault.at == 0, what
-            assert not preamble or preamble not in wire, what
+            assert not any(_begins(found, at) for at in range(len(wire))), what
         case Rule.FIRST:
             assert (fault.at, seen) == (0, len(rest[Around.BEFORE])), what
             assert _begins(found, len(rest[Around.BEFORE])), what
@@ -103,9 +111,9 @@ def _check_place(found: Dissection, fault: Fault) -> None:
 
 def _begins(found: Dissection, at: int) -> bool:
     """Whether a frame may begin at a place."""
-    first = found.plan.frame.envelope.parts[0]
-    if isinstance(first, MarkPart):
-        return bool(found.wire[at] & first.marker)
+    end = found.plan.frame.end
+    if isinstance(end, ByMark):
+        return bool(found.wire[at] & end.header.marker) and end.header.id_of(found.wire[at]) != end.end.end_id
     return found.wire[at:].startswith(found.plan.frame.envelope.preamble)
 
 
