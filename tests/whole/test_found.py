@@ -7,6 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from qlinkgen.backends import python
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.dissect import dissect
 from qlinkgen.schema import loads
 from tests.support.whole.trial import Effort, run_text
 
@@ -42,6 +44,17 @@ frame:
     code: {role: message, type: u8}
     data: {role: payload, size: 0..40}
   stuffing: {after: 0x10, insert: 0x03, exempt: [start]}
+bus: {kind: master_slave}
+"""
+_STUFFED_PAYLOAD = """\
+frame:
+  parts:
+    start: {role: constant, value: 7E}
+    code: {role: message, type: u8}
+    length: {role: length, type: u8, counts: [data]}
+    data: {role: payload, size: 0..4}
+    crc: {role: checksum, type: u8, algorithm: sum8, over: [data]}
+  stuffing: {after: 0x10, insert: 0x10, exempt: [start, code, length, crc], checksum: after}
 bus: {kind: master_slave}
 """
 _MARKED = """\
@@ -107,3 +120,16 @@ def test_the_first_wrong_part_of_a_header_names_the_fault() -> None:
     with pytest.raises(codec.DecodeError) as caught:
         codec.decode(bytes.fromhex("05 02 63 01 00 05"))
     assert caught.value.kind == "frame"
+
+
+def test_a_payload_that_is_too_long_without_inserted_bytes_is_a_fault_of_the_length() -> None:
+    """Its size is that of a stuffed payload; the check value is wrong too, but is checked later."""
+    text = f"{_HEAD}{_STUFFED_PAYLOAD}messages:\n  log: {{id: 5, fields: {{v: bytes}}}}\n"
+    protocol, faults = loads(text, "whole.yaml")
+    assert protocol, faults
+    wire = bytes.fromhex("7E 05 05 01 02 03 04 05 00")
+    assert dissect(plan_of(protocol), wire, "message").kind == "length"
+    codec = python.load(protocol)
+    with pytest.raises(codec.DecodeError) as caught:
+        codec.decode(wire)
+    assert caught.value.kind == "length"
