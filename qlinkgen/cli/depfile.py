@@ -16,15 +16,26 @@ _OURS = re.compile(r"(?:[^\n]+ \\\n)*[^\n]+: \\\n(?: [^\n]+ \\\n)* [^\n]+\n|")
 class Depfile:
     """A file with one rule."""
 
-    def __init__(self, file: Path, outputs: Sequence[Path], inputs: Sequence[Path]) -> None:
-        """Compose the rule. Raises Failure for a path that make cannot name, or a foreign file."""
+    def __init__(
+        self, file: Path, outputs: Sequence[Path], inputs: Sequence[Path], manifests: Sequence[Path] = ()
+    ) -> None:
+        """Compose the rule.
+
+        Raises Failure for a path that make cannot name, a foreign file, and a place of outputs; ``manifests``
+        are written too, but are not part of the rule.
+        """
         self._file = file
         self.text = rule(outputs, inputs)
         found = output.look(file.parent, file.name)
         self._present = "" if found.data is None else found.data.decode("utf-8", "replace")
         what = found.obstacle
-        if file.resolve() in {path.resolve() for path in (*outputs, *inputs)}:
+        place, written = file.resolve(), [path.resolve() for path in (*outputs, *manifests)]
+        if place in {*written, *(path.resolve() for path in inputs)}:
             what = f"{file} is one of the outputs or schemas"
+        elif any(place in path.parents or path in place.parents for path in written):
+            what = f"{file} is in the way of an output"
+        elif place.parent in {path.resolve().parent for path in outputs}:
+            what = f"{file} is in a folder of outputs, where another file is an orphan"
         elif not _OURS.fullmatch(self._present):
             what = f"{file} was not written by qlinkgen"
         if what:

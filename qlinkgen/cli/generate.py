@@ -102,7 +102,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     if dry_run:
         return reconcile.show(folders)
     inputs = _inputs(protocols, targets)
-    rule = Depfile(Path(depfile), reconcile.outputs(folders), inputs) if depfile else None
+    made = reconcile.outputs(folders)
+    rule = Depfile(Path(depfile), made, inputs, reconcile.manifests(folders)) if depfile else None
     reconcile.update(folders)
     if rule:
         rule.write()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from qlinkgen.cli import manifest
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.common import on_terminal, warn
 from qlinkgen.cli.drift import Change, Folder
@@ -18,6 +19,11 @@ from qlinkgen.model.texts import visible
 def outputs(folders: Sequence[Folder]) -> list[Path]:
     """Return every file generated from the schemas, without manifests, which depend on other runs too."""
     return sorted(folder.root / path for folder in folders for path in folder.wanted)
+
+
+def manifests(folders: Sequence[Folder]) -> list[Path]:
+    """Return the path of the manifest of every folder that has one."""
+    return [folder.root / manifest.NAME for folder in folders if folder.listed]
 
 
 def list_outputs(folders: Sequence[Folder]) -> int:

@@ -108,6 +108,17 @@ def test_schemas_outputs_folders_and_links_are_left_alone(
         assert (result.code, thermo.read_text(), out.exists()) == (1, schema, False)
 
 
+@pytest.mark.parametrize("place", ["manifest.json", "", "c", "c/thermo.h/d", "c/thermo.d"])
+def test_places_of_outputs_are_left_alone_before_they_exist(
+    qlinkgen: Run, out: Path, thermo: Path, place: str
+) -> None:
+    result = qlinkgen("generate", thermo, "--target", "c", "-o", out, "--depfile", out / place)
+    assert (result.code, out.exists()) == (1, False)
+    assert f"--depfile: {out / place} is" in result.err
+    assert qlinkgen("generate", thermo, "--target", "c", "-o", out, "--depfile", out / "thermo.d").code == 0
+    assert qlinkgen("generate", thermo, "--target", "c", "-o", out, "--check").code == 0
+
+
 def test_line_breaks_cannot_be_written(qlinkgen: Run, tmp_path: Path, out: Path, thermo: Path) -> None:
     schema = tmp_path / "a\nb.yaml"
     schema.write_text(thermo.read_text())
