@@ -23,7 +23,8 @@ Json: TypeAlias = "str | int | float | Decimal | Sequence[Json] | Mapping[str, J
 Native = int | bool | float | Decimal | bytes | str | list[int]
 
 
-_WHOLE = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|0[bB][01]+|[0-9]+)")
+#: No number of a protocol is nearly as long; Python refuses to convert one of more than 4300 digits.
+_WHOLE = re.compile(r"[+-]?(0[xX][0-9a-fA-F]{1,1000}|0[bB][01]{1,1000}|[0-9]{1,1000})")
 _DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
