@@ -18,6 +18,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.spelling import similar
 from qlinkgen.model.texts import visible
+from qlinkgen.plan.framing import frame_plan
 
 
 def find_schema(name: str) -> Path:
@@ -38,6 +39,8 @@ def load_protocol(name: str, crc: str | None = None) -> Protocol:
     protocol = load(path)
     if crc is None:
         return protocol
+    if frame_plan(protocol.frame).check is None:
+        raise Failure(f"--set crc={crc}: the frame of {protocol.name} has no checksum; omit the option")
     try:
         protocol = load(path, crc=crc)
         if names := [each.name for each in candidates(crc)]:

@@ -399,6 +399,19 @@ def test_fields_that_the_codec_fills(qlinkgen: Run, thermo: Path) -> None:
     assert "'count' is filled in by the encoder" in result.err
 
 
+def test_another_crc_of_a_frame_without_a_checksum(qlinkgen: Run, tmp_path: Path, thermo: Path) -> None:
+    text = thermo.read_text()
+    schema = tmp_path / "unchecked.yaml"
+    schema.write_text(re.sub(r"^ *sum: .*\n", "", text, flags=re.MULTILINE))
+    for arguments in (
+        ("encode", schema, "get_log", "--node", "1"),
+        ("generate", schema, "-o", tmp_path / "o"),
+    ):
+        result = qlinkgen(*arguments, "--set", "crc=bogus")
+        assert (result.code, (tmp_path / "o").exists()) == (2, False)
+        assert "--set crc=bogus: the frame of thermo has no checksum" in result.err
+
+
 @pytest.mark.parametrize("protocol", ["qlink", "trio", "mc1231a"])
 def test_another_crc(qlinkgen: Run, protocol: str) -> None:
     result = qlinkgen("encode", "qlink", "motor_position", "--node", "3", "--set", "crc=crc-ccitt")
