@@ -36,7 +36,7 @@ def alone(code: str, folder: Path) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("package", ["wire", "my.wire", "_a._b.c3", "match.type", "Thermo"])
+@pytest.mark.parametrize("package", ["wire", "my.wire", "_a._b.c3", "match.type", "Thermo", "console.com"])
 def test_the_layout(qlinkgen: Run, out: Path, thermo: Path, package: str) -> None:
     assert qlinkgen("generate", thermo, *PYTHON, "--package", package, "-o", out).code == 0
     folder = package.replace(".", "/")
@@ -112,7 +112,7 @@ def test_a_package_of_ones_own_is_not_touched(qlinkgen: Run, out: Path, thermo: 
     [
         "", ".", "a.", ".a", "a..b", "1a", "a-b", "a b", "a/b", "../a", "/a", "a\\b", "ä", "ﬁ", "a.ª",
         "a\n", "a\0b", "qlinkgen", "qlinkgen.codecs", "my.qlinkgen", "QLinkGen", "codecs", "json.wire",
-        "site", *keyword.kwlist,
+        "site", "con", "my.Aux", "nul.wire", "com1", "LPT9.a", *keyword.kwlist,
     ],
 )  # fmt: skip
 def test_names_that_no_package_can_have(qlinkgen: Run, out: Path, thermo: Path, name: str) -> None:
