@@ -57,7 +57,7 @@ lint: setup  ## Everything of `test` that runs no test
 	@$(BIN)/lint-imports --no-logo
 	@echo "== qlinkgen generate --check"
 	@$(BIN)/qlinkgen generate --check
-	@echo "== prose of changed files"
+	@echo "== prose"
 	@$(BIN)/python -m tests.prose
 
 generate: .venv/.user  ## Rewrite generated/ from schemas/

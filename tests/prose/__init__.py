@@ -1,13 +1,10 @@
 """A word list for prose: phrases that readers stumble over, and their replacements.
 
 `make lint` runs `python -m tests.prose`, which searches every text of the project that is not generated.
-Files that were written before the list and have not changed since are exempt: `untouched.txt` has their
-digests. Reword such a file when you change it; `--forget` then removes its line.
 """
 
 from __future__ import annotations
 
-import hashlib
 import re
 import subprocess
 from collections.abc import Iterator, Mapping
@@ -15,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-UNTOUCHED = Path(__file__).with_name("untouched.txt")
 KINDS = ("*.py", "*.md", "*.j2", "*.yaml", "*.c", "*.h", "*.toml", "Makefile")
 #: Not searched: generated files, and the list itself with its tests.
 ELSEWHERE = ("generated/", "tests/prose/", "qlinkgen/codecs", "tests/c/corpus/")
@@ -76,13 +72,3 @@ def hits(path: str, text: str) -> list[Hit]:
         Hit(path, text.count("\n", 0, each.start()) + 1, " ".join(each[0].split()), better)
         for each, better in sorted(found, key=lambda pair: pair[0].start())
     ]
-
-
-def digest(path: str, text: str) -> str:
-    """Hash and path of a file, as a line of the list of exempt files."""
-    return f"{hashlib.sha256(text.encode()).hexdigest()[:16]} {path}"
-
-
-def untouched() -> set[str]:
-    """Lines of the list of exempt files."""
-    return set(UNTOUCHED.read_text("utf-8").splitlines())
