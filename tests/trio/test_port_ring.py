@@ -140,7 +140,7 @@ def test_ports_may_be_given() -> None:
 
 
 def test_wrong_places() -> None:
-    with pytest.raises(SimulationError, match="no place of the ring is a port"):
+    with pytest.raises(SimulationError, match="the ring has no port"):
         PortRing(["coordinator"])
     near, _far = memory_pair()
     with pytest.raises(SimulationError, match="memory:a has no descriptor"):
