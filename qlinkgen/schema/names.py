@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from qlinkgen.model import naming
 from qlinkgen.model.message import Message
-from qlinkgen.model.naming import upper
-from qlinkgen.model.types import Array, Blob
+from qlinkgen.model.naming import snake, upper
+from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.schema.file_model import Fields, SchemaFile
 from qlinkgen.schema.kinds import NAME_PATTERN
 from qlinkgen.schema.notation import shown
@@ -47,7 +47,7 @@ def check_names(file: SchemaFile, messages: Sequence[Message], report: Reporter)
             check.clashes(_attributes(message, address, c=c))
     check.clashes(_classes(file))
     check.clashes(_methods(file))
-    check.clashes(_macros(file))
+    check.clashes(_macros(file, messages))
 
 
 class _Checker:
@@ -122,10 +122,7 @@ def _field_groups(file: SchemaFile) -> Iterator[tuple[Fields, Path]]:
 
 def _attributes(message: Message, address: str | None, *, c: bool) -> Iterator[tuple[str, str, Path]]:
     """Attributes of a message object, or members of its C struct."""
-    group, last = (
-        ("commands", message.direction) if message.name != message.command else ("messages", "fields")
-    )
-    path: Path = (group, message.command, last)
+    path = _fields_path(message)
     spelt = naming.member if c else naming.attribute
     if address is not None and not c:
         yield naming.address_attribute(address), f"the frame's '{address}'", path
@@ -137,6 +134,13 @@ def _attributes(message: Message, address: str | None, *, c: bool) -> Iterator[t
         if c and isinstance(value.type, Array | Blob) and not value.field.fixed:
             suffix = value.type.quantity
             yield f"{value.name}_{suffix}", f"the {suffix} of '{value.name}'", place
+
+
+def _fields_path(message: Message) -> Path:
+    group, last = (
+        ("commands", message.direction) if message.name != message.command else ("messages", "fields")
+    )
+    return group, message.command, last
 
 
 def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
@@ -173,8 +177,8 @@ def _class_base(file: SchemaFile, name: str) -> str:
     return f"{found}_message" if found in file.enums or found in file.flags else found
 
 
-def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
-    """Names of constants of the C header."""
+def _macros(file: SchemaFile, messages: Sequence[Message]) -> Iterator[tuple[str, str, Path]]:
+    """Names of constants of the C header; its functions differ if they do."""
     prefix = upper(file.protocol.name)
     for name in _GLOBAL_MACROS:
         yield f"{prefix}_{upper(name)}", "a constant of every header", ("protocol", "name")
@@ -184,17 +188,57 @@ def _macros(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
                 base = naming.stem(file.protocol.name, name, _KINDS[group])
                 result = f"{prefix}_{upper(base)}_{upper(member)}"
                 yield result, f"'{member}' of {name}", (group, name, "values", member)
-    for stem, owner, macros, path in _macro_owners(file):
+    for stem, owner, macros, path in (*_macro_owners(file, messages), *_conversions(file, messages)):
         for macro in macros:
             yield f"{prefix}_{upper(stem)}_{upper(macro)}", f"a constant of {owner}", path
 
 
-def _macro_owners(file: SchemaFile) -> Iterator[tuple[str, str, Sequence[str], Path]]:
+def _macro_owners(
+    file: SchemaFile, messages: Sequence[Message]
+) -> Iterator[tuple[str, str, Sequence[str], Path]]:
     """Stem, owner, suffixes and path of constants of the C header."""
+    values = {
+        f"{_class_base(file, snake(message.name))}_{value.name}"
+        for message in messages
+        for value in message.values
+    }
     for name in file.types:
-        yield name, f"the type '{name}'", _TYPE_MACROS, ("types", name)
+        stem = naming.stem(file.protocol.name, name, "type")
+        while stem in values:
+            stem += "_type"
+        yield stem, f"the type '{name}'", _TYPE_MACROS, ("types", name)
     for name in file.commands:
         for direction in ("request", "response"):
             yield f"{name}_{direction}", f"{name}.{direction}", _MESSAGE_MACROS, ("commands", name)
     for name in file.messages:
         yield _class_base(file, name), f"the message '{name}'", _MESSAGE_MACROS, ("messages", name)
+
+
+def _conversions(
+    file: SchemaFile, messages: Sequence[Message]
+) -> Iterator[tuple[str, str, Sequence[str], Path]]:
+    """The same for scaled values that may have conversions of their own instead of those of their type.
+
+    If fields narrow a type, the selected messages determine which of them have the conversions of the type.
+    """
+    variants: dict[str, set[object]] = {}
+    for message in messages:
+        for value in message.values:
+            if isinstance(value.type, Scalar):
+                variants.setdefault(value.type.type_name, set()).add(_converted(value.type))
+    for message in messages:
+        path = _fields_path(message)
+        for value in message.values:
+            if not isinstance(value.type, Scalar) or value.type.scaling is None:
+                continue
+            if value.type.type_name and len(variants[value.type.type_name]) == 1:
+                continue
+            inside = ("bits", value.name) if value.bits else ()
+            stem = f"{_class_base(file, snake(message.name))}_{value.name}"
+            owner = f"'{value.name}' of {message.name}"
+            yield stem, owner, _TYPE_MACROS, (*path, value.field.name, *inside)
+
+
+def _converted(number: Scalar) -> object:
+    """What a conversion depends on."""
+    return number.bits, number.signed, number.minimum, number.maximum, number.scaling, number.unit
