@@ -145,7 +145,7 @@ def test_wrong_places() -> None:
     near, _far = memory_pair()
     with pytest.raises(SimulationError, match="memory:a has no descriptor"):
         PortRing([near])
-    with pytest.raises(SimulationError, match="no node of the kind 'x'"):
+    with pytest.raises(SimulationError, match="unknown kind of node 'x'"):
         ring_bus("x")
     with pytest.raises(SimulationError, match="16 places"):
         PortRing(["port"] * 16)
