@@ -22,10 +22,10 @@ Labels: TypeAlias = Annotated[Mapping[str, str | int | bool], _FREE]
 _Node = TypeVar("_Node")
 
 #: Illegal characters: control characters except tab and line feed, line separators, marks that reorder text,
-#: surrogates, and code points that are not characters. Terminals execute them; in source code they end lines,
-#: or display text that differs from what a compiler reads.
+#: the zero-width space, surrogates, and code points that are not characters. Terminals execute them; in
+#: source code they end lines, are refused by linters, or display text that differs from what compilers read.
 CONTROL = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ufffe\uffff\ud800-\udfff]"
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ufffe\uffff\ud800-\udfff]"
 )
 _BLANKS = re.compile(r"[ \t\n]+")
 

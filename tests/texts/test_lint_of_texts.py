@@ -27,7 +27,7 @@ def test_every_text_of_the_file_model_has_a_slot() -> None:
 
 def test_which_characters_are_control_characters() -> None:
     assert {*map(chr, range(0x20)), *map(chr, range(0x7F, 0xA0))} - set(CHARACTERS) == {"\t", "\n"}
-    marks = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u2028\u2029\ufeff"
+    marks = "\u061c\u200b\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u2028\u2029\ufeff"
     assert set(marks) <= set(CHARACTERS)
     assert not [char for char in CHARACTERS if char.isprintable()]
 
