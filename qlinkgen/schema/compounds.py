@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
+from qlinkgen.model.types import Array, BitField, Bits, Blob, Enum, Length, Scalar
 from qlinkgen.schema.constants import integer_range
 from qlinkgen.schema.file_model import BitSpec, FieldSpec
 from qlinkgen.schema.kinds import MAX_PAYLOAD
@@ -191,6 +191,9 @@ def _bit_meaning(
         if width > 1:
             location.fault("bits-do-not-fit", "", f"bool has one bit, not {width}", "use at: with one bit")
         return "bool"
-    if not plain.fits(width):
+    if isinstance(plain.meaning, Enum) and any(member.value < 0 for member in plain.meaning.members):
+        what = f"{spec.type} has negative values, which a bit field cannot hold"
+        location.fault("bits-do-not-fit", "", what, "use signed: true without a type, or numbers from 0")
+    elif not plain.fits(width):
         location.fault("bits-do-not-fit", "", f"{spec.type} does not fit {width} bits", "widen the bit field")
     return plain.meaning
