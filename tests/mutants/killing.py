@@ -20,6 +20,7 @@ _PYTEST = ("-m", "pytest", "-qx", "--tb=no", "--assert=plain", "-p", "no:cachepr
 STAGES: Mapping[str, Sequence[str]] = {
     "generate": ("-m", "qlinkgen", "generate", "--check"),
     "plan": (*_PYTEST, "tests/plan", "tests/model", "tests/test_checksum.py", "tests/test_spelling.py"),
+    "receiver": (*_PYTEST, "tests/python/test_receiver.py"),
     "whole": (
         *("-m", "tests.whole", "--seeds", "1..10", "--names", "mixed"),
         *("--uncompiled", "--jobs", "1", "--stop"),
