@@ -245,9 +245,6 @@ class RescanningReceiver(Receiver):
 
     def give_up(self) -> Iterator[Event]:
         """Give up the incomplete frame and search its bytes for others."""
-        if self._due and self._buffer[:1] == self._due:
-            self._buffer = self._buffer[1:]
-        self._due = b""
         if self._buffer and not self._strategy.bare:
             yield self.event("truncated", self._buffer, self._start)
             self._buffer = self._buffer[1:]
