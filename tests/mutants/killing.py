@@ -22,7 +22,7 @@ STAGES: Mapping[str, Sequence[str]] = {
     "plan": (*_PYTEST, "tests/plan", "tests/model", "tests/test_checksum.py", "tests/test_spelling.py"),
     "receiver": (*_PYTEST, "tests/python/test_receiver.py"),
     "whole": (
-        *("-m", "tests.whole", "--seeds", "1..10", "--names", "mixed"),
+        *("-m", "tests.whole", "--seeds", "1..44", "--names", "mixed"),
         *("--uncompiled", "--jobs", "1", "--stop"),
     ),
     "schema": (
