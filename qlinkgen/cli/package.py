@@ -9,9 +9,8 @@ import sys
 import click
 
 from qlinkgen.cli.boundary import Failure
+from qlinkgen.model.naming import WINDOWS_DEVICES
 
-#: Devices of Windows, which cannot be names of folders there.
-_DEVICES = re.compile(r"con|prn|aux|nul|(com|lpt)[1-9]", re.IGNORECASE)
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
@@ -33,7 +32,7 @@ def _refused(part: str) -> str:
         return f"{part!r} is not a Python name of letters, digits and _"
     if keyword.iskeyword(part):
         return f"{part} is a keyword of Python"
-    if _DEVICES.fullmatch(part):
+    if part.lower() in WINDOWS_DEVICES:
         return f"{part} is a device of Windows"
     if part.lower() == "qlinkgen":
         return f"{part} is the package of the generator itself"

@@ -136,13 +136,16 @@ def stem(protocol: str, name: str, kind: str) -> str:
 
 # Files ------------------------------------------------------------------------------------------------------
 
-#: Headers of C and POSIX, modules that generated ones import, and devices of Windows.
-_FILES = frozenset(
+#: Devices of Windows, whose names are not allowed for its files and folders, in any case of letters.
+WINDOWS_DEVICES = frozenset(
+    """aux con nul prn com1 com2 com3 com4 com5 com6 com7 com8 com9
+    lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 lpt8 lpt9""".split()  # noqa: SIM905
+)
+#: Also headers of C and POSIX, and modules that generated ones import.
+_FILES = WINDOWS_DEVICES | frozenset(
     """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign
     stdarg stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath
-    threads time uchar wchar wctype fcntl poll pthread sched semaphore strings termios unistd aux
-    con nul prn com1 com2 com3 com4 com5 com6 com7 com8 com9 lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 lpt8
-    lpt9""".split()  # noqa: SIM905
+    threads time uchar wchar wctype fcntl poll pthread sched semaphore strings termios unistd""".split()  # noqa: SIM905
 )
 
 

@@ -61,7 +61,7 @@ class Programs:
         """Run all programs to their ends; return their results.
 
         Raises:
-            SimulationError: deadlock: all of them wait, and there are no more events.
+            SimulationError: deadlock: all of them wait, and no events are left.
             BaseException: the exception of the first failed program; the others are stopped.
         """
         if self._programs:
@@ -93,7 +93,7 @@ class Programs:
         """Wait for an event, at the latest until `due`.
 
         Raises:
-            SimulationError: there are no more events, or another program has failed.
+            SimulationError: no events are left, or another program has failed.
         """
         program = self._running
         if program is None or threading.current_thread() is not program:
@@ -144,6 +144,6 @@ class _Stopped(SimulationError):
 
 def _nothing_happens() -> SimulationError:
     return SimulationError(
-        "deadlock: all programs wait, and there are no more events; use a timeout, or look for a message "
+        "deadlock: all programs wait, and no events are left; use a timeout, or look for a message "
         "that was not sent, or was sent to another node"
     )

@@ -133,7 +133,7 @@ class VirtualRing:
         """Run blocking programs concurrently to their ends; return their results.
 
         Raises:
-            SimulationError: deadlock: all of them wait, and there are no more events.
+            SimulationError: deadlock: all of them wait, and no events are left.
         """
         return self._programs.run(programs)
 
@@ -185,7 +185,7 @@ class HostedNode(RingDriver):
         """See `RingDriver.until`.
 
         Raises:
-            SimulationError: there are no more events.
+            SimulationError: no events are left.
         """
         ring = self._ring
         due = math.inf if timeout is None else ring.now + timeout
@@ -228,7 +228,7 @@ class AsyncHostedNode(AsyncRingDriver):
         """See `RingDriver.until`; other tasks run after each event.
 
         Raises:
-            SimulationError: there are no more events, and no timeout.
+            SimulationError: no events are left, and no timeout.
         """
         ring = self._ring
         due = math.inf if timeout is None else ring.now + timeout
@@ -240,7 +240,7 @@ class AsyncHostedNode(AsyncRingDriver):
             # Other tasks may be about to send: deadlock only after they had some turns.
             idle = 0 if ring.wire.step(due) else idle + 1
             if idle > _IDLE_ROUNDS:
-                raise SimulationError("there are no more events on the ring; use a timeout, or send first")
+                raise SimulationError("no events are left on the ring; use a timeout, or send first")
         ring.wire.wake(self.node)
         return value
 

@@ -26,8 +26,6 @@ from tests.support.cdriver import Driver, build
 from tests.support.whole import chance
 from tests.support.whole.reference import Reference, Seen, Wrong
 from tests.support.whole.reference.document import Message
-from tests.support.whole.reference.frames import Frame
-from tests.support.whole.reference.special import Packets
 from tests.support.whole.targets import CTarget, InterpreterTarget, PythonTarget, Target, printed_codec
 
 #: Frames per batch of one process.
@@ -76,16 +74,10 @@ class Tally:
 
 def mutated(reference: Reference, rng: random.Random) -> Iterator[tuple[Message, bytes, bytes]]:
     """Endless frames, each with its original message and its request."""
-    mark = 0xA5
-    if isinstance(reference.frame, Frame) and reference.frame.stuffing:
-        mark = reference.frame.stuffing.after[0]
     while True:
         message = rng.choice(reference.messages)
-        request = b""
-        if isinstance(reference.frame, Packets) and message.direction == "response":
-            asked = reference.by_name[message.name.replace(".response", ".request")]
-            request = reference.encode(asked.name, chance.values(asked, rng, mark))[1]
-        given = chance.values(message, rng, mark)
+        request = chance.request(reference, message, rng)
+        given = chance.values(message, rng, chance.mark(reference))
         payload, wire = reference.encode(message.name, given, chance.address(message, rng), request)
         wrong = chance.wrong_frames(reference, message, payload, wire, rng, request=request)
         yield from ((message, frame, request) for frame in (wire, *wrong))

@@ -85,7 +85,7 @@ def test_a_loop_that_only_asks_for_keys_lets_time_pass() -> None:
 
 def test_waiting_for_what_never_happens_is_an_error() -> None:
     ring = VirtualRing("coordinator,coordinator")
-    with pytest.raises(SimulationError, match="deadlock: all programs wait, and there are no more events"):
+    with pytest.raises(SimulationError, match="deadlock: all programs wait, and no events are left"):
         ring.run(lambda: ring.coordinator(0).get(4), lambda: ring.coordinator(1).get(4))
     with pytest.raises(SimulationError, match="all programs wait"):
         ring.coordinator(0).get(4)
@@ -153,7 +153,7 @@ def test_a_virtual_ring_for_asyncio() -> None:
         await first.send(10, 2, 10)
         got = [await last.get(4)]
         await task
-        with pytest.raises(SimulationError, match="there are no more events"):
+        with pytest.raises(SimulationError, match="no events are left"):
             await last.get(4)
         return got, last.now()
 

@@ -32,6 +32,7 @@ _PRECEDENCE = (
 )
 #: Words that an expression follows.
 _BEFORE_EXPRESSION = frozenset({"if", "elif", "while", "return", "raise", "assert", "not"})
+_ASSIGNMENTS = frozenset({"=", "+=", "-=", "|=", "^="})
 _NO_TOKENS = (tokenize.NEWLINE, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 
 
@@ -166,8 +167,7 @@ def _split(nodes: list[Node], indent: int) -> list[str]:
 
 def _expression(nodes: Sequence[Node]) -> int:
     """Where the expression of a statement begins: after keywords or the last equals sign."""
-    equals = [at for at, each in enumerate(nodes) if isinstance(each, Word) and each.text.endswith("=")]
-    assigned = [at for at in equals if _flat([nodes[at]]) in ("=", "+=", "|=", "-=", "^=")]
+    assigned = [at for at, each in enumerate(nodes) if isinstance(each, Word) and each.text in _ASSIGNMENTS]
     if assigned:
         return assigned[-1] + 1
     start = 0

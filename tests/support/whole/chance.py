@@ -7,6 +7,22 @@ from collections.abc import Callable, Sequence
 
 from tests.support.whole.reference import Raw, Reference
 from tests.support.whole.reference.document import Message, Number, Run
+from tests.support.whole.reference.frames import Frame
+from tests.support.whole.reference.special import Packets
+
+
+def mark(reference: Reference) -> int:
+    """The byte after which others are inserted; any without stuffing."""
+    frame = reference.frame
+    return frame.stuffing.after[0] if isinstance(frame, Frame) and frame.stuffing else 0xA5
+
+
+def request(reference: Reference, message: Message, rng: random.Random) -> bytes:
+    """The packet of a request, if the response depends on it."""
+    if not isinstance(reference.frame, Packets) or message.direction != "response":
+        return b""
+    asked = reference.by_name[message.name.replace(".response", ".request")]
+    return reference.encode(asked.name, values(asked, rng, mark(reference)))[1]
 
 
 def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:

@@ -146,7 +146,6 @@ class _Trial:
         self.outcome, self.folder, self.effort = outcome, folder, effort
         self.rng = random.Random(f"trial {outcome.seed}")
         self.targets: list[Target] = []
-        self.mark = 0xA5
 
     def run(self) -> None:
         protocol, faults = loads(self.outcome.text, "whole.yaml")
@@ -156,8 +155,7 @@ class _Trial:
         assert protocol is not None
         self.reference = Reference(self.outcome.text)
         self.outcome.traits = traits(self.reference)
-        if isinstance(self.reference.frame, Frame) and self.reference.frame.stuffing:
-            self.mark = self.reference.frame.stuffing.after[0]
+        self.mark = chance.mark(self.reference)
         with contextlib.ExitStack() as programs:
             self._make(protocol, programs)
             self._messages()
@@ -280,17 +278,10 @@ class _Trial:
             for _ in range(self.effort.messages):
                 self._message(message)
 
-    def _request(self, message: Message) -> bytes:
-        """The packet of the request, if the response depends on it."""
-        if not isinstance(self.reference.frame, Packets) or message.direction != "response":
-            return b""
-        asked = self.reference.by_name[message.name.replace(".response", ".request")]
-        return self.reference.encode(asked.name, chance.values(asked, self.rng, self.mark))[1]
-
     def _message(self, message: Message) -> None:
         self.outcome.messages += 1
         given = chance.values(message, self.rng, self.mark)
-        place, request = chance.address(message, self.rng), self._request(message)
+        place, request = chance.address(message, self.rng), chance.request(self.reference, message, self.rng)
         payload, wire = self.reference.encode(message.name, given, place, request)
         wrong = chance.wrong_frames(self.reference, message, payload, wire, self.rng, request=request)
         for target in list(self.targets):
@@ -353,7 +344,7 @@ class _Trial:
         for _ in range(self.effort.streams if known else 0):
             asked, data = [], b""
             for message in self.rng.choices(known, k=self.rng.randint(1, 4)):
-                asked.append(self._request(message))
+                asked.append(chance.request(self.reference, message, self.rng))
                 given = chance.values(message, self.rng, self.mark)
                 data += self.reference.encode(message.name, given, request=asked[-1])[1]
             self._stream("response", chance.damaged(data, data[:4], self.rng), tuple(asked))
