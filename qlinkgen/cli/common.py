@@ -18,7 +18,6 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.spelling import similar
 from qlinkgen.model.texts import visible
-from qlinkgen.plan.framing import frame_plan
 
 
 def find_schema(name: str) -> Path:
@@ -39,6 +38,8 @@ def load_protocol(name: str, crc: str | None = None) -> Protocol:
     protocol = load(path)
     if crc is None:
         return protocol
+    from qlinkgen.plan.framing import frame_plan  # noqa: PLC0415  # only this option needs the plan
+
     if frame_plan(protocol.frame).check is None:
         raise Failure(f"--set crc={crc}: the frame of {protocol.name} has no checksum; omit the option")
     try:
