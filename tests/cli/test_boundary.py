@@ -37,10 +37,10 @@ def test_version_and_help(qlinkgen: Run) -> None:
             assert "\\b" not in shown.out
 
 
-def test_help_imports_nothing_heavy() -> None:
-    check = (
-        "import sys; sys.argv=['qlinkgen','--help']; from qlinkgen.cli import cli; cli(standalone_mode=False)"
-    )
+@pytest.mark.parametrize("command", [[], ["lint"]])
+def test_help_imports_nothing_heavy(command: list[str]) -> None:
+    words = ["qlinkgen", *command, "--help"]
+    check = f"import sys; sys.argv={words}; from qlinkgen.cli import cli; cli(standalone_mode=False)"
     heavy = "{'qlinkgen.plan','pydantic','rich','jinja2','construct','yaml','serial'} & set(sys.modules)"
     code = f"{check}; print(*sorted({heavy}), file=sys.stderr)"
     done = subprocess.run(
