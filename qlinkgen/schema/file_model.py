@@ -6,7 +6,9 @@ The JSON Schema for editors is generated from these classes, so editors show the
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import re
+from collections.abc import Mapping
+from typing import Annotated, Final, Literal
 
 from pydantic import (
     BaseModel,
@@ -25,6 +27,7 @@ from pydantic_core import CoreSchema
 from qlinkgen.schema.kinds import (
     AnyRange,
     ByteText,
+    Characters,
     Count,
     Id,
     Label,
@@ -153,6 +156,17 @@ class FieldSpec(Fact):
     )
 
 
+PartRole = Literal["constant", "length", "message", "address", "payload", "checksum"]
+#: The role that a key tells.
+_TELLING: Final[Mapping[str, PartRole]] = {
+    "counts": "length",
+    "value": "constant",
+    "text": "constant",
+    "algorithm": "checksum",
+}
+#: Bytes as a short form; names are in lower case.
+_HEX_PAIRS = re.compile(r"\s*(?:[0-9A-F]{2}\s*)+\Z", re.ASCII)
+
 ShortField = Annotated[FieldSpec, ShortForm("type", "string")]
 Fields = dict[str, ShortField]
 
@@ -160,12 +174,13 @@ Fields = dict[str, ShortField]
 class PartSpec(Fact):
     """A part of a frame."""
 
-    role: Literal["constant", "length", "message", "address", "payload", "checksum"] = Field(
-        description="Role of the part"
+    role: PartRole | None = Field(
+        default=None, description="Role of the part, if no other key tells it: counts, value, text, algorithm"
     )
     type: str | None = Field(default=None, description="Integer type: u8, u16, u24, u32 or u64")
     byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
     value: ByteText | None = Field(default=None, description="The constant bytes")
+    text: Characters | None = Field(default=None, description="The constant bytes, as characters")
     counts: list[str] | None = Field(default=None, description="Parts whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     algorithm: str | None = Field(default=None, description="Name in the CRC catalogue, or sum8, sum16")
@@ -176,6 +191,33 @@ class PartSpec(Fact):
     only: list[str] | None = Field(default=None, description="Messages with the checksum; default: all")
     words: Annotated[StrictInt, Field(ge=1, le=8)] = Field(1, description="Size of the words that a sum adds")
     rejected: Id | None = Field(default=None, description="Check value that rejects an unknown command")
+
+    @property
+    def told(self) -> PartRole | None:
+        """The role, stated or told by other keys; None if nothing tells it."""
+        if self.role is not None:
+            return self.role
+        given = (role for key, role in _TELLING.items() if getattr(self, key) is not None)
+        return next(given, None)
+
+
+class _PartForms:
+    """Accepts bytes or a type as short forms of a part."""
+
+    @staticmethod
+    def expanded(value: object) -> object:
+        """The mapping of a short form."""
+        if isinstance(value, dict | BaseModel):
+            return value
+        constant = isinstance(value, int) or (isinstance(value, str) and _HEX_PAIRS.match(value))
+        return {"value" if constant else "type": value}
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [{"type": ["string", "integer"]}, handler(core)]}
+
+
+Parts = dict[str, Annotated[PartSpec, BeforeValidator(_PartForms.expanded), _PartForms]]
 
 
 class StuffingSpec(_Mapping):
@@ -211,12 +253,10 @@ class MarkedSpec(_Mapping):
 class FrameSpec(Fact):
     """The frame around a message: exactly one of parts, marked and packet."""
 
-    parts: dict[str, PartSpec] | None = Field(default=None, description="Parts in wire order")
+    parts: Parts | None = Field(default=None, description="Parts in wire order")
     stuffing: StuffingSpec | None = Field(default=None, description="Keeps the preamble unique")
     marked: MarkedSpec | None = Field(default=None, description="Header and end are marked by a bit")
-    packet: dict[str, PartSpec] | None = Field(
-        default=None, description="No frame: message id, words, checksum"
-    )
+    packet: Parts | None = Field(default=None, description="No frame: message id, words, checksum")
 
 
 class BusSpec(_Mapping):

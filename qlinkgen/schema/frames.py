@@ -24,7 +24,7 @@ def payload_bounds(file: SchemaFile) -> tuple[int, int]:
         return file.frame.marked.payload
     parts = {**(file.frame.parts or {}), **(file.frame.packet or {})}
     return next(
-        (part.size for part in parts.values() if part.role == "payload" and part.size), (0, MAX_PAYLOAD)
+        (part.size for part in parts.values() if part.told == "payload" and part.size), (0, MAX_PAYLOAD)
     )
 
 
@@ -138,11 +138,13 @@ class FrameBuilder:
         if spec.checksum is None:
             return None
         place = (*path, "checksum")
-        if spec.checksum.role != "checksum":
-            what = f"the checksum has role: {spec.checksum.role}"
+        if spec.checksum.told != "checksum":
+            what = f"the checksum has role: {spec.checksum.told}"
             self._report.error("bad-frame", (*place, "role"), what, "use role: checksum")
             return None
-        self._parts.reject(spec.checksum, ("value", "counts", "size", "words", "rejected"), "checksum", place)
+        self._parts.reject(
+            spec.checksum, ("value", "text", "counts", "size", "words", "rejected"), "checksum", place
+        )
         checksum = self._parts.checksum(spec.checksum, ("payload",), place)
         if checksum and any(chunk.mask & spec.marker for chunk in checksum.chunks):
             what = f"a byte of the checksum can have the marker bit {spec.marker:#04x}"
@@ -176,9 +178,11 @@ class FrameBuilder:
             specs, path
         ):
             return None
-        places = {spec.role: (spec, (*path, name)) for name, spec in specs.items()}
+        places = {spec.told: (spec, (*path, name)) for name, spec in specs.items()}
         id_spec, id_place = places["message"]
-        self._parts.reject(id_spec, ("value", "counts", "size", "algorithm", "over"), "message", id_place)
+        self._parts.reject(
+            id_spec, ("value", "text", "counts", "size", "algorithm", "over"), "message", id_place
+        )
         if self._parts.integer(id_spec, id_place).size != 1:
             what = "the message id of a packet must be one byte"
             self._report.error("bad-packet", (*id_place, "type"), what, "use u8", needs=(id_place,))
@@ -197,9 +201,9 @@ class FrameBuilder:
         )
 
     def _packet_roles_fit(self, specs: Mapping[str, PartSpec], path: Path) -> bool:
-        wrong = [name for name, spec in specs.items() if spec.role not in _PACKET_ROLES]
+        wrong = [name for name, spec in specs.items() if spec.told not in _PACKET_ROLES]
         for name in wrong:
-            what = f"a part with role {specs[name].role} is not allowed in a packet"
+            what = f"a part with role {specs[name].told} is not allowed in a packet"
             self._parts.fault(
                 "bad-packet", (*path, name), what, f"use {listed(_PACKET_ROLES)}, or a frame of parts"
             )
@@ -207,9 +211,9 @@ class FrameBuilder:
 
     def _packet_checksum(self, spec: PartSpec, specs: Mapping[str, PartSpec], place: Path) -> Checksum | None:
         self._parts.reject(
-            spec, ("value", "counts", "size", "sent", "only", "over"), "packet's checksum", place
+            spec, ("value", "text", "counts", "size", "sent", "only", "over"), "packet's checksum", place
         )
-        over = [name for name, part in specs.items() if part.role != "checksum"]
+        over = [name for name, part in specs.items() if part.told != "checksum"]
         checksum = self._parts.checksum(spec.model_copy(update={"over": over}), specs, place)
         if checksum is not None and not isinstance(checksum.algorithm, catalogue.Sum):
             what = f"the check value of a packet must be a sum, not {checksum.algorithm.name}"

@@ -41,6 +41,12 @@ def _uncontrolled(text: str) -> str:
     return text
 
 
+def _characters(value: object) -> object:
+    if isinstance(value, str) and value and value.isascii() and value.isprintable():
+        return value
+    raise ValueError(f"{shown(value)} is not text of printable ASCII characters; use value for other bytes")
+
+
 def _scalar(value: object) -> object:
     if isinstance(value, list) and all(
         isinstance(item, int) and not isinstance(item, bool) for item in value
@@ -112,7 +118,10 @@ WholeRange = Annotated[
 ByteText = Annotated[
     bytes,
     PlainValidator(notation.byte_string),
-    _json("One byte (0xA5) or hex pairs (A5 A5)", "string", "integer"),
+    _json("Hex pairs (A5 A5) or one byte (0xA5)", "string", "integer"),
+]
+Characters = Annotated[
+    str, BeforeValidator(_characters), WithJsonSchema({"type": "string", "pattern": "^[ -~]+$"})
 ]
 Time = Annotated[
     notation.Duration, PlainValidator(notation.duration), _json("3 bytes, 260 us, 10 ms or 1 s", "string")

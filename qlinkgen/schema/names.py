@@ -86,7 +86,7 @@ class _Checker:
         for group in ("parts", "packet"):
             for name, part in (getattr(file.frame, group) or {}).items():
                 self.spelling(name, ("frame", group, name))
-                if part.role == "address":
+                if part.told == "address":
                     address = name
         return address
 

@@ -49,7 +49,7 @@ class TypeText:
 
 
 class DecimalNumber(int):
-    """A number of two decimal digits or more, which is ambiguous as a byte string: it may be hex."""
+    """A number of two decimal digits or more; pairs of digits are hex where bytes are expected."""
 
 
 def shown(value: object) -> str:
@@ -106,15 +106,12 @@ def whole_range(value: object) -> tuple[int, int]:
 
 
 def byte_string(value: object) -> bytes:
-    """One number 0-255, or pairs of hex digits like ``A5 A5``. Raises ValueError.
+    """Pairs of hex digits like ``A5 A5``, or one number like ``0xA5``. Raises ValueError.
 
-    In YAML a plain ``10`` is the number ten, while ``1A`` and ``10 10`` are text, which is read as hex.
+    To YAML a plain ``10`` is a number, while ``1A`` and ``10 10`` are text; all three are read as hex here.
     """
-    if isinstance(value, DecimalNumber) and value <= 99:
-        raise ValueError(
-            f'{shown(value)} may be decimal or hex; write 0x{value} or "{value}" for the hex digits, '
-            f"0x{value:02X} for the decimal number"
-        )
+    if isinstance(value, DecimalNumber) and len(str(int(value))) % 2 == 0:
+        return bytes.fromhex(str(int(value)))
     if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= 0xFF:
         return bytes([value])
     if isinstance(value, str) and _HEX.match(value):

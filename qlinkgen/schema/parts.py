@@ -16,7 +16,7 @@ from qlinkgen.schema.source import Path
 _INTEGERS = {"u8": 1, "u16": 2, "u24": 3, "u32": 4, "u64": 8}
 _SINGLE_ROLES = ("length", "message", "address", "payload", "checksum")
 _ROLE_KEYS = {
-    "constant": ("value",),
+    "constant": ("value", "text"),
     "length": ("type", "byteorder", "counts"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
@@ -27,6 +27,7 @@ _KEYS = (
     "type",
     "byteorder",
     "value",
+    "text",
     "counts",
     "size",
     "algorithm",
@@ -48,14 +49,22 @@ class PartBuilder:
         self._crc = crc
 
     def roles_fit(self, specs: Mapping[str, PartSpec], needed: Sequence[str], path: Path) -> bool:
-        """Check that required roles are present, and each role but constant occurs once."""
-        roles = [spec.role for spec in specs.values()]
+        """Check that every part and each required role has its role, and each but constant occurs once."""
+        roles = [spec.told for spec in specs.values()]
         fit = True
+        for name in (name for name, spec in specs.items() if spec.told is None):
+            if not any(self._report.touched((*path, name, key)) for key in ("role", *_KEYS)):
+                what = f"{name} has no role"
+                hint = (
+                    "add role: message, address or payload; counts, value, text or algorithm tell the others"
+                )
+                self._report.error("bad-frame", (*path, name), what, hint, of_key=True, absent=True)
+            fit = False
         for index, (name, spec) in enumerate(specs.items()):
-            if spec.role in _SINGLE_ROLES and spec.role in roles[:index]:
-                first = next(other for other, each in specs.items() if each.role == spec.role)
+            if spec.told in _SINGLE_ROLES and spec.told in roles[:index]:
+                first = next(other for other, each in specs.items() if each.told == spec.told)
                 what, hint = (
-                    f"{name} and {first} are both the {spec.role}",
+                    f"{name} and {first} are both the {spec.told}",
                     "a frame has one of each role but constant",
                 )
                 self.fault("bad-frame", (*path, name), what, hint)
@@ -69,24 +78,24 @@ class PartBuilder:
 
     def build(self, name: str, spec: PartSpec, names: Iterable[str], path: Path) -> Part:
         """The part described by a mapping; missing keys are reported and replaced by placeholders."""
-        self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS[spec.role]], spec.role, path)
+        role = spec.told
+        assert role is not None
+        self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS[role]], role, path)
         value, size, checksum, scalar = b"", (0, 0), None, None
-        if spec.role == "constant":
-            value = spec.value or b"\0"
-            if spec.value is None:
-                self._lacks("value", "add value: A5 A5", path)
-        elif spec.role == "payload":
+        if role == "constant":
+            value = self.constant(spec, path)
+        elif role == "payload":
             size = self.payload_size(spec, path)
-        elif spec.role == "checksum":
+        elif role == "checksum":
             checksum = self.checksum(spec, names, path)
         else:
             scalar = self.integer(spec, path)
-            if spec.role == "length" and not spec.counts:
+            if role == "length" and not spec.counts:
                 self._lacks("counts", "add counts: [PART, ...]", path)
             self.known(spec.counts or (), names, (*path, "counts"))
         return Part(
             name=name,
-            role=spec.role,
+            role=role,
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
@@ -113,6 +122,15 @@ class PartBuilder:
     def _lacks(self, key: str, hint: str, path: Path) -> None:
         if not self._report.touched((*path, key)):
             self._report.error("bad-frame", path, f"{path[-1]} has no {key}", hint, of_key=True, absent=True)
+
+    def constant(self, spec: PartSpec, path: Path) -> bytes:
+        """The bytes of a constant."""
+        if spec.value is not None and spec.text is not None:
+            what = f"{path[-1]} has both value and text"
+            self.fault("bad-frame", (*path, "text"), what, "remove one of them")
+        if spec.value is None and spec.text is None:
+            self._lacks("value", "add value: A5 A5", path)
+        return spec.value or (spec.text or "\0").encode("ascii")
 
     def payload_size(self, spec: PartSpec, path: Path) -> tuple[int, int]:
         """Minimum and maximum size of a payload."""

@@ -50,7 +50,30 @@ def choose(rng: random.Random, words: _Words) -> Shape:
     kind = rng.choices(("hunted", "parts", "marked", "packet"), (16, 66, 10, 8))[0]
     if kind == "marked":
         return _marked(rng)
-    return _packet(rng) if kind == "packet" else _Parts(rng, words).make(hunted=kind == "hunted")
+    shape = _packet(rng) if kind == "packet" else _Parts(rng, words).make(hunted=kind == "hunted")
+    for key in ("parts", "packet"):
+        parts: Doc = shape.frame.get(key, {})
+        for name, spec in parts.items():
+            parts[name] = _shorter(rng, spec)
+    return shape
+
+
+def _shorter(rng: random.Random, spec: Doc) -> object:
+    """A part in one of its notations."""
+    if spec["role"] in ("message", "address", "payload") or rng.random() < 0.3:
+        return spec
+    rest = {key: value for key, value in spec.items() if key != "role"}
+    if spec["role"] != "constant":
+        return rest
+    data = bytes.fromhex(rest["value"])
+    forms: list[object] = [rest, rest["value"]]
+    if len(data) == 1 and data[0] >= 100:
+        forms.append(data[0])
+    if rest["value"].isdecimal() and rest["value"][0] != "0":
+        forms += [int(rest["value"]), {"value": int(rest["value"])}]
+    if data.isascii() and data.decode().isprintable():
+        forms.append({"text": data.decode()})
+    return rng.choice(forms)
 
 
 def _algorithm(rng: random.Random) -> tuple[str, int]:

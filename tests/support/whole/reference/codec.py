@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tests.support.whole.reference import document, values
-from tests.support.whole.reference.document import Direction, Fields, Message, whole_span
+from tests.support.whole.reference.document import Direction, Fields, Message, part_doc, whole_span
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.receivers import (
     Event,
@@ -40,9 +40,9 @@ class Reference:
             Frame(data) if "parts" in shape else Marked(data) if "marked" in shape else Packets(data)
         )
         parts = {**shape.get("parts", {}), **shape.get("packet", {})}
-        sizes = [spec["size"] for spec in parts.values() if spec["role"] == "payload"]
+        sizes = [spec["size"] for spec in map(part_doc, parts.values()) if spec["role"] == "payload"]
         most = whole_span(sizes[0] if sizes else shape["marked"]["payload"])[1]
-        addressed = [name for name, spec in parts.items() if spec["role"] == "address"]
+        addressed = [name for name, spec in parts.items() if part_doc(spec)["role"] == "address"]
         self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None
         self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
         self.by_name = {message.name: message for message in self.messages}

@@ -178,8 +178,19 @@ def whole_span(given: object) -> tuple[int, int]:
 
 
 def octets(given: object) -> bytes:
-    """One number, or pairs of hex digits."""
-    return bytes([given]) if isinstance(given, int) else bytes.fromhex(str(given))
+    """Pairs of hex digits, to YAML a number if they are two decimal ones; or a number."""
+    if isinstance(given, int) and not 10 <= given <= 99:
+        return bytes([given])
+    return bytes.fromhex(str(given))
+
+
+def part_doc(given: object) -> Doc:
+    """A part of a frame with its role; a short form becomes a mapping."""
+    if not isinstance(given, dict):
+        pairs = isinstance(given, int) or re.fullmatch("([0-9A-F]{2} ?)+", str(given))
+        given = {"value" if pairs else "type": given}
+    told = {"value": "constant", "text": "constant", "counts": "length", "algorithm": "checksum"}
+    return {"role": next((role for key, role in told.items() if key in given), "value"), **given}
 
 
 def byte_pieces(size: int, order: str) -> tuple[tuple[int, int], ...]:

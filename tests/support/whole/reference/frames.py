@@ -8,7 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.support.whole.reference import checks
-from tests.support.whole.reference.document import Doc, Message, Run, byte_pieces, octets, whole_span
+from tests.support.whole.reference.document import (
+    Doc,
+    Message,
+    Run,
+    byte_pieces,
+    octets,
+    part_doc,
+    whole_span,
+)
 from tests.support.whole.reference.values import Wrong, get, items_of, put
 
 
@@ -67,10 +75,11 @@ class Stuffing:
         return plain + rest
 
 
-def part_of(name: str, spec: Doc, order: str) -> Part:
+def part_of(name: str, spec: object, order: str) -> Part:
     """A part from its mapping."""
+    spec = part_doc(spec)
     if spec["role"] == "constant":
-        constant = octets(spec["value"])
+        constant = spec["text"].encode("ascii") if "text" in spec else octets(spec["value"])
         return Part(name, "constant", len(constant), spec, constant)
     if spec["role"] == "payload":
         return Part(name, "payload", 0, spec)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tests.support.whole.reference import checks
-from tests.support.whole.reference.document import Doc, Message, whole_span
+from tests.support.whole.reference.document import Doc, Message, part_doc, whole_span
 from tests.support.whole.reference.frames import part_of
 from tests.support.whole.reference.values import Wrong, put
 
@@ -72,7 +72,9 @@ class Packets:
         """Read the sum."""
         parts = document["frame"]["packet"]
         order = document.get("byteorder", "big")
-        found = [part_of(name, spec, order) for name, spec in parts.items() if spec["role"] == "checksum"]
+        found = [
+            part_of(name, spec, order) for name, spec in parts.items() if part_doc(spec)["role"] == "checksum"
+        ]
         self._check = found[0] if found else None
 
     def size(self, message: Message) -> int:
