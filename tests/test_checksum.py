@@ -255,3 +255,55 @@ def test_at_most_three_names_are_meant() -> None:
     with pytest.raises(UnknownAlgorithm) as caught:
         find("crc-16/cm")
     assert caught.value.suggestions == ("crc-16/cms", "crc-16", "crc-16/gsm")
+
+
+KNOWN = {
+    "sum8": 0xDD,
+    "sum8-inverted": 0x22,
+    "sum8-zero": 0x23,
+    "xor8": 0x31,
+    "sum16": 0x01DD,
+    "sum16-inverted": 0xFE22,
+    "sum16-zero": 0xFE23,
+    "sum32": 0x01DD,
+    "fletcher-8": 0x15DD,
+    "fletcher-16": 0x1EDE,
+    "adler-32": 0x091E01DE,
+}
+
+
+def test_known_values_of_what_is_not_a_crc() -> None:
+    assert {each.name: each.check for each in checksum.SUMS} == KNOWN
+    assert find("fletcher-16").compute(b"abcde") == 0xC8F0
+    assert find("adler").compute(b"Wikipedia") == 0x11E60398
+    # ModbusASCII, :010300000002 FA; UBX poll of MON-VER, B5 62 0A 04 00 00 0E 34.
+    assert find("sum8-zero").compute(bytes.fromhex("010300000002")) == 0xFA
+    assert find("fletcher-8").compute(bytes.fromhex("0A040000")).to_bytes(2, "little").hex() == "0e34"
+
+
+@given(data=st.binary(max_size=200))
+def test_a_register_takes_bytes_one_by_one(data: bytes) -> None:
+    for each in (*checksum.SUMS, *ALL):
+        register = each.start
+        for byte in data[:20]:
+            register = each.step(register, byte)
+        assert each.finish(register) == each.compute(data[:20]), each.name
+    assert find("adler-32").compute(data) == zlib.adler32(data)
+
+
+def test_a_crc_by_its_parameters() -> None:
+    smbus = checksum.stated(8, 0x07, 0, refin=False, refout=False, xorout=0)
+    assert smbus is find("crc-8/smbus")
+    own = checksum.stated(16, 0x1021, 0xABCD, refin=True, refout=False, xorout=1)
+    assert own.name == "crc-16/poly-1021"
+    assert own.check == own.compute(CHECK_DATA) == bitwise(own, CHECK_DATA)
+    with pytest.raises(ValueError, match="poly must be odd"):
+        checksum.stated(8, 0x8C ^ 0x8E, 0, refin=False, refout=False, xorout=0)
+
+
+def test_words_for_several_sums_are_no_algorithm() -> None:
+    for name in checksum._UNNAMED:
+        with pytest.raises(UnknownAlgorithm) as caught:
+            find(name)
+        assert caught.value.suggestions == tuple(each.name for each in checksum.candidates(name))
+        assert len(caught.value.suggestions) >= 2

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from qlinkgen.model.checksum import SUMS, Algorithm, Sum, catalogue
+from qlinkgen.model.checksum import Checksum, of_width
 from qlinkgen.plan.check import Check
 
 #: Most matches to show; further ones are probably coincidences.
@@ -78,12 +78,8 @@ def _fits(check: Check, received: int, covers: Sequence[Coverage], limit: int) -
                 yield Fit(f"{algorithm.name}{each.text}{suffix}", steps + extra)
 
 
-def _algorithms(own: Algorithm | Sum) -> list[Algorithm | Sum]:
-    others: list[Algorithm | Sum] = [
-        *catalogue(own.width),
-        *(each for each in SUMS if each.width == own.width),
-    ]
-    return [own, *(each for each in others if each.name != own.name)]
+def _algorithms(own: Checksum) -> list[Checksum]:
+    return [own, *(each for each in of_width(own.width) if each.name != own.name)]
 
 
 def _swapped(check: Check, value: int) -> int:

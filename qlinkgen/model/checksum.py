@@ -1,4 +1,4 @@
-"""Checksums by name: the catalogue of CRC algorithms, 3 to 64 bits wide, and plain sums.
+"""Checksums by name: the catalogue of CRC algorithms, 3 to 64 bits wide, sums and others.
 
 The parameters of a CRC are those of the RevEng catalogue: `init` and `poly` describe a register that shifts
 towards its high bit, regardless of `refin`. Implementations keep the register of a reflected CRC reflected,
@@ -11,14 +11,28 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, Literal
 
 from qlinkgen.errors import QlinkgenError
 from qlinkgen.model.spelling import similar
+from qlinkgen.model.sums import SUMS, Fletcher, Sum, Xor
 
-__all__ = ["SUMS", "Algorithm", "Checksum", "Sum", "UnknownAlgorithm", "candidates", "catalogue", "find"]
+__all__ = [
+    "SUMS",
+    "Algorithm",
+    "Checksum",
+    "Fletcher",
+    "Sum",
+    "UnknownAlgorithm",
+    "Xor",
+    "candidates",
+    "catalogue",
+    "find",
+    "of_width",
+    "stated",
+]
 
 
 class UnknownAlgorithm(QlinkgenError, LookupError):
@@ -104,6 +118,10 @@ class Algorithm:
         """Return the CRC of the bytes."""
         return self.finish(self.register(data, self.start))
 
+    def step(self, register: int, byte: int) -> int:
+        """Return the register after one more byte."""
+        return self.register((byte,), register)
+
     def finish(self, register: int) -> int:
         """Return the CRC of the final register."""
         return (_reflect(register, self.width) if self.refin != self.refout else register) ^ self.xorout
@@ -156,46 +174,32 @@ class Algorithm:
         return (register ^ (self.feedback if out else 0)) >> 1 | (out ^ bit) << self.width - 1
 
 
-@dataclass(frozen=True, slots=True)
-class Sum:
-    """A sum of units, bytes or words, modulo a power of two.
-
-    Attributes:
-        name: name in schema files.
-        width: bits of the sum.
-        complement: every bit of the result is inverted.
-    """
-
-    kind: ClassVar[Literal["sum"]] = "sum"
-
-    name: str
-    width: int
-    complement: bool = False
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The name: sums have no aliases."""
-        return (self.name,)
-
-    @property
-    def mask(self) -> int:
-        """All bits of the sum set."""
-        return (1 << self.width) - 1
-
-    def compute(self, units: Iterable[int]) -> int:
-        """Return the sum of the units; bytes are units too."""
-        return (~sum(units) if self.complement else sum(units)) & self.mask
-
-
-Checksum = Algorithm | Sum
-
-#: Every plain sum that `find` knows.
-SUMS = (Sum("sum8", 8), Sum("sum8-inverted", 8, complement=True), Sum("sum16", 16))
+Checksum = Algorithm | Sum | Xor | Fletcher
 
 
 def catalogue(width: int | None = None) -> tuple[Algorithm, ...]:
     """Return the CRC algorithms, of one width or all, ordered by width and name."""
     return tuple(algorithm for algorithm in _catalogue() if width in (None, algorithm.width))
+
+
+def of_width(width: int) -> tuple[Checksum, ...]:
+    """Return every algorithm with a name whose value has so many bits, CRCs first."""
+    return (*catalogue(width), *(each for each in SUMS if each.width == width))
+
+
+def stated(width: int, poly: int, init: int, *, refin: bool, refout: bool, xorout: int) -> Algorithm:
+    """Return the CRC with these parameters; the one of the catalogue if it has them.
+
+    Raises:
+        ValueError: they do not describe a CRC.
+    """
+    wanted = (poly, init, refin, refout, xorout)
+    for each in catalogue(width):
+        if (each.poly, each.init, each.refin, each.refout, each.xorout) == wanted:
+            return each
+    name = f"crc-{width}/poly-{poly:x}"
+    unchecked = Algorithm(name, width, poly, init, refin, refout, xorout, check=0)
+    return replace(unchecked, check=unchecked.compute(b"123456789"))
 
 
 def find(name: str) -> Checksum:
@@ -213,7 +217,8 @@ def find(name: str) -> Checksum:
     candidates = _by_short_name().get(key, ())
     if len(candidates) == 1:
         return candidates[0]
-    raise UnknownAlgorithm(name, tuple(each.name for each in candidates) or _similar(key))
+    meant = _UNNAMED.get(key) or tuple(each.name for each in candidates)
+    raise UnknownAlgorithm(name, meant or _similar(key))
 
 
 #: Names that documents and libraries use for several algorithms, and these algorithms. The catalogue assigns
@@ -232,12 +237,23 @@ _AMBIGUOUS = {
     "crc32": ("crc-32/iso-hdlc", "crc-32/mpeg-2", "crc-32/bzip2", "crc-32/iscsi"),
     "crc64": ("crc-64/ecma-182", "crc-64/xz", "crc-64/go-iso"),
 }
+#: Names that documents use for several algorithms, none of which is likelier than the others.
+_UNNAMED = {
+    "lrc": ("xor8", "sum8-zero"),
+    "lrc8": ("xor8", "sum8-zero"),
+    "bcc": ("xor8", "sum8"),
+    "checksum": ("sum8", "sum8-zero", "sum8-inverted", "xor8"),
+    "checksum8": ("sum8", "sum8-zero", "sum8-inverted", "xor8"),
+    "sum": ("sum8", "sum16", "sum32"),
+    "checksum16": ("sum16", "sum16-zero", "fletcher-16"),
+    "fletcher": ("fletcher-8", "fletcher-16"),
+}
 
 
-def candidates(name: str) -> tuple[Algorithm, ...]:
+def candidates(name: str) -> tuple[Checksum, ...]:
     """Return the algorithms that an ambiguous name may mean, the likeliest first; () for other names."""
-    by_name = {each.name: each for each in _catalogue()}
-    return tuple(by_name[each] for each in _AMBIGUOUS.get(_key(name), ()))
+    key = _key(name)
+    return tuple(find(each) for each in _AMBIGUOUS.get(key) or _UNNAMED.get(key, ()))
 
 
 def _similar(key: str) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from qlinkgen.model.checksum import Algorithm, Sum
+from qlinkgen.model.checksum import Checksum as Algorithm
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Scalar
@@ -19,7 +19,7 @@ Role = Literal["constant", "length", "message", "address", "payload", "checksum"
 class Checksum:
     """The algorithm and wire layout of the check value."""
 
-    algorithm: Algorithm | Sum
+    algorithm: Algorithm
     #: The check value's wire bytes; bits in no chunk are neither sent nor compared.
     chunks: tuple[Chunk, ...]
     #: Names of the frame parts covered, in wire order.

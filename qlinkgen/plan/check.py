@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from qlinkgen.model.checksum import Algorithm, Sum
+from qlinkgen.model.checksum import Checksum as AnyAlgorithm
+from qlinkgen.model.checksum import Sum
 from qlinkgen.model.frame import Checksum
 from qlinkgen.model.integer import ByteOrder, unpack_chunks
 
@@ -26,7 +27,7 @@ class Check:
     rejected: int | None = None
 
     @property
-    def algorithm(self) -> Algorithm | Sum:
+    def algorithm(self) -> AnyAlgorithm:
         """The algorithm that computes the value."""
         return self.value.algorithm
 
@@ -57,7 +58,7 @@ class Check:
 
     def of(self, *runs: bytes, start: int = 0) -> int:
         """The value over runs of bytes; a sum begins with ``start`` and splits each run into words."""
-        if isinstance(self.algorithm, Algorithm):
+        if not isinstance(self.algorithm, Sum):
             return self.algorithm.compute(b"".join(runs))
         words = [run[at : at + self.word] for run in runs for at in range(0, len(run), self.word)]
         return self.algorithm.compute([start, *(int.from_bytes(word, "big") for word in words)])

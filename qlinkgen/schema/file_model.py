@@ -171,6 +171,32 @@ ShortField = Annotated[FieldSpec, ShortForm("type", "string")]
 Fields = dict[str, ShortField]
 
 
+class CrcSpec(_Mapping):
+    """A CRC by its parameters, which have the meaning of the catalogue."""
+
+    width: Annotated[StrictInt, Field(ge=8, le=64)] = Field(description="Bits of the CRC")
+    poly: Id = Field(description="Polynomial without its highest term")
+    init: Id = Field(default=0, description="Initial register")
+    refin: StrictBool = Field(default=False, description="Bytes are processed low bit first")
+    refout: StrictBool | None = Field(
+        default=None, description="The final register is reflected; default: as refin"
+    )
+    xorout: Id = Field(default=0, description="XORed with the result")
+    check: Id | None = Field(
+        default=None, description="CRC of the characters 123456789, if the document states it"
+    )
+
+
+def _algorithm_form(value: object) -> str:
+    return f"{BRANCH}crc" if isinstance(value, dict | CrcSpec) else f"{BRANCH}name"
+
+
+AnyAlgorithm = Annotated[
+    Annotated[CrcSpec, Tag(f"{BRANCH}crc")] | Annotated[str, Tag(f"{BRANCH}name")],
+    Discriminator(_algorithm_form),
+]
+
+
 class PartSpec(Fact):
     """A part of a frame."""
 
@@ -183,7 +209,9 @@ class PartSpec(Fact):
     text: Characters | None = Field(default=None, description="The constant bytes, as characters")
     counts: list[str] | None = Field(default=None, description="Parts whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
-    algorithm: str | None = Field(default=None, description="Name in the CRC catalogue, or sum8, sum16")
+    algorithm: AnyAlgorithm | None = Field(
+        default=None, description="Name of a CRC in the catalogue or of a sum, or the parameters of a CRC"
+    )
     over: list[str] | None = Field(default=None, description="Parts that the checksum covers")
     sent: list[WholeRange] | None = Field(
         default=None, description="Bit ranges of the checksum that are sent, one per byte"

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import Checksum, Part
 from qlinkgen.model.types import Chunk, Scalar, byte_chunks
-from qlinkgen.schema.file_model import PartSpec, SchemaFile
+from qlinkgen.schema.file_model import CrcSpec, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -223,29 +223,55 @@ class PartBuilder:
             taken |= mask
         return tuple(Chunk(first, last + 1 - first) for first, last in spec.sent)
 
-    def _ambiguous(self, name: str, found: catalogue.Checksum, path: Path) -> None:
+    def _ambiguous(self, name: str, found: catalogue.Checksum | None, path: Path) -> bool:
+        """Report an ambiguous name; ``found`` is what it was taken as."""
         candidates = catalogue.candidates(name)
         if candidates:
-            what = f"{shown(name)} is ambiguous and was taken as {found.name}"
+            what = f"{shown(name)} is ambiguous" + (f" and was taken as {found.name}" if found else "")
             names = listed((f"{each.name} ({each.check:0{each.width // 4}X})" for each in candidates), "or")
             hint = f"write the one whose check value for 123456789 matches the document: {names}"
-            place = (*path, "algorithm")
-            self._report.error("ambiguous-algorithm", place, what, hint, of_key=self._crc is not None)
+            rule = "ambiguous-algorithm" if found else "unknown-algorithm"
+            self._report.error(rule, (*path, "algorithm"), what, hint, of_key=self._crc is not None)
+        return bool(candidates)
 
-    def _algorithm(self, spec: PartSpec, path: Path) -> catalogue.Algorithm | catalogue.Sum | None:
+    def _algorithm(self, spec: PartSpec, path: Path) -> catalogue.Checksum | None:
         name = self._crc or spec.algorithm
         if name is None:
             self._lacks("algorithm", "add algorithm: crc-16/ibm-3740 or another", path)
             return None
+        if isinstance(name, CrcSpec):
+            return self._parameters(name, (*path, "algorithm"))
         try:
             found = catalogue.find(name[:80])
             self._ambiguous(name, found, path)
             return found
         except catalogue.UnknownAlgorithm as error:
-            hint = "see the catalogue of CRC algorithms, or use sum8 or sum16"
+            if self._ambiguous(name, None, path):
+                return None
+            hint = "see the catalogue of CRC algorithms, or use sum8, xor8 or another sum"
             if error.suggestions:
                 hint = f"did you mean {listed(map(repr, error.suggestions), 'or')}?"
             place = (*path, "algorithm")
             what = f"unknown checksum algorithm {shown(name)}"
             self._report.error("unknown-algorithm", place, what, hint, of_key=self._crc is not None)
             return None
+
+    def _parameters(self, spec: CrcSpec, path: Path) -> catalogue.Algorithm | None:
+        """The CRC with parameters of its own."""
+        refout = spec.refin if spec.refout is None else spec.refout
+        try:
+            found = catalogue.stated(
+                spec.width, spec.poly, spec.init, refin=spec.refin, refout=refout, xorout=spec.xorout
+            )
+        except ValueError as error:
+            what, hint = str(error).partition(": ")[2], "correct it"
+            if "poly" in what:
+                hint = "write it unreflected and without its highest term, like 0x1021"
+            self._report.error("crc-parameters", path, what, hint)
+            return None
+        if spec.check is not None and spec.check != found.check:
+            digits = spec.width // 4
+            what = f"the CRC of 123456789 is 0x{found.check:0{digits}X}, not 0x{spec.check:0{digits}X}"
+            hint = "correct a parameter, most often init, refin or xorout"
+            self._report.error("crc-parameters", (*path, "check"), what, hint)
+        return found

@@ -151,8 +151,13 @@ _ALL = (
     Rule("length-does-not-fit", "The length field can hold the longest frame.", "It would overflow."),
     Rule(
         "unknown-algorithm",
-        "A checksum is a CRC of the catalogue, or a sum.",
+        "A checksum is a CRC of the catalogue, a sum, or a CRC by its parameters.",
         "Names of the catalogue and their aliases are accepted.",
+    ),
+    Rule(
+        "crc-parameters",
+        "The parameters of a CRC fit its width, and give the check value that the document states.",
+        "A CRC with an even polynomial misses errors; a wrong parameter makes every frame invalid.",
     ),
     Rule(
         "ambiguous-algorithm",

@@ -7,7 +7,7 @@ from typing import assert_never
 
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.errors import GenerationError
-from qlinkgen.model.checksum import Algorithm, Sum, catalogue
+from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
 
 
 def algorithm_macro(algorithm: Algorithm) -> str:
@@ -17,11 +17,13 @@ def algorithm_macro(algorithm: Algorithm) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SumView:
-    """A sum of bytes."""
+    """A check value that is not a CRC: start, the statements of a step, and its result."""
 
     name: str
     width: int
     type: str
+    start: str
+    step: list[str]
     finished: str
 
 
@@ -43,6 +45,7 @@ class CrcView:
     width: int
     type: str
     selectable: bool
+    turned: bool
     choices: list[Choice]
     poly: str
     feedback: str
@@ -65,7 +68,7 @@ class CrcView:
 CheckView = SumView | CrcView
 
 
-def render(algorithm: Algorithm | Sum) -> CheckView:
+def render(algorithm: Checksum) -> CheckView:
     """The check value for the template.
 
     Raises:
@@ -73,24 +76,55 @@ def render(algorithm: Algorithm | Sum) -> CheckView:
     """
     match algorithm:
         case Sum():
-            return _render_sum(algorithm)
+            kind = unsigned_type(algorithm.width)
+            return _render_sum(algorithm, [f"return ({kind})(sum + byte);"], finished(algorithm))
+        case Xor():
+            return _render_sum(algorithm, ["return (uint8_t)(sum ^ byte);"], "sum")
+        case Fletcher():
+            return _render_sum(algorithm, _fletcher_step(algorithm), "sum")
         case Algorithm():
             return _render_crc(algorithm)
         case _:
             assert_never(algorithm)
 
 
-def _render_sum(algorithm: Sum) -> SumView:
+def finished(algorithm: Sum) -> str:
+    """The expression for the value of a ``sum``."""
     kind = unsigned_type(algorithm.width)
-    finished = f"({kind})~sum" if algorithm.complement else "sum"
-    return SumView(name=algorithm.name, width=algorithm.width, type=kind, finished=finished)
+    return {"plain": "sum", "inverted": f"({kind})~sum", "zero": f"({kind})(0U - sum)"}[algorithm.form]
+
+
+def _render_sum(algorithm: Sum | Xor | Fletcher, step: list[str], result: str) -> SumView:
+    width, start = algorithm.width, f"{algorithm.start}U"
+    return SumView(
+        name=algorithm.name,
+        width=width,
+        type=unsigned_type(width),
+        start=start,
+        step=step,
+        finished=result,
+    )
+
+
+def _fletcher_step(algorithm: Fletcher) -> list[str]:
+    """Both sums stay below the modulus, so one subtraction replaces a division."""
+    kind, half = unsigned_type(algorithm.width), algorithm.half
+    mask, modulus = (unsigned(each, algorithm.width) for each in ((1 << half) - 1, algorithm.modulus))
+    return [
+        f"{kind} low = ({kind})((sum & {mask}) + byte);",
+        f"{kind} high = ({kind})(sum >> {half});",
+        f"low = ({kind})((low >= {modulus}) ? (low - {modulus}) : low);",
+        f"high = ({kind})(high + low);",
+        f"high = ({kind})((high >= {modulus}) ? (high - {modulus}) : high);",
+        f"return ({kind})(({kind})(high << {half}) | low);",
+    ]
 
 
 def _render_crc(algorithm: Algorithm) -> CrcView:
-    if algorithm.refin != algorithm.refout or algorithm.width not in (8, 16, 24, 32, 64):
-        raise GenerationError(
-            f"{algorithm.name}: not supported in C; use a CRC of whole bytes with equal refin and refout"
-        )
+    if algorithm.width not in (8, 16, 24, 32, 64):
+        raise GenerationError(f"{algorithm.name}: not supported in C; use a CRC of whole bytes")
+    turned = algorithm.refin != algorithm.refout
+    selectable = algorithm.width == 16 and not turned
     width, kind = algorithm.width, unsigned_type(algorithm.width)
     # A CRC of 24 bits needs a mask in its wider type; one of 8 bits is shifted out completely.
     return CrcView(
@@ -98,8 +132,9 @@ def _render_crc(algorithm: Algorithm) -> CrcView:
         macro=algorithm_macro(algorithm),
         width=width,
         type=kind,
-        selectable=width == 16,
-        choices=[_choice(each) for each in catalogue(16)] if width == 16 else [],
+        selectable=selectable,
+        turned=turned,
+        choices=[_choice(each) for each in _choices(algorithm)] if selectable else [],
         poly=unsigned(algorithm.poly, width, hexadecimal=True),
         feedback=unsigned(algorithm.feedback, width, hexadecimal=True),
         start=unsigned(algorithm.start, width, hexadecimal=True),
@@ -117,6 +152,11 @@ def _render_crc(algorithm: Algorithm) -> CrcView:
         nibble_rows=_rows(algorithm, 4),
         rows=_rows(algorithm, 8),
     )
+
+
+def _choices(algorithm: Algorithm) -> list[Algorithm]:
+    known = catalogue(algorithm.width)
+    return [*known, *(() if algorithm in known else (algorithm,))]
 
 
 def _choice(algorithm: Algorithm) -> Choice:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from qlinkgen.backends.c.crc import finished
 from qlinkgen.backends.c.framing import Function, struct_parameter
 from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
 from qlinkgen.backends.c.parts import differs, put_check, refusal
@@ -68,7 +69,7 @@ def _check(check: Check) -> PacketCheckView:
         sum_type=kind,
         word_type=unsigned_type(max(algorithm.width, 8 * check.word)),
         word_size=check.word,
-        finished=f"({kind})~sum" if algorithm.complement else "sum",
+        finished=finished(algorithm),
         size=check.size,
         put=put_check(check, "end", 0, "value"),
         differs=differs(check, "end", 0, "value"),

@@ -32,8 +32,8 @@ _PACKAGE_DOC = '''\
 _SUPPORT = {
     "_fields": "ArrayField BitFields Bits Boolean BytesField Clear Count Groups Member Message OpenFlags "
     "Ranged Scaled TextField like",
-    "_frames": "CRC Address Check Constant DelimitedFrame Id Length Mark MarkedFrame Packet Payload Stuffing "
-    "Sum messages_of",
+    "_frames": "CRC Address Check Constant DelimitedFrame Fletcher Id Length Mark MarkedFrame Packet Payload "
+    "Stuffing Sum Xor messages_of",
 }
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()

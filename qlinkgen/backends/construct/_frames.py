@@ -68,15 +68,44 @@ class CRC(NamedTuple):
 
 
 class Sum(NamedTuple):
-    """The sum of bytes or words modulo 2**width, inverted if it is a complement."""
+    """The sum of bytes or words modulo 2**width; "inverted", or what makes it "zero"."""
 
     width: int
-    complement: bool = False
+    form: str = "plain"
 
     def compute(self, data: Iterable[int]) -> int:
         """The check value of bytes or words."""
         total = sum(data)
-        return (~total if self.complement else total) & (1 << self.width) - 1
+        if self.form != "plain":
+            total = ~total if self.form == "inverted" else -total
+        return total & (1 << self.width) - 1
+
+
+class Xor(NamedTuple):
+    """The exclusive or of bytes."""
+
+    def compute(self, data: Iterable[int]) -> int:
+        """The check value of bytes."""
+        total = 0
+        for byte in data:
+            total ^= byte
+        return total
+
+
+class Fletcher(NamedTuple):
+    """The sum of bytes, and above it the sum of the intermediate sums."""
+
+    half: int
+    modulus: int
+    first: int = 0
+
+    def compute(self, data: Iterable[int]) -> int:
+        """The check value of bytes."""
+        low, high = self.first, 0
+        for byte in data:
+            low = (low + byte) % self.modulus
+            high = (high + low) % self.modulus
+        return high << self.half | low
 
 
 # Parts
@@ -153,7 +182,7 @@ class Check(NamedTuple):
     """
 
     name: str
-    algorithm: CRC | Sum
+    algorithm: CRC | Sum | Xor | Fletcher
     integer: Construct
     mask: int
     over: Sequence[str]

@@ -89,10 +89,16 @@ def _frames(plan: Plan, messages: Mapping[str, str]) -> Iterator[Definition]:
     yield Definition("MESSAGES", Call("messages_of", tuple(frames)), "Payloads by full name.")
 
 
-def _algorithm(algorithm: catalogue.Algorithm | catalogue.Sum) -> Call:
+def _algorithm(algorithm: catalogue.Checksum) -> Call:
     match algorithm:
         case catalogue.Sum():
-            return Call("Sum", (algorithm.width,), (("complement", True),) if algorithm.complement else ())
+            form = () if algorithm.form == "plain" else (algorithm.form,)
+            return Call("Sum", (algorithm.width, *form))
+        case catalogue.Xor():
+            return Call("Xor")
+        case catalogue.Fletcher():
+            first = (("first", algorithm.first),) if algorithm.first else ()
+            return Call("Fletcher", (algorithm.half, algorithm.modulus), first)
         case catalogue.Algorithm():
             return _crc(algorithm)
         case _:

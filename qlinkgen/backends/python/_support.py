@@ -935,9 +935,49 @@ def _key(name: str) -> str:
     return "".join(filter(str.isalnum, name.lower()))
 
 
-def sum_of(name: str, width: int, *, complement: bool = False) -> Checksum:
-    """The sum of the bytes."""
+def sum_of(name: str, width: int, form: str = "plain") -> Checksum:
+    """The sum of the bytes; "inverted", or the number that makes the sum "zero"."""
     mask = (1 << width) - 1
-    if complement:
+    if form == "inverted":
         return Checksum(name, lambda data, start: ~(start + sum(data)) & mask)
+    if form == "zero":
+        return Checksum(name, lambda data, start: -(start + sum(data)) & mask)
     return Checksum(name, lambda data, start: (start + sum(data)) & mask)
+
+
+def xor_of(name: str) -> Checksum:
+    """The exclusive or of the bytes."""
+    return Checksum(name, _xor)
+
+
+def _xor(data: bytes, register: int) -> int:
+    if len(data) < 32:
+        for byte in data:
+            register ^= byte
+        return register
+    number, shift = int.from_bytes(data, "big"), 4 << len(data).bit_length()
+    while shift >= 8:  # folding halves onto each other is faster than single bytes
+        number ^= number >> shift
+        shift >>= 1
+    return number & 0xFF ^ register
+
+
+def fletcher(name: str, half: int, modulus: int) -> Checksum:
+    """The sum of the bytes, and above it the sum of all intermediate sums."""
+    from itertools import accumulate
+
+    mask = (1 << half) - 1
+
+    def compute(data: bytes, start: int) -> int:
+        low = start & mask
+        high = (start >> half) + len(data) * low + sum(accumulate(data))
+        return high % modulus << half | (low + sum(data)) % modulus
+
+    return Checksum(name, compute)
+
+
+def adler(name: str) -> Checksum:
+    """The checksum of zlib."""
+    from zlib import adler32
+
+    return Checksum(name, adler32, 1)

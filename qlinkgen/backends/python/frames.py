@@ -9,7 +9,7 @@ from typing import assert_never
 from qlinkgen.backends.python import integers
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import class_name
-from qlinkgen.model.checksum import Algorithm, Sum
+from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_argument, address_attribute
@@ -289,33 +289,43 @@ def _by_id(messages: Sequence[MessagePlan], attribute: str = "") -> str:
 def _check_view(check: Check) -> CheckView:
     algorithm = check.algorithm
     selectable = isinstance(algorithm, Algorithm) and algorithm.width == 16
-    maker = "sum_of" if isinstance(algorithm, Sum) else "find_crc" if selectable else "crc"
-    definition = _definition(algorithm, maker)
+    maker, arguments = _algorithm(algorithm)
+    definition = wrapped(f"_CHECKSUM = {maker}(", arguments, ")", 0)
     return CheckView(definition, check.size, check.regular or "", _check_bytes(check), selectable, maker)
 
 
-def _definition(algorithm: Algorithm | Sum, maker: str) -> list[str]:
+def _algorithm(algorithm: Checksum) -> tuple[str, list[str]]:
+    """The function of the support module that makes an algorithm, and its arguments."""
+    name = f'"{algorithm.name}"'
     match algorithm:
         case Sum():
-            complement = ", complement=True" if algorithm.complement else ""
-            return [f'_CHECKSUM = {maker}("{algorithm.name}", {algorithm.width}{complement})']
-        case Algorithm(width=16):
-            return [f'_CHECKSUM = {maker}("{algorithm.name}")']
+            form = [] if algorithm.form == "plain" else [f'"{algorithm.form}"']
+            return "sum_of", [name, str(algorithm.width), *form]
+        case Xor():
+            return "xor_of", [name]
+        case Fletcher(name="adler-32"):
+            return "adler", [name]
+        case Fletcher():
+            return "fletcher", [name, str(algorithm.half), str(algorithm.modulus)]
+        case Algorithm(width=16) if algorithm in catalogue(16):
+            return "find_crc", [name]
         case Algorithm():
-            digits = (algorithm.width + 3) // 4
-            numbers = {key: f"0x{getattr(algorithm, key):0{digits}X}" for key in ("poly", "init", "xorout")}
-            arguments = [
-                f'"{algorithm.name}"',
-                f"width={algorithm.width}",
-                f"poly={numbers['poly']}",
-                f"init={numbers['init']}",
-                f"refin={algorithm.refin}",
-                f"refout={algorithm.refout}",
-                f"xorout={numbers['xorout']}",
-            ]
-            return wrapped(f"_CHECKSUM = {maker}(", arguments, ")", 0)
+            return "crc", [name, *_parameters(algorithm)]
         case _:
             assert_never(algorithm)
+
+
+def _parameters(algorithm: Algorithm) -> list[str]:
+    digits = (algorithm.width + 3) // 4
+    numbers = {key: f"0x{getattr(algorithm, key):0{digits}X}" for key in ("poly", "init", "xorout")}
+    return [
+        f"width={algorithm.width}",
+        f"poly={numbers['poly']}",
+        f"init={numbers['init']}",
+        f"refin={algorithm.refin}",
+        f"refout={algorithm.refout}",
+        f"xorout={numbers['xorout']}",
+    ]
 
 
 def _check_bytes(check: Check, number: str = "crc") -> str:
@@ -583,6 +593,6 @@ def _packet(plan: Plan, title: str) -> PacketView:
         check_bytes=_check_bytes(check, "check"),
         check_mask=f"0x{check.algorithm.mask:X}",
         word=check.word,
-        total="~total" if check.algorithm.complement else "total",
+        total={"plain": "total", "inverted": "~total", "zero": "-total"}[check.algorithm.form],
         rejected="" if check.rejected is None else f"0x{check.rejected:0{check.size * 2}X}",
     )

@@ -170,6 +170,7 @@ class Module:
         check = None if isinstance(view, PacketView) else view.check
         if check is not None:
             used |= {"Checksum", "wrong_check", check.maker}
+            used |= {"find_crc"} if check.selectable else set()
         match view:
             case UniqueView():
                 used |= {"UNREAD", "UNREADABLE", *(["Struct"] if view.whole_sizes else [])}

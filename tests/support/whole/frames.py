@@ -76,18 +76,28 @@ def _shorter(rng: random.Random, spec: Doc) -> object:
     return rng.choice(forms)
 
 
-def _algorithm(rng: random.Random) -> tuple[str, int]:
+def _algorithm(rng: random.Random) -> tuple[str | Doc, int]:
     """A checksum and its width, mostly sums and CRCs of eight and sixteen bits."""
-    name: str = rng.choice(
+    found: str | Doc = rng.choice(
         (
-            rng.choice(("sum8", "sum8-inverted", "sum16")),
+            rng.choice(checks.sums(8)),
+            rng.choice(checks.sums(rng.choice((8, 16, 16, 32)))),
             rng.choice(_crcs(8)),
             rng.choice(_crcs(16)),
             rng.choice(_crcs(16)),
             rng.choice(_crcs(rng.choice((24, 32, 64)))),
+            _parameters(rng),
         )
     )
-    return name, checks.width(name)
+    return found, checks.width(found)
+
+
+def _parameters(rng: random.Random) -> Doc:
+    """A CRC with parameters of its own."""
+    width = rng.choice((8, 16, 16, 32))
+    found: Doc = {"width": width, "poly": rng.randrange(1, 1 << width, 2)}
+    found |= {key: rng.randrange(1 << width) for key in ("init", "xorout") if rng.random() < 0.5}
+    return found | {key: rng.random() < 0.5 for key in ("refin", "refout") if rng.random() < 0.5}
 
 
 def _crcs(bits: int) -> Sequence[str]:
@@ -281,7 +291,8 @@ def _marked(rng: random.Random) -> Shape:
     spec: Doc = {"marker": marker, "header": header, "end": end, "payload": f"0..{most}"}
     only = False
     if rng.random() < 0.6:
-        name = rng.choice((rng.choice(_crcs(16)), rng.choice(_crcs(8)), "sum8", "sum16"))
+        width = rng.choice((8, 16))
+        name = rng.choice((rng.choice(_crcs(width)), rng.choice(checks.sums(width))))
         sent = ["0..5", "8..13"] if checks.width(name) == 16 else [rng.choice(("0..5", "2..7"))]
         spec["checksum"] = {
             "role": "checksum",
@@ -314,7 +325,7 @@ def _packet(rng: random.Random) -> Shape:
         "data": {"role": "payload", "size": f"0..{most}"},
     }
     if rng.random() < 0.8:
-        name = rng.choice(("sum16", "sum16", "sum8", "sum8-inverted"))
+        name = rng.choice([each for each in checks.sums(rng.choice((8, 16, 16))) if each.startswith("sum")])
         check: Doc = {"role": "checksum", "type": f"u{checks.width(name)}", "algorithm": name, "words": word}
         if rng.random() < 0.6:
             check["rejected"] = rng.choice((0, 0, 0xFF))

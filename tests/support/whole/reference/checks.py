@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 #: The only file shared with the product: published parameters, not code.
 CATALOGUE = Path(__file__).parents[4] / "qlinkgen" / "model" / "crc_catalogue.csv"
@@ -18,29 +19,66 @@ def catalogue() -> Mapping[str, Mapping[str, str]]:
         return {row["name"]: row for row in csv.DictReader(rows)}
 
 
-def width(name: str) -> int:
+#: Bits of the check values that are not CRCs.
+_SUMS = {
+    "sum8": 8, "sum8-inverted": 8, "sum8-zero": 8, "xor8": 8,
+    "sum16": 16, "sum16-inverted": 16, "sum16-zero": 16, "sum32": 32,
+    "fletcher-8": 16, "fletcher-16": 16, "adler-32": 32,
+}  # fmt: skip
+_MODULUS = {"fletcher-8": 256, "fletcher-16": 255, "adler-32": 65521}
+#: The algorithm of a schema: a name, or the parameters of a CRC.
+Algorithm = str | Mapping[str, Any]
+
+
+def sums(bits: int) -> list[str]:
+    """The names of check values that are not CRCs."""
+    return [name for name, width in _SUMS.items() if width == bits]
+
+
+def width(algorithm: Algorithm) -> int:
     """Bits of a check value."""
-    return {"sum8": 8, "sum8-inverted": 8, "sum16": 16}.get(name) or int(catalogue()[name]["width"])
+    if not isinstance(algorithm, str):
+        return int(algorithm["width"])
+    return _SUMS.get(algorithm) or int(catalogue()[algorithm]["width"])
 
 
-def compute(name: str, data: Iterable[int]) -> int:
+def compute(algorithm: Algorithm, data: Sequence[int]) -> int:
     """The check value of bytes; sums take numbers of any size."""
-    if name.startswith("sum"):
+    if not isinstance(algorithm, str):
+        stated = {"init": 0, "refin": False, "xorout": 0} | dict(algorithm)
+        return _crc(bytes(data), **{"refout": stated["refin"]} | stated)
+    if algorithm.startswith("sum"):
         total = sum(data)
-        return (~total if name.endswith("inverted") else total) & (1 << width(name)) - 1
-    return _crc(name, bytes(data))
+        signed = ~total if algorithm.endswith("inverted") else -total if algorithm.endswith("zero") else total
+        return signed & (1 << width(algorithm)) - 1
+    if algorithm == "xor8":
+        return sum((sum(byte >> bit & 1 for byte in data) & 1) << bit for bit in range(8))
+    if algorithm in _MODULUS:
+        return _two_sums(list(data), int(algorithm == "adler-32"), _MODULUS[algorithm], width(algorithm) // 2)
+    return _named(algorithm, bytes(data))
+
+
+def _two_sums(data: list[int], first: int, modulus: int, half: int) -> int:
+    low = first + sum(data)
+    high = first * len(data) + sum((len(data) - index) * byte for index, byte in enumerate(data))
+    return (high % modulus << half) + low % modulus
 
 
 @functools.lru_cache(maxsize=4096)
-def _crc(name: str, data: bytes) -> int:
-    row, bits = catalogue()[name], width(name)
-    poly, register, top = int(row["poly"], 16), int(row["init"], 16), 1 << bits - 1
-    low_first = row["refin"] == "true"
+def _named(name: str, data: bytes) -> int:
+    row = catalogue()[name]
+    numbers = {key: int(row[key], 16) for key in ("poly", "init", "xorout")}
+    refin, refout = (row[key] == "true" for key in ("refin", "refout"))
+    return _crc(data, width=int(row["width"]), **numbers, refin=refin, refout=refout)
+
+
+def _crc(data: bytes, *, width: int, poly: int, init: int, refin: bool, refout: bool, xorout: int) -> int:
+    register, top = init, 1 << width - 1
     for byte in data:
         for index in range(8):
-            bit = byte >> (index if low_first else 7 - index) & 1
+            bit = byte >> (index if refin else 7 - index) & 1
             register = (register << 1) ^ (poly if bool(register & top) != bool(bit) else 0)
-            register &= (1 << bits) - 1
-    if row["refout"] == "true":
-        register = int(f"{register:0{bits}b}"[::-1], 2)
-    return register ^ int(row["xorout"], 16)
+            register &= (1 << width) - 1
+    if refout:
+        register = int(f"{register:0{width}b}"[::-1], 2)
+    return register ^ xorout

@@ -1,0 +1,158 @@
+"""Check values that are not CRCs: sums, XORs, and the two sums of Fletcher and Adler.
+
+Each is a register that takes the bytes one after the other: ``start``, ``step`` and ``finish``.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+__all__ = ["SUMS", "Fletcher", "Sum", "Xor"]
+
+#: The value sent for a sum: the sum, its bits inverted, or the number that makes the sum zero.
+Form = Literal["plain", "inverted", "zero"]
+
+
+class _Register:
+    """A register of ``width`` bits that takes the covered bytes in wire order."""
+
+    __slots__ = ()
+
+    name: str
+    width: int
+    aliases: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name and the aliases."""
+        return (self.name, *self.aliases)
+
+    @property
+    def mask(self) -> int:
+        """All bits of the value set."""
+        return (1 << self.width) - 1
+
+    @property
+    def start(self) -> int:
+        """The initial register."""
+        return 0
+
+    @property
+    def check(self) -> int:
+        """The value of the nine characters 123456789."""
+        return self.compute(b"123456789")
+
+    def compute(self, data: Iterable[int]) -> int:
+        """Return the value of the bytes."""
+        return self.finish(functools.reduce(self.step, data, self.start))
+
+    def step(self, register: int, byte: int) -> int:
+        """Return the register after one more byte."""
+        raise NotImplementedError
+
+    def finish(self, register: int) -> int:
+        """Return the value of the final register."""
+        return register
+
+
+@dataclass(frozen=True, slots=True)
+class Sum(_Register):
+    """A sum of units, bytes or words, modulo a power of two.
+
+    Attributes:
+        name: name in schema files.
+        width: bits of the sum.
+        form: the value for a sum.
+        aliases: other names in use.
+    """
+
+    kind: ClassVar[Literal["sum"]] = "sum"
+
+    name: str
+    width: int
+    form: Form = "plain"
+    aliases: tuple[str, ...] = ()
+
+    def step(self, register: int, byte: int) -> int:
+        """Return the sum with one more unit."""
+        return register + byte & self.mask
+
+    def finish(self, register: int) -> int:
+        """Return the value for the sum of all units."""
+        signed = {"plain": register, "inverted": ~register, "zero": -register}[self.form]
+        return signed & self.mask
+
+
+@dataclass(frozen=True, slots=True)
+class Xor(_Register):
+    """The exclusive or of the bytes.
+
+    Attributes:
+        name: name in schema files.
+        aliases: other names in use.
+    """
+
+    kind: ClassVar[Literal["xor"]] = "xor"
+
+    name: str
+    width: int = 8
+    aliases: tuple[str, ...] = ()
+
+    def step(self, register: int, byte: int) -> int:
+        """Return the register after one more byte."""
+        return register ^ byte
+
+
+@dataclass(frozen=True, slots=True)
+class Fletcher(_Register):
+    """The sum of the bytes, and above it the sum of all intermediate sums, both modulo one number.
+
+    Attributes:
+        name: name in schema files.
+        width: bits of both sums.
+        modulus: what both sums are taken modulo; at least 255.
+        first: start of the lower sum.
+        aliases: other names in use.
+    """
+
+    kind: ClassVar[Literal["fletcher"]] = "fletcher"
+
+    name: str
+    width: int
+    modulus: int
+    first: int = 0
+    aliases: tuple[str, ...] = ()
+
+    @property
+    def half(self) -> int:
+        """Bits of each sum."""
+        return self.width // 2
+
+    @property
+    def start(self) -> int:
+        """The initial register."""
+        return self.first
+
+    def step(self, register: int, byte: int) -> int:
+        """Return both sums with one more byte."""
+        low = ((register & (1 << self.half) - 1) + byte) % self.modulus
+        return ((register >> self.half) + low) % self.modulus << self.half | low
+
+
+#: Every check value that `find` knows and that is not a CRC.
+SUMS: tuple[Sum | Xor | Fletcher, ...] = (
+    Sum("sum8", 8),
+    Sum("sum8-inverted", 8, "inverted", ("sum8-ones-complement",)),
+    Sum("sum8-zero", 8, "zero", ("sum8-twos-complement", "lrc-modbus-ascii")),
+    Sum("sum16", 16),
+    Sum("sum16-inverted", 16, "inverted"),
+    Sum("sum16-zero", 16, "zero"),
+    Sum("sum32", 32),
+    Xor("xor8", aliases=("xor",)),
+    Fletcher("fletcher-8", 16, 256),
+    Fletcher("fletcher-16", 16, 255),
+    Fletcher("adler-32", 32, 65521, first=1, aliases=("adler",)),
+)
