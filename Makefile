@@ -31,7 +31,7 @@ setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' to
 
 .venv/.dev: .venv/.user
 	@echo "== adding linters, type checkers and test tools (a minute, once)"
-	@$(PIP) '.[dev]'
+	@$(PIP) '.[dev,library-tests]'
 	@touch $@
 
 demo: .venv/.user  ## A message of each protocol in construct, Python and C; then a bus, a ring and a chip set behind ptys

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["schemas_dir"]
+__all__ = ["library_dir", "schemas_dir"]
 
 
 def schemas_dir() -> Path:
@@ -22,3 +22,8 @@ def schemas_dir() -> Path:
         if folder.is_dir():
             return folder
     raise FileNotFoundError(f"no schemas folder in {package} or next to it; reinstall qlinkgen")
+
+
+def library_dir() -> Path:
+    """Return the folder of the public protocols. Raises FileNotFoundError like `schemas_dir`."""
+    return schemas_dir() / "library"

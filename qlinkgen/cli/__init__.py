@@ -14,6 +14,7 @@ from qlinkgen.model.spelling import similar
 COMMANDS = {
     "generate": "Write Python, C, construct and vectors for protocols, or check that they are up to date.",
     "lint": "Check schema files; report every error with its line, column, rule and fix.",
+    "list": "List the protocols of qlinkgen.",
     "show": "Show a protocol or a message: layout, sizes, transactions.",
     "encode": "Encode values as wire bytes.",
     "decode": "Decode wire bytes: one JSON object per line.",
@@ -69,7 +70,7 @@ class LazyGroup(click.Group):
 def cli() -> None:
     """Generate codecs for Python and C from the schema of a serial protocol, inspect frames, drive the bus.
 
-    PROTOCOL is the name of a shipped schema (qlink, trio, mc1231a) or the path of a .yaml file.
+    PROTOCOL is a name that `qlinkgen list` prints (qlink, modbus_rtu) or the path of a .yaml file.
 
     Exit codes: 0 success, 1 failed check (drift, bad frame, invalid schema, no answer, no such port), 2 usage
     error, 70 internal error (--debug shows the traceback).

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TypedDict
 
-from qlinkgen._resources import schemas_dir
+from qlinkgen._resources import library_dir, schemas_dir
 from qlinkgen.backends.base import is_generated
 from qlinkgen.cli.boundary import WRONG, Failure
 from qlinkgen.cli.common import find_schema
@@ -131,8 +131,8 @@ def ships(schema: str) -> bool:
 
 
 def schema_of(protocol: Protocol, given: str, root: Path) -> str:
-    """Return the schema's name in a manifest: its shipped name, or its path relative to the folder."""
-    if ships(given):
+    """Return the schema's name in a manifest: that in the package, or its path relative to the folder."""
+    if find_schema(given).resolve().parent in {folder.resolve() for folder in (schemas_dir(), library_dir())}:
         return protocol.name
     return Path(os.path.relpath(given, root)).as_posix()
 
@@ -151,4 +151,5 @@ def _is_below(path: str) -> bool:
 
 def _exists(schema: str, root: Path) -> bool:
     named = "/" not in schema and not Path(schema).suffix
-    return (schemas_dir() / f"{schema}.yaml" if named else root / schema).is_file()
+    places = [folder / f"{schema}.yaml" for folder in (schemas_dir(), library_dir())]
+    return any(place.is_file() for place in (places if named else [root / schema]))

@@ -8,7 +8,7 @@ import os
 import stat
 from pathlib import Path as FilePath
 
-from qlinkgen._resources import schemas_dir
+from qlinkgen._resources import library_dir, schemas_dir
 from qlinkgen.errors import Fault, SchemaError
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema.addresses import check_addresses
@@ -28,22 +28,28 @@ _KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a so
 
 
 def shipped() -> tuple[str, ...]:
-    """Names of the schemas in the package."""
+    """Names of the protocols whose code is in the package."""
     return tuple(sorted(path.stem for path in schemas_dir().glob("*.yaml")))
 
 
+def library() -> tuple[str, ...]:
+    """Names of the public protocols in the package."""
+    return tuple(sorted(path.stem for path in library_dir().glob("*.yaml")))
+
+
 def find(protocol: str) -> FilePath:
-    """The file of a shipped schema, or of a path. Raises SchemaError for an unknown name."""
+    """The file of a schema in the package, or of a path. Raises SchemaError for an unknown name."""
     path = FilePath(protocol)
-    if "/" not in protocol and not path.suffix:
-        path = schemas_dir() / f"{protocol}.yaml"
-        if not path.is_file():
-            names = shipped()
-            hint = did_you_mean(
-                protocol, names, f"shipped are {', '.join(names)}; or give the path of a .yaml file"
-            )
-            raise SchemaError([Fault(protocol, 1, 1, "file-unreadable", "unknown schema", hint)])
-    return path
+    if "/" in protocol or path.suffix:
+        return path
+    for folder in (schemas_dir(), library_dir()):
+        if (file := folder / f"{protocol}.yaml").is_file():
+            return file
+    names = (*shipped(), *library())
+    hint = did_you_mean(
+        protocol, names, "`qlinkgen list` names those of qlinkgen; or give the path of a .yaml file"
+    )
+    raise SchemaError([Fault(protocol, 1, 1, "file-unreadable", "unknown schema", hint)])
 
 
 def lint(path: FilePath | str) -> list[Fault]:

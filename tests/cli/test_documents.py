@@ -29,6 +29,7 @@ DOCUMENTS = [
     "README.md",
     "docs/tutorial.md",
     "docs/cli.md",
+    "docs/library.md",
     "docs/plan.md",
     "docs/quick-start.md",
     "docs/write-a-slave.md",

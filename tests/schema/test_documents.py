@@ -10,7 +10,7 @@ import jsonschema
 import pytest
 import yaml
 
-from qlinkgen.schema import find, loads, shipped
+from qlinkgen.schema import find, library, loads, shipped
 from qlinkgen.schema.documents import json_schema_text, outputs
 from qlinkgen.schema.file_model import SchemaFile, json_schema
 from qlinkgen.schema.rules import RULES
@@ -19,7 +19,7 @@ from qlinkgen.schema.source import parse
 ROOT = Path(__file__).parents[2]
 REFERENCE = (ROOT / "docs/schema-reference.md").read_text("utf-8")
 BLOCKS = re.findall(r"```yaml\n(.*?)```", REFERENCE, re.DOTALL)
-FILES = [*(find(name) for name in shipped()), *sorted((ROOT / "tests/schemas").glob("*.yaml"))]
+FILES = [*(find(name) for name in (*shipped(), *library())), *sorted((ROOT / "tests/schemas").glob("*.yaml"))]
 
 
 def plain(data: Any) -> Any:

@@ -15,11 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qlinkgen.errors import Fault
-from qlinkgen.schema import find, lint, loads, shipped
+from qlinkgen.schema import find, library, lint, loads, shipped
 from qlinkgen.schema.rules import RULES
 from qlinkgen.schema.source import parse
 
-SCHEMAS = [*(find(name) for name in shipped()), *sorted(Path(__file__).parents[1].glob("schemas/*.yaml"))]
+SCHEMAS = [
+    *(find(name) for name in (*shipped(), *library())),
+    *sorted(Path(__file__).parents[1].glob("schemas/*.yaml")),
+]
 DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 TEXTS = {path.stem: path.read_text("utf-8") for path in SCHEMAS}
 ODD: list[Any] = [

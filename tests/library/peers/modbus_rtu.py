@@ -1,0 +1,130 @@
+"""Modbus RTU by pymodbus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pymodbus.framer import FramerRTU
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu import bit_message as bits
+from pymodbus.pdu import other_message as other
+from pymodbus.pdu import register_message as registers
+from pymodbus.pdu.diag_message import DiagnosticBase
+
+from qlinkgen.model.message import Direction
+from tests.library.protocols import Record
+
+#: Message to the class of pymodbus, and each field to its argument and attribute.
+_KINDS: Mapping[str, tuple[type[ModbusPDU], Mapping[str, str]]] = {
+    "read_holding_registers.request": (
+        registers.ReadHoldingRegistersRequest,
+        {"start": "address", "quantity": "count"},
+    ),
+    "read_holding_registers.response": (registers.ReadHoldingRegistersResponse, {"registers": "registers"}),
+    "read_input_registers.request": (
+        registers.ReadInputRegistersRequest,
+        {"start": "address", "quantity": "count"},
+    ),
+    "read_input_registers.response": (registers.ReadInputRegistersResponse, {"registers": "registers"}),
+    "write_single_coil.request": (bits.WriteSingleCoilRequest, {"number": "address", "value": "bits"}),
+    "write_single_coil.response": (bits.WriteSingleCoilResponse, {"number": "address", "value": "bits"}),
+    "write_single_register.request": (
+        registers.WriteSingleRegisterRequest,
+        {"number": "address", "value": "registers"},
+    ),
+    "write_single_register.response": (
+        registers.WriteSingleRegisterResponse,
+        {"number": "address", "value": "registers"},
+    ),
+    "read_exception_status.request": (other.ReadExceptionStatusRequest, {}),
+    "read_exception_status.response": (other.ReadExceptionStatusResponse, {"outputs": "status"}),
+    "get_comm_event_counter.request": (other.GetCommEventCounterRequest, {}),
+    "get_comm_event_counter.response": (
+        other.GetCommEventCounterResponse,
+        {"status": "status", "events": "count"},
+    ),
+    "write_multiple_registers.request": (
+        registers.WriteMultipleRegistersRequest,
+        {"start": "address", "registers": "registers"},
+    ),
+    "write_multiple_registers.response": (
+        registers.WriteMultipleRegistersResponse,
+        {"start": "address", "quantity": "count"},
+    ),
+    "report_server_id.request": (other.ReportDeviceIdRequest, {}),
+    "mask_write_register.request": (
+        registers.MaskWriteRegisterRequest,
+        {"number": "address", "and_mask": "and_mask", "or_mask": "or_mask"},
+    ),
+    "mask_write_register.response": (
+        registers.MaskWriteRegisterResponse,
+        {"number": "address", "and_mask": "and_mask", "or_mask": "or_mask"},
+    ),
+    "read_write_multiple_registers.request": (
+        registers.ReadWriteMultipleRegistersRequest,
+        {
+            "read_start": "read_address",
+            "read_quantity": "read_count",
+            "write_start": "write_address",
+            "registers": "write_registers",
+        },
+    ),
+    "read_write_multiple_registers.response": (
+        registers.ReadWriteMultipleRegistersResponse,
+        {"registers": "registers"},
+    ),
+}
+_NAMES = {kind: name for name, (kind, _) in _KINDS.items()}
+#: What pymodbus calls a value, and back; it has two states each of a coil, and of a server.
+_COIL = {"off": [False], "on": [True]}
+_STATUS = {0: 1, 0xFFFF: 0}
+_GIVEN: Mapping[str, Callable[[Any], Any]] = {
+    "write_single_coil.request": _COIL.get,
+    "write_single_coil.response": _COIL.get,
+    "write_single_register.request": lambda value: [value],
+    "write_single_register.response": lambda value: [value],
+}
+#: Messages that it neither builds nor reads.
+UNKNOWN: frozenset[str] = frozenset()
+
+
+def build(record: Record) -> bytes | None:
+    name, fields = record["message"], record["fields"]
+    pdu: ModbusPDU
+    if name.startswith("diagnostics"):
+        pdu = DiagnosticBase(message=fields["data"])
+        pdu.sub_function_code = fields["function"]
+    elif name == "report_server_id.response":
+        *identifier, state = bytes.fromhex(fields["data"])
+        if state not in {0, 0xFF}:
+            return None
+        pdu = other.ReportDeviceIdResponse(bytes(identifier), status=bool(state))
+    else:
+        kind, named = _KINDS[name]
+        given = {named[each]: _given(name, each, value) for each, value in fields.items()}
+        if None in given.values():
+            return None
+        pdu = kind(**given)
+    pdu.dev_id = record["node"]
+    return FramerRTU(DecodePDU(is_server=True)).buildFrame(pdu)
+
+
+def _given(name: str, field: str, value: Any) -> Any:
+    if field == "status":
+        return _STATUS.get(value)
+    return _GIVEN[name](value) if field == "value" else value
+
+
+def read(wire: bytes, direction: Direction) -> Record | None:
+    _, pdu = FramerRTU(DecodePDU(is_server=direction == "request")).handleFrame(wire, 0, 0)
+    if pdu is None or (name := _NAMES.get(type(pdu))) is None:
+        return None
+    fields = {each: getattr(pdu, attribute) for each, attribute in _KINDS[name][1].items()}
+    if "value" in fields:
+        (value,) = fields["value"]
+        fields["value"] = value
+        if isinstance(value, bool):
+            del fields["value"]  # any number but 0xFF00 is off
+    fields.pop("status", None)  # likewise
+    return {"message": name, "node": pdu.dev_id, "fields": fields}

@@ -1,0 +1,93 @@
+"""The protocols of the library, and the library of somebody else that each is held against."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import json
+import random
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any, Protocol, cast
+
+import pytest
+
+from qlinkgen.backends.python import load as load_module
+from qlinkgen.cli.decode import message_record
+from qlinkgen.cli.encode import compose
+from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.protocol import Protocol as Model
+from qlinkgen.plan import Plan, plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.schema import find, library, load
+from tests.support.random_raw import random_address, random_values
+
+#: A message as `qlinkgen decode` prints it.
+Record = Mapping[str, Any]
+
+#: Protocol to the module that it is held against and its name on PyPI.
+PEERS: Mapping[str, tuple[str, str]] = {
+    "modbus_rtu": ("pymodbus", "pymodbus"),
+}
+NAMES = library()
+
+
+class Peer(Protocol):
+    """An adapter in `tests.library.peers`."""
+
+    #: Messages that the library neither builds nor reads.
+    UNKNOWN: frozenset[str]
+
+    def build(self, record: Record) -> bytes | None:
+        """The frame that the library builds of a message; None if it builds no such message."""
+        ...
+
+    def read(self, wire: bytes, direction: Direction) -> Record | None:
+        """What the library reads in a frame: some or all of its record; None if it reads no such message."""
+        ...
+
+
+def peer(name: str) -> Peer:
+    """The adapter of a protocol; skips the test if the library is not installed."""
+    module, package = PEERS[name]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of other people's code
+        importlib.import_module("tests.library.peers")
+        pytest.importorskip(module, reason=f"needs {module} (pip install {package})")
+        return cast(Peer, importlib.import_module(f"tests.library.peers.{name}"))
+
+
+@dataclass(frozen=True)
+class Described:
+    """A protocol of the library in the forms that the tests use."""
+
+    model: Model
+    plan: Plan
+    module: ModuleType
+
+    def wire(self, message: Message, rng: random.Random) -> bytes:
+        """A frame of random values, made by the interpreter."""
+        values = dict(zip((each.name for each in message.values), random_values(message, rng), strict=True))
+        address = random_address(message, rng) if message.addresses else None
+        return Codec(self.plan).encode(message.name, values, address)
+
+    def record(self, wire: bytes, direction: Direction) -> Record:
+        """The record of a frame, read by the generated decoder, with numbers as JSON has them."""
+        suffix = "" if direction == "message" else f"_{direction}"
+        found = getattr(self.module, f"decode{suffix}")(wire)
+        plain: Record = json.loads(json.dumps(message_record(self.model, found), default=float))
+        return plain
+
+    def encoded(self, record: Record) -> bytes:
+        """The frame of a record, made by the generated encoder."""
+        *_, built = compose(self.model, None, (), (), json.dumps(record), codec=self.module)
+        return bytes(built.to_frame())
+
+
+@functools.cache
+def described(name: str) -> Described:
+    """A protocol of the library."""
+    model = load(find(name))
+    return Described(model, plan_of(model), load_module(model))
