@@ -108,3 +108,28 @@ class EchoCanceller:
                 self.forget()
             return True
         return False
+
+
+class EchoProbe:
+    """Detects whether the port echoes, by sending two bytes once.
+
+    Attributes:
+        until: time at which the probe counts as not echoed; 0 before it is sent.
+    """
+
+    __slots__ = ("_heard", "until")
+
+    def __init__(self) -> None:
+        self.until = 0.0
+        self._heard = b""
+
+    def send(self, until: float) -> bytes:
+        """Return the bytes to send, whose echo arrives until then."""
+        self.until = until
+        self._heard = b""
+        return PROBE
+
+    def echoed(self, data: bytes) -> bool:
+        """Whether these bytes complete the probe, which may lose its first byte, or follow noise."""
+        heard = self._heard = self._heard + data
+        return heard[:1] == PROBE[:1] or 0 < heard.find(PROBE) <= NOISE

@@ -10,18 +10,6 @@ from qlinkgen.link.codec import Command, Fault, Framed, Message, Module
 from qlinkgen.link.host_timing import HostTiming
 
 
-class State:
-    """States of the engine; see the table in `qlinkgen.link.host`."""
-
-    IDLE = "idle"
-    READY = "ready"
-    SELECTING = "selecting"
-    WAITING = "waiting"
-    GUARD = "guard"
-    FILLING = "filling"
-    PROVING = "proving"
-
-
 class HostCodec(Module, Protocol):
     """A generated module of a protocol of the host kind, such as `qlinkgen.codecs.mc1231a`."""
 
@@ -97,26 +85,3 @@ class Asked:
     def to_bytes(self) -> bytes:
         """Return the payload."""
         return self.payload
-
-
-class WayBack:
-    """Progress of a resynchronisation.
-
-    Attributes:
-        fill: the fill byte.
-        rounds: failed rounds of this transaction.
-        silent: failed rounds without any received byte.
-        heard: bytes were received in this round.
-        fills: fill bytes sent in this round.
-        completed: the fill bytes have completed a packet.
-    """
-
-    __slots__ = ("completed", "fill", "fills", "heard", "rounds", "silent")
-
-    def __init__(self, fill: int) -> None:
-        self.fill = fill
-        self.rounds = 0
-        self.silent = 0
-        self.heard = False
-        self.fills = 0
-        self.completed = False

@@ -1,0 +1,61 @@
+"""A request of a master, and which messages answer it."""
+
+from __future__ import annotations
+
+from qlinkgen.link.codec import Framed
+from qlinkgen.link.counters import LinkCounters
+from qlinkgen.link.transaction import CommandTiming
+
+
+class Pending:
+    """A request as sent.
+
+    Attributes:
+        request: the message.
+        command: its command.
+        node: address in it, None for frames without one.
+        to_all: it is a broadcast.
+        frame: its bytes on the wire.
+        count: counts of the node.
+    """
+
+    __slots__ = ("command", "count", "frame", "node", "request", "to_all")
+
+    def __init__(  # noqa: PLR0917  # made for each transaction, where keywords would take 1 % of the time
+        self,
+        request: Framed,
+        command: CommandTiming,
+        node: int | None,
+        frame: bytes,
+        count: LinkCounters,
+        to_all: bool,
+    ) -> None:
+        self.request = request
+        self.command = command
+        self.node = node
+        self.frame = frame
+        self.count = count
+        self.to_all = to_all
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether any node answers."""
+        command = self.command
+        return command.response is not None and (not self.to_all or command.answers_broadcast)
+
+    def answered_by(self, response: Framed, node: int | None) -> bool:
+        """Whether a response of the right class from a node is the answer."""
+        command, request = self.command, self.request
+        for name in command.echoes:
+            if getattr(response, name) != getattr(request, name):
+                return False
+        if command.accepts is not None:
+            return command.accepts(request, response)
+        return node == self.node or (self.to_all and command.answers_broadcast)
+
+    def may_be_answered_by(self, message: Framed, node: int | None) -> bool:
+        """Whether a message from a node has the class and address of an answer, to any attempt."""
+        command = self.command
+        return type(message) is command.response and (
+            node == self.node or (self.to_all and command.answers_broadcast)
+        )
