@@ -274,6 +274,9 @@ class HostEngine:
             self.count.count_damaged("frame")
             self.events.append(Damaged(now, None, fault))
             self._out_of_step(now, None, "unsolicited bytes", received=data)
+            if self._state is HostState.READY:  # nothing is sent yet, and must not be before it is in step
+                self._state = _LOST[self._state]
+                self._guard(self._line.quiet_at, now)
         self._line.disturbed(now, waiting=self._state is HostState.GUARD)
 
     def _arrived(self, now: float) -> None:

@@ -27,7 +27,7 @@ class HostEvent(StrEnum):
     UNREAD = "sent unread"  #: the request is sent, and no answer is read
     ANSWERED = "answered"  #: the answer to the request was received
     CONFIRMED = "confirmed"  #: the answer to the context, or the last of the proof, was received
-    LOST = "lost"  #: a wrong answer or none, with attempts or rounds left
+    LOST = "lost"  #: a wrong answer or none, with attempts or rounds left, or bytes before anything was sent
     FILL = "fill"  #: the line is quiet, and a byte is sent
     SILENT = "silent"  #: no answer to the byte, and not all are sent
     FILLED = "filled"  #: an answer to the byte, or silence after all of them
@@ -44,6 +44,7 @@ HOST_MOVES = {
     (_S.READY, _E.SELECT): _S.SELECTING,
     (_S.READY, _E.SENT): _S.WAITING,
     (_S.READY, _E.UNREAD): _S.IDLE,
+    (_S.READY, _E.LOST): _S.GUARD,
     (_S.READY, _E.ABORT): _S.IDLE,
     (_S.SELECTING, _E.CONFIRMED): _S.READY,
     (_S.SELECTING, _E.LOST): _S.GUARD,

@@ -94,6 +94,26 @@ def test_a_raw_request_goes_to_whatever_is_current() -> None:
     assert line.sent == [b"\x25\0\3"]
 
 
+def test_bytes_between_the_call_and_its_first_packet() -> None:
+    """The host is out of step before it has sent anything: it gets back in step first, and then asks."""
+    line, _ = chip_line()
+    engine = line.engine
+    start = engine.start
+
+    def disturbed_start(*args: Any, **options: Any) -> None:
+        start(*args, **options)
+        engine.receive(b"?", line.now)
+
+    engine.start = disturbed_start  # type: ignore[method-assign]
+    reply = line.ask(on_axis(GET_KP, 2))
+    assert (reply.response, reply.attempts) == (mc1231a.GetKpResponse(value=0), 1)
+    assert engine.in_step
+    assert [type(event) for event in engine.events if isinstance(event, OutOfStep | InStep)] == [
+        OutOfStep,
+        InStep,
+    ]
+
+
 # Checksums
 
 
