@@ -106,7 +106,7 @@ class MasterEngine:
         self._pending: Pending  #: set by `start`
         #: The previous request, whose answer may still arrive.
         self._earlier: Pending | None = None
-        #: A missing answer is no failure of the node.
+        #: A missing answer is not a failure of the node.
         self._trial = False
         self._earliest = 0.0
         self._deadline = 0.0
