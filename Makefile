@@ -4,6 +4,8 @@
 PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --editable
+# A peer of the library's tests; it asks for an older construct, and works with this one.
+CRSF := crsf-parser==0.3.2
 # Scripts are checked like the package; a folder without any would be an error to mypy.
 TYPED := qlinkgen tests $(sort $(dir $(wildcard examples/*.py benchmarks/*.py)))
 
@@ -32,6 +34,7 @@ setup: .venv/.dev  ## Make .venv with qlinkgen (editable) and the developers' to
 .venv/.dev: .venv/.user
 	@echo "== adding linters, type checkers and test tools (a minute, once)"
 	@$(PIP) '.[dev,library-tests]'
+	@$(BIN)/python -m pip install -qq --disable-pip-version-check --no-deps $(CRSF)
 	@touch $@
 
 demo: .venv/.user  ## A message of each protocol in construct, Python and C; then a bus, a ring and a chip set behind ptys

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.util
 import json
 import random
 import warnings
@@ -29,9 +30,18 @@ Record = Mapping[str, Any]
 
 #: Protocol to the module that it is held against and its name on PyPI.
 PEERS: Mapping[str, tuple[str, str]] = {
+    "crsf": ("crsf_parser", "crsf-parser"),
     "modbus_rtu": ("pymodbus", "pymodbus"),
+    "pelco_d": ("ptz_control_lib", "pyptzcontroller"),
+    "ubx": ("pyubx2", "pyubx2"),
+    "vesc": ("pyvesc", "pyvesc"),
 }
 NAMES = library()
+
+
+def pairs(text: str) -> dict[str, str]:
+    """Names of the schema to those of the other library: "period=measRate ratio=navRate"."""
+    return dict(each.split("=") for each in text.split())
 
 
 class Peer(Protocol):
@@ -52,10 +62,10 @@ class Peer(Protocol):
 def peer(name: str) -> Peer:
     """The adapter of a protocol; skips the test if the library is not installed."""
     module, package = PEERS[name]
+    if importlib.util.find_spec(module) is None:
+        pytest.skip(f"needs {module} (pip install {package})")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of other people's code
-        importlib.import_module("tests.library.peers")
-        pytest.importorskip(module, reason=f"needs {module} (pip install {package})")
         return cast(Peer, importlib.import_module(f"tests.library.peers.{name}"))
 
 

@@ -13,67 +13,70 @@ from pymodbus.pdu import register_message as registers
 from pymodbus.pdu.diag_message import DiagnosticBase
 
 from qlinkgen.model.message import Direction
-from tests.library.protocols import Record
+from tests.library.protocols import Record, pairs
 
 #: Message to the class of pymodbus, and each field to its argument and attribute.
 _KINDS: Mapping[str, tuple[type[ModbusPDU], Mapping[str, str]]] = {
-    "read_holding_registers.request": (
-        registers.ReadHoldingRegistersRequest,
-        {"start": "address", "quantity": "count"},
-    ),
-    "read_holding_registers.response": (registers.ReadHoldingRegistersResponse, {"registers": "registers"}),
-    "read_input_registers.request": (
-        registers.ReadInputRegistersRequest,
-        {"start": "address", "quantity": "count"},
-    ),
-    "read_input_registers.response": (registers.ReadInputRegistersResponse, {"registers": "registers"}),
-    "write_single_coil.request": (bits.WriteSingleCoilRequest, {"number": "address", "value": "bits"}),
-    "write_single_coil.response": (bits.WriteSingleCoilResponse, {"number": "address", "value": "bits"}),
-    "write_single_register.request": (
-        registers.WriteSingleRegisterRequest,
-        {"number": "address", "value": "registers"},
-    ),
-    "write_single_register.response": (
-        registers.WriteSingleRegisterResponse,
-        {"number": "address", "value": "registers"},
-    ),
-    "read_exception_status.request": (other.ReadExceptionStatusRequest, {}),
-    "read_exception_status.response": (other.ReadExceptionStatusResponse, {"outputs": "status"}),
-    "get_comm_event_counter.request": (other.GetCommEventCounterRequest, {}),
-    "get_comm_event_counter.response": (
-        other.GetCommEventCounterResponse,
-        {"status": "status", "events": "count"},
-    ),
-    "write_multiple_registers.request": (
-        registers.WriteMultipleRegistersRequest,
-        {"start": "address", "registers": "registers"},
-    ),
-    "write_multiple_registers.response": (
-        registers.WriteMultipleRegistersResponse,
-        {"start": "address", "quantity": "count"},
-    ),
-    "report_server_id.request": (other.ReportDeviceIdRequest, {}),
-    "mask_write_register.request": (
-        registers.MaskWriteRegisterRequest,
-        {"number": "address", "and_mask": "and_mask", "or_mask": "or_mask"},
-    ),
-    "mask_write_register.response": (
-        registers.MaskWriteRegisterResponse,
-        {"number": "address", "and_mask": "and_mask", "or_mask": "or_mask"},
-    ),
-    "read_write_multiple_registers.request": (
-        registers.ReadWriteMultipleRegistersRequest,
-        {
-            "read_start": "read_address",
-            "read_quantity": "read_count",
-            "write_start": "write_address",
-            "registers": "write_registers",
-        },
-    ),
-    "read_write_multiple_registers.response": (
-        registers.ReadWriteMultipleRegistersResponse,
-        {"registers": "registers"},
-    ),
+    f"{name}.{direction}": (kind, pairs(named))
+    for name, kinds, requested, answered in (
+        (
+            "read_holding_registers",
+            (registers.ReadHoldingRegistersRequest, registers.ReadHoldingRegistersResponse),
+            "start=address quantity=count",
+            "registers=registers",
+        ),
+        (
+            "read_input_registers",
+            (registers.ReadInputRegistersRequest, registers.ReadInputRegistersResponse),
+            "start=address quantity=count",
+            "registers=registers",
+        ),
+        (
+            "write_single_coil",
+            (bits.WriteSingleCoilRequest, bits.WriteSingleCoilResponse),
+            "number=address value=bits",
+            "number=address value=bits",
+        ),
+        (
+            "write_single_register",
+            (registers.WriteSingleRegisterRequest, registers.WriteSingleRegisterResponse),
+            "number=address value=registers",
+            "number=address value=registers",
+        ),
+        (
+            "read_exception_status",
+            (other.ReadExceptionStatusRequest, other.ReadExceptionStatusResponse),
+            "",
+            "outputs=status",
+        ),
+        (
+            "get_comm_event_counter",
+            (other.GetCommEventCounterRequest, other.GetCommEventCounterResponse),
+            "",
+            "status=status events=count",
+        ),
+        (
+            "write_multiple_registers",
+            (registers.WriteMultipleRegistersRequest, registers.WriteMultipleRegistersResponse),
+            "start=address registers=registers",
+            "start=address quantity=count",
+        ),
+        ("report_server_id", (other.ReportDeviceIdRequest, other.ReportDeviceIdResponse), "", ""),
+        (
+            "mask_write_register",
+            (registers.MaskWriteRegisterRequest, registers.MaskWriteRegisterResponse),
+            "number=address and_mask=and_mask or_mask=or_mask",
+            "number=address and_mask=and_mask or_mask=or_mask",
+        ),
+        (
+            "read_write_multiple_registers",
+            (registers.ReadWriteMultipleRegistersRequest, registers.ReadWriteMultipleRegistersResponse),
+            """read_start=read_address read_quantity=read_count write_start=write_address
+            registers=write_registers""",
+            "registers=registers",
+        ),
+    )
+    for direction, kind, named in zip(("request", "response"), kinds, (requested, answered), strict=True)
 }
 _NAMES = {kind: name for name, (kind, _) in _KINDS.items()}
 #: What pymodbus calls a value, and back; it has two states each of a coil, and of a server.

@@ -1,0 +1,74 @@
+"""u-blox UBX by pyubx2."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pyubx2 import GET, POLL, SETPOLL, UBXMessage, UBXReader
+
+from qlinkgen.model.message import Direction
+from tests.library.protocols import Record, pairs
+
+_ENUMS = {
+    "fix": ("none", "dead_reckoning", "two_dimensional", "three_dimensional", "combined", "time"),
+    "reference": ("utc", "gps", "glonass", "beidou", "galileo"),
+}
+#: Message to its name in the library, and each field to its attribute.
+_KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "poll_rate.request": ("CFG-RATE", {}),
+    "poll_rate.response": ("CFG-RATE", pairs("period=measRate ratio=navRate reference=timeRef")),
+    "poll_status.request": ("NAV-STATUS", {}),
+    "poll_status.response": (
+        "NAV-STATUS",
+        pairs("itow=iTOW fix=gpsFix flags=flags differential=fixStat flags2=flags2 ttff=ttff uptime=msss"),
+    ),
+    "ack": ("ACK-ACK", pairs("class=clsID number=msgID")),
+    "nak": ("ACK-NAK", pairs("class=clsID number=msgID")),
+    "nav_pvt": (
+        "NAV-PVT",
+        pairs("""
+            itow=iTOW year=year month=month day=day hour=hour minute=min second=second valid=valid
+            time_accuracy=tAcc nano=nano fix=fixType flags=flags flags2=flags2 satellites=numSV longitude=lon
+            latitude=lat height=height altitude=hMSL horizontal_accuracy=hAcc vertical_accuracy=vAcc
+            north=velN east=velE down=velD ground_speed=gSpeed motion_heading=headMot speed_accuracy=sAcc
+            heading_accuracy=headAcc dilution=pDOP flags3=flags3 vehicle_heading=headVeh declination=magDec
+            declination_accuracy=magAcc
+        """),
+    ),
+}
+_BITS = {"flags": 1, "flags2": 1, "flags3": 2, "valid": 1, "fixStat": 1}
+UNKNOWN: frozenset[str] = frozenset()
+
+
+def build(record: Record) -> bytes | None:
+    identity, named = _KINDS[record["message"]]
+    given = {named[each]: _given(each, named[each], value) for each, value in record["fields"].items()}
+    mode = POLL if record["message"].endswith(".request") else GET
+    return bytes(UBXMessage(identity[:3], identity, mode, parsebitfield=0, **given).serialize())
+
+
+def _given(field: str, attribute: str, value: Any) -> Any:
+    if attribute in _BITS:
+        return int(value).to_bytes(_BITS[attribute], "little")
+    if isinstance(value, str):
+        return _ENUMS[field].index(value)
+    # It cuts off what is less than a step.
+    return value * (1 + 1e-12) if isinstance(value, float) else value
+
+
+def read(wire: bytes, direction: Direction) -> Record | None:
+    mode = SETPOLL if direction == "request" else GET
+    found = UBXReader.parse(wire, msgmode=mode, parsebitfield=0)
+    names = [each for each, (identity, _) in _KINDS.items() if identity == found.identity]
+    name = next(each for each in names if each.endswith(".request") == (direction == "request"))
+    fields = {each: _read(each, getattr(found, attribute)) for each, attribute in _KINDS[name][1].items()}
+    return {"message": name, "fields": fields}
+
+
+def _read(field: str, value: Any) -> Any:
+    if isinstance(value, bytes):
+        return int.from_bytes(value, "little")
+    if isinstance(value, float):
+        return round(value, 7)
+    return dict(enumerate(_ENUMS.get(field, ()))).get(value, value)
