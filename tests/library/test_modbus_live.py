@@ -1,0 +1,131 @@
+"""Modbus over pseudo-terminals: our master with pymodbus's server, its client with our slave."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from qlinkgen.link import MasterEngine, SlaveEngine
+from qlinkgen.transport import PtyPort, open_pty
+from qlinkgen.transport.blocking import BlockingMaster
+from qlinkgen.transport.conversation import timing_of
+from qlinkgen.transport.serving import serve
+from tests.library.protocols import described
+
+pymodbus = pytest.importorskip("pymodbus", reason="needs pymodbus (pip install pymodbus)")
+
+NODE = 17
+REGISTERS = [each * 3 for each in range(100)]
+
+
+@pytest.fixture
+def pty() -> Iterator[PtyPort]:
+    with open_pty() as port:
+        yield port
+
+
+@pytest.fixture
+def server(pty: PtyPort) -> Iterator[None]:
+    """The server of pymodbus at the other end."""
+    from pymodbus.framer import FramerType
+    from pymodbus.server import ModbusSerialServer
+    from pymodbus.simulator import DataType, SimData, SimDevice
+
+    ready, loop = threading.Event(), asyncio.new_event_loop()
+    data = SimData(0, values=list(REGISTERS), datatype=DataType.REGISTERS)
+
+    async def main() -> None:
+        device = SimDevice(NODE, simdata=[data])
+        made = ModbusSerialServer(context=device, framer=FramerType.RTU, port=pty.path, baudrate=115200)
+        stop = asyncio.Event()
+        loop.stop_it = stop.set  # type: ignore[attr-defined]
+        await made.listen()
+        ready.set()
+        await stop.wait()
+        await made.shutdown()  # type: ignore[no-untyped-call]
+
+    thread = threading.Thread(target=lambda: loop.run_until_complete(main()))
+    thread.start()
+    assert ready.wait(10)
+    yield
+    loop.call_soon_threadsafe(loop.stop_it)  # type: ignore[attr-defined]
+    thread.join(10)
+    loop.close()
+
+
+@pytest.fixture
+def master(pty: PtyPort, server: None) -> BlockingMaster:
+    codec = described("modbus_rtu").module
+    return BlockingMaster(MasterEngine(codec, timing_of(codec, pty)), pty)
+
+
+def test_our_master_reads_and_writes(master: BlockingMaster) -> None:
+    codec: Any = described("modbus_rtu").module
+    ask: Callable[[Any], Any] = lambda request: master.transact(request).response  # noqa: E731
+    read = codec.ReadHoldingRegistersRequest(node=NODE, start=10, quantity=90)
+    assert ask(read).registers == REGISTERS[10:]
+    write = codec.WriteMultipleRegistersRequest(node=NODE, start=20, registers=[7, 8, 9])
+    assert ask(write).quantity == 3
+    assert ask(codec.WriteSingleRegisterRequest(node=NODE, number=11, value=0xFFFF)).value == 0xFFFF
+    assert ask(read).registers[:14] == [30, 0xFFFF, *REGISTERS[12:20], 7, 8, 9, REGISTERS[23]]
+    both = codec.ReadWriteMultipleRegistersRequest(
+        node=NODE, read_start=0, read_quantity=3, write_start=1, registers=[1]
+    )
+    assert ask(both).registers == [0, 1, REGISTERS[2]]
+    assert master.engine.total.requests == master.engine.total.answers == 5
+
+
+class Registers:
+    """A node with a hundred registers."""
+
+    def __init__(self, codec: Any) -> None:
+        self.number = NODE
+        self.values = list(REGISTERS)
+        self._codec = codec
+
+    def handle(self, request: Any, now: float) -> Any:
+        codec = self._codec
+        match request:
+            case codec.ReadHoldingRegistersRequest(start=start, quantity=quantity):
+                return codec.ReadHoldingRegistersResponse(
+                    node=NODE, registers=self.values[start : start + quantity]
+                )
+            case codec.WriteSingleRegisterRequest(number=number, value=value):
+                self.values[number] = value
+                return codec.WriteSingleRegisterResponse(node=NODE, number=number, value=value)
+            case codec.WriteMultipleRegistersRequest(start=start, registers=registers):
+                self.values[start : start + len(registers)] = registers
+                return codec.WriteMultipleRegistersResponse(node=NODE, start=start, quantity=len(registers))
+        return None
+
+
+@pytest.fixture
+def slave(pty: PtyPort) -> Iterator[Registers]:
+    codec = described("modbus_rtu").module
+    node, stopped = Registers(codec), threading.Event()
+    engine = SlaveEngine(codec, node)
+    thread = threading.Thread(target=serve, args=(pty, engine), kwargs={"stop": stopped.is_set})
+    thread.start()
+    yield node
+    stopped.set()
+    thread.join(10)
+
+
+def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers) -> None:
+    from pymodbus.client import ModbusSerialClient
+
+    client = ModbusSerialClient(pty.path, baudrate=115200, timeout=2, retries=0)
+    assert client.connect()
+    try:
+        found = client.read_holding_registers(10, count=90, device_id=NODE)
+        assert found.registers == REGISTERS[10:]
+        assert not client.write_register(11, 0xABCD, device_id=NODE).isError()
+        assert client.write_registers(20, [7, 8, 9], device_id=NODE).count == 3
+        assert slave.values[11] == 0xABCD
+        assert client.read_holding_registers(20, count=3, device_id=NODE).registers == [7, 8, 9]
+    finally:
+        client.close()  # type: ignore[no-untyped-call]
