@@ -7,12 +7,14 @@ orders and groups of seven bits share one mechanism.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from decimal import Context, Decimal
 from fractions import Fraction
 from functools import cached_property
 from typing import ClassVar, Literal
 
+from qlinkgen.model.floats import Float
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, byte_chunks, group_chunks
 from qlinkgen.model.texts import Text
 
@@ -29,6 +31,7 @@ __all__ = [
     "Enum",
     "FieldType",
     "Flags",
+    "Float",
     "Integer",
     "Length",
     "NamedValue",
@@ -162,7 +165,10 @@ Role = Settable | Constant | Reserved | Count
 
 @dataclass(frozen=True, kw_only=True)
 class Scalar:
-    """An integer on the wire of any meaning: number, bool, enum, flags, scaled or fixed-point value."""
+    """An integer on the wire of any meaning: number, bool, enum, flags, scaled or fixed-point value.
+
+    The integer of a floating-point number is its bits.
+    """
 
     bits: int
     signed: bool = False
@@ -173,7 +179,7 @@ class Scalar:
     role: Role = Settable()
     scaling: Scaling | None = None
     unit: Text = ""
-    meaning: Enum | Flags | Literal["bool"] | None = None
+    meaning: Enum | Flags | Float | Literal["bool"] | None = None
     #: The named type of the field, "" if its type has no name. Not part of the layout.
     type_name: str = field(default="", compare=False)
 
@@ -220,12 +226,24 @@ class Scalar:
     @property
     def number(self) -> Literal["int", "float", "decimal"]:
         """Python type that holds every physical value without loss."""
+        if isinstance(self.meaning, Float):
+            return "float"
         if self.scaling is None or self.scaling.divisor == 1:
             return "int"
         return "float" if self.bits <= DOUBLE_BITS else "decimal"
 
+    @property
+    def span(self) -> tuple[Number, Number]:
+        """Minimum and maximum value in the field's unit."""
+        if isinstance(self.meaning, Float):
+            return self.meaning.bounds or (-math.inf, math.inf)
+        low, high = sorted((self.physical(self.minimum), self.physical(self.maximum)))
+        return low, high
+
     def physical(self, raw: int) -> Number:
         """The value of a raw integer in the field's unit, of the type :attr:`number`."""
+        if isinstance(self.meaning, Float):
+            return self.meaning.value(raw)
         if self.scaling is None:
             return raw
         value = raw * self.scaling.factor + self.scaling.bias

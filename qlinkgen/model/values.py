@@ -1,8 +1,9 @@
 """The values of a message as native Python objects, as raw integers, and in JSON.
 
 Native values are those of generated Python and construct: int, bool, float or Decimal in the field's unit, an
-int for enums and flags, bytes, str, a list of ints. In JSON, bytes are hex strings, enums their name (a
-number if unknown), flags an integer, scaled values numbers in the unit with all their digits.
+int for enums and flags, bytes, str, a list of the values of its items. In JSON, bytes are hex strings, enums
+their name (a number if unknown), flags an integer, scaled values numbers in the unit with all their digits,
+infinities and NaN the texts "inf", "-inf" and "nan".
 """
 
 from __future__ import annotations
@@ -16,16 +17,19 @@ from fractions import Fraction
 from typing import TypeAlias, assert_never
 
 from qlinkgen.model.message import Value
-from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
+from qlinkgen.model.types import Array, Blob, Enum, Flags, Float, Scalar
 
 #: A JSON value; numbers with a decimal point are read as Decimal.
 Json: TypeAlias = "str | int | float | Decimal | Sequence[Json] | Mapping[str, Json] | None"
-Native = int | bool | float | Decimal | bytes | str | list[int]
+Item = int | bool | float | Decimal
+Native = Item | bytes | str | list[Item]
 
 
 #: No number of a protocol is nearly as long; Python refuses to convert one of more than 4300 digits.
 _WHOLE = re.compile(r"[+-]?(0[xX][0-9a-fA-F]{1,1000}|0[bB][01]{1,1000}|[0-9]{1,1000})")
 _DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+#: Floating-point numbers that JSON has no notation for.
+_NOT_FINITE = {"nan": math.nan, "inf": math.inf, "+inf": math.inf, "-inf": -math.inf}
 
 
 class BadValue(ValueError):
@@ -39,14 +43,14 @@ def default_of(value: Value) -> Native:
         case Scalar():
             return native_from_raw(kind, kind.default)
         case Array():
-            return list(kind.default)
+            return [native_from_raw(kind.item, raw) for raw in kind.default]
         case Blob():
             return kind.default.decode("ascii") if kind.text else kind.default
         case _:
             assert_never(kind)
 
 
-def native_from_raw(scalar: Scalar, raw: int) -> Native:
+def native_from_raw(scalar: Scalar, raw: int) -> Item:
     """The native value of a raw integer."""
     return bool(raw) if scalar.meaning == "bool" else scalar.physical(raw)
 
@@ -55,37 +59,66 @@ def raw_from_native(value: Value, native: Native) -> int:
     """The raw integer of a native number: the nearest step, in range. Raises BadValue."""
     scalar = value.type
     assert isinstance(scalar, Scalar)
-    if isinstance(native, bytes | str | list) or (isinstance(native, float) and not math.isfinite(native)):
-        raise BadValue(f"{value.name}: {_shown(native)} is not a number")
+    return raw_number(value.name, scalar, native)
+
+
+def raw_number(name: str, scalar: Scalar, native: Native) -> int:
+    """Like `raw_from_native`, for a value or an item of a list."""
+    if isinstance(native, bytes | str | list):
+        raise BadValue(f"{name}: {_shown(native)} is not a number")
+    if isinstance(scalar.meaning, Float):
+        return _raw_float(name, scalar, scalar.meaning, native)
+    if isinstance(native, float) and not math.isfinite(native):
+        raise BadValue(f"{name}: {_shown(native)} is not a number")
     if isinstance(native, Decimal) and not native.is_finite():
-        raise BadValue(f"{value.name}: {native} is not a number")
+        raise BadValue(f"{name}: {native} is not a number")
     exact = Fraction(native)
     if scalar.scaling is None and exact.denominator != 1:
-        raise BadValue(f"{value.name}: {native} is not a whole number")
+        raise BadValue(f"{name}: {native} is not a whole number")
     raw = scalar.scaling.raw(exact) if scalar.scaling else int(exact)
     if not scalar.minimum <= raw <= scalar.maximum:
-        low, high = sorted((scalar.physical(scalar.minimum), scalar.physical(scalar.maximum)))
-        unit = f" {scalar.unit}" if scalar.unit else ""
-        raise BadValue(f"{value.name}: {native} is out of range; {low}..{high}{unit} can be sent")
+        raise _out_of_range(name, scalar, native)
     return raw
 
 
-def to_json(value: Value, native: Native) -> str | int | float | Decimal | list[int]:
+def _raw_float(name: str, scalar: Scalar, kind: Float, native: Item) -> int:
+    try:
+        value = float(native)
+        raw = kind.raw(value)
+    except OverflowError:
+        raise BadValue(f"{name}: {native} is too large for {kind.name}") from None
+    if not kind.allows(value):
+        raise _out_of_range(name, scalar, native)
+    return raw
+
+
+def _out_of_range(name: str, scalar: Scalar, native: Item) -> BadValue:
+    low, high = scalar.span
+    unit = f" {scalar.unit}" if scalar.unit else ""
+    return BadValue(f"{name}: {native} is out of range; {low}..{high}{unit} can be sent")
+
+
+def to_json(value: Value, native: Native) -> str | Item | list[str | Item]:
     """The JSON value of a native value; a Decimal is kept, so that the writer can print all its digits."""
     kind = value.type
     if isinstance(kind, Blob):
         assert isinstance(native, bytes | str)
         return native.hex() if isinstance(native, bytes) else native
     if isinstance(kind, Array):
-        assert isinstance(native, Sequence)
-        return [int(item) for item in native]
-    if isinstance(kind.meaning, Enum):
+        assert isinstance(native, list)
+        return [_item_to_json(kind.item, item) for item in native]
+    assert not isinstance(native, bytes | str | list)
+    return _item_to_json(kind, native)
+
+
+def _item_to_json(scalar: Scalar, native: Item) -> str | Item:
+    if isinstance(scalar.meaning, Enum):
         assert isinstance(native, int)
-        return kind.meaning.name_of(native) or int(native)
-    if isinstance(kind.meaning, Flags):
-        assert not isinstance(native, list)
+        return scalar.meaning.name_of(native) or int(native)
+    if isinstance(scalar.meaning, Flags):
         return int(native)  # construct has a class of its own
-    assert not isinstance(native, bytes)
+    if isinstance(native, float) and not math.isfinite(native):
+        return str(native)
     return native
 
 
@@ -99,19 +132,24 @@ def from_json(value: Value, given: Json) -> Native:
     if isinstance(kind, Blob):
         return _blob(value.name, kind, given)
     if isinstance(kind, Array):
-        return [_whole(value.name, item) for item in _listed(value.name, given)]
-    if isinstance(kind.meaning, Enum) and isinstance(given, str):
-        names = {member.name: member.value for member in kind.meaning.members}
-        return names[given] if given in names else _named_or_number(value.name, given, names)
-    if isinstance(kind.meaning, Flags) and not isinstance(given, int):
-        return _flags(value.name, kind.meaning, given)
-    if kind.meaning == "bool":
-        return _bool(value.name, given)
-    return (
-        _whole(value.name, given)
-        if kind.number == "int"
-        else _number(value.name, given, exact=kind.number == "decimal")
-    )
+        return [_item_from_json(value.name, kind.item, item) for item in _listed(value.name, given)]
+    return _item_from_json(value.name, kind, given)
+
+
+def _item_from_json(name: str, scalar: Scalar, given: Json) -> Item:
+    meaning = scalar.meaning
+    if isinstance(meaning, Enum) and isinstance(given, str):
+        names = {member.name: member.value for member in meaning.members}
+        return names[given] if given in names else _named_or_number(name, given, names)
+    if isinstance(meaning, Flags) and not isinstance(given, int):
+        return _flags(name, meaning, given)
+    if meaning == "bool":
+        return _bool(name, given)
+    if isinstance(meaning, Float) and isinstance(given, str) and given.lower() in _NOT_FINITE:
+        return _NOT_FINITE[given.lower()]
+    if scalar.number == "int":
+        return _whole(name, given)
+    return _number(name, given, exact=scalar.number == "decimal")
 
 
 def check_items(value: Value, native: Native) -> None:
@@ -123,10 +161,14 @@ def check_items(value: Value, native: Native) -> None:
     if not low <= number <= high:
         limit = f"at most {high}" if number > high else f"at least {low}"
         raise BadValue(f"{value.name}: {number} item{'' if number == 1 else 's'}; {limit}")
-    low, high = kind.item.minimum, kind.item.maximum
+    first, last = kind.item.span
     for index, item in enumerate(native):
-        if not low <= item <= high:
-            raise BadValue(f"{value.name}[{index}]: {item} is out of range {low}..{high}")
+        if not first <= item <= last and not (isinstance(item, float) and _takes_nan(kind.item)):
+            raise BadValue(f"{value.name}[{index}]: {item} is out of range {first}..{last}")
+
+
+def _takes_nan(scalar: Scalar) -> bool:
+    return isinstance(scalar.meaning, Float) and scalar.meaning.bounds is None
 
 
 def whole_number(text: str) -> int | None:

@@ -7,7 +7,18 @@ from fractions import Fraction
 from typing import assert_never
 
 from qlinkgen.model.integer import Chunk, Integer
-from qlinkgen.model.types import Constant, Count, Enum, Flags, Length, Number, Reserved, Scalar, Settable
+from qlinkgen.model.types import (
+    Constant,
+    Count,
+    Enum,
+    Flags,
+    Float,
+    Length,
+    Number,
+    Reserved,
+    Scalar,
+    Settable,
+)
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
@@ -68,7 +79,7 @@ def number_text(value: Number | Fraction) -> str:
 
 def limits_text(scalar: Scalar) -> str:
     """Legal values in the unit."""
-    low, high = sorted((scalar.physical(scalar.minimum), scalar.physical(scalar.maximum)))
+    low, high = scalar.span
     return f"{number_text(low)}..{number_text(high)}"
 
 
@@ -80,9 +91,16 @@ def range_text(scalar: Scalar) -> str:
         case Reserved():
             return "reserved"
         case Settable() | Count():
-            return "" if scalar.meaning is not None and scalar.full_range else limits_text(scalar)
+            return "" if _is_free(scalar) else limits_text(scalar)
         case _:
             assert_never(scalar.role)
+
+
+def _is_free(scalar: Scalar) -> bool:
+    """Whether the value has no limits beyond those of its type, which has a name."""
+    if isinstance(scalar.meaning, Float):
+        return scalar.meaning.bounds is None
+    return scalar.meaning is not None and scalar.full_range
 
 
 def scale_text(scalar: Scalar) -> str:
@@ -108,7 +126,7 @@ def value_text(scalar: Scalar, raw: int) -> str:
             return f"{bits} ({' | '.join(names) or 'none set'})"
         case "bool":
             return str(native_from_raw(scalar, raw)).lower()
-        case None:
+        case Float() | None:
             unit = f" {scalar.unit}" if scalar.unit else ""
             raw_text = f" (raw {raw})" if scalar.scaling else ""
             return f"{number_text(scalar.physical(raw))}{unit}{raw_text}"
@@ -140,7 +158,7 @@ def type_text(step: Step | Member) -> str:
         case BytesStep():
             return f"{'text' if step.text else 'bytes'}[{_length_text(step.length)}]"
         case ItemsStep():
-            return f"{integer_text(step.item)}[{_length_text(step.length)}]"
+            return f"{_scalar_text(step.number)}[{_length_text(step.length)}]"
         case _:
             assert_never(step)
 
@@ -152,6 +170,8 @@ def _scalar_text(scalar: Scalar) -> str:
             return f"{meaning.name} (enum, {integer})"
         case Flags():
             return f"{meaning.name} (flags, {integer})"
+        case Float():
+            return f"{meaning.name}{integer.removeprefix(f'u{scalar.bits}')}"
         case "bool":
             return "bool"
         case None:
@@ -219,6 +239,8 @@ def kind_text(step: Step | Member) -> str:
 def must_text(step: Step | Member) -> str:
     """Conditions on the raw number of a step, or of each of its items, beyond the limits of its bits."""
     match step:
+        case ValueStep() | ItemsStep() | Member() if isinstance(step.number.meaning, Float):
+            return range_text(step.number)
         case ValueStep() | ItemsStep() | Member():
             return " and ".join(map(condition_text, step.conditions))
         case ConstantStep():

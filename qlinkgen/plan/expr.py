@@ -68,5 +68,4 @@ class OneOf:
         return any(each.holds(number) for each in self.ranges)
 
 
-Limit = Within | Clear
-Condition = Limit | OneOf
+Condition = Within | Clear | OneOf

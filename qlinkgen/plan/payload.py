@@ -22,12 +22,13 @@ from qlinkgen.model.types import (
     Count,
     Enum,
     Flags,
+    Float,
     Length,
     Reserved,
     Scalar,
     Settable,
 )
-from qlinkgen.plan.expr import Clear, Limit, Size, Within
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ class ValueStep:
     number: Scalar
 
     @property
-    def conditions(self) -> tuple[Limit, ...]:
+    def conditions(self) -> tuple[Condition, ...]:
         """Conditions on the integer on the wire, beyond the limits of its bits."""
         return conditions(self.number)
 
@@ -77,7 +78,7 @@ class ConstantStep:
     number: Scalar
 
     @property
-    def conditions(self) -> tuple[Limit, ...]:
+    def conditions(self) -> tuple[Condition, ...]:
         """Conditions on the integer on the wire."""
         return (Within(self.value, self.value),)
 
@@ -121,7 +122,7 @@ class Member:
     number: Scalar
 
     @property
-    def conditions(self) -> tuple[Limit, ...]:
+    def conditions(self) -> tuple[Condition, ...]:
         """Conditions on the number, beyond the limits of its bits."""
         return conditions(self.number)
 
@@ -184,7 +185,7 @@ class ItemsStep:
         return self.length.fixed
 
     @property
-    def conditions(self) -> tuple[Limit, ...]:
+    def conditions(self) -> tuple[Condition, ...]:
         """Conditions on each item, beyond the limits of its bits."""
         return conditions(self.number)
 
@@ -299,19 +300,21 @@ def least_size(step: Step) -> int:
             assert_never(step)
 
 
-def conditions(number: Scalar) -> tuple[Limit, ...]:
+def conditions(number: Scalar) -> tuple[Condition, ...]:
     """Conditions on a received number, beyond the limits of its bits."""
     return limits(number)[1:] if number.full_range else limits(number)
 
 
-def limits(number: Scalar) -> tuple[Limit, ...]:
+def limits(number: Scalar) -> tuple[Condition, ...]:
     """Conditions on an integer before it is sent."""
-    found: list[Limit] = [Within(number.minimum, number.maximum)]
+    found: list[Condition] = [Within(number.minimum, number.maximum)]
     meaning = number.meaning
     match meaning:
         case Flags() if meaning.reserved_zero and (mask := number.integer.mask & ~meaning.mask):
             found.append(Clear(mask))
-        case Flags() | Enum() | "bool" | None:
+        case Float() if meaning.bounds is not None:
+            found.append(OneOf(tuple(Within(*each) for each in meaning.legal)))
+        case Flags() | Enum() | Float() | "bool" | None:
             pass
         case _:
             assert_never(meaning)

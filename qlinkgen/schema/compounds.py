@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from qlinkgen.model.types import Array, BitField, Bits, Blob, Enum, Length, Scalar
+from qlinkgen.model.types import Array, BitField, Bits, Blob, Enum, Float, Length, Scalar
 from qlinkgen.schema.constants import integer_range
 from qlinkgen.schema.file_model import BitSpec, FieldSpec
 from qlinkgen.schema.kinds import MAX_PAYLOAD
@@ -15,6 +15,7 @@ from qlinkgen.schema.scalars import Meaning, Plain, ScalarBuilder
 
 _NUMBER_KEYS = ("byteorder", "groups", "parts", "scale", "offset", "range", "raw_range", "counts", "bits")
 _ITEM_KEYS = ("scale", "offset", "range", "raw_range", "const", "reserved", "counts", "bits")
+_WHOLE_KEYS = ("const", "reserved", "counts", "bits")
 _CONTAINER_KEYS = ("scale", "offset", "range", "raw_range", "default", "const", "reserved", "counts", "unit")
 
 
@@ -92,8 +93,8 @@ def build_array(
     if length is None:
         return None
     default = _array_default(spec, item, length, location)
-    required = spec.default is None and length.minimum > 0
-    return Array(item, length, default + (0,) * (length.minimum - len(default)), required)
+    required = spec.default is None and length.minimum > 0 and item.default == 0
+    return Array(item, length, default + (item.default,) * (length.minimum - len(default)), required)
 
 
 def _array_default(spec: FieldSpec, item: Scalar, length: Length, location: Location) -> tuple[int, ...]:
@@ -118,6 +119,9 @@ def _array_default(spec: FieldSpec, item: Scalar, length: Length, location: Loca
 
 def is_plain_item(spec: FieldSpec, plain: Plain, base: str, location: Location) -> bool:
     """Check that an array can hold the type, and that keys apply to its items."""
+    if isinstance(plain.meaning, Float):
+        location.reject(spec, _WHOLE_KEYS, "an array")
+        return True
     if plain.meaning is not None or plain.scaling is not None:
         hint = "use u8 to i64, or a field for each"
         location.fault("bad-array", "type", f"an array cannot hold '{base}', only plain integers", hint)
@@ -183,7 +187,7 @@ def _bit_meaning(
     plain = scalars.named(spec.type, location)
     if plain is None:
         return "unknown"
-    if plain.meaning is None:
+    if plain.meaning is None or isinstance(plain.meaning, Float):
         hint = "omit type, and write signed: true for a signed number"
         location.fault("not-applicable", "type", f"'{spec.type}' is not the type of a bit field", hint)
         return "unknown"

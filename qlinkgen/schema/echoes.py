@@ -7,7 +7,7 @@ from typing import assert_never
 
 from qlinkgen.model.message import Field
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Array, Bits, Blob, FieldType, Length, Scalar
+from qlinkgen.model.types import Array, Bits, Blob, FieldType, Float, Length, Scalar
 from qlinkgen.schema.file_model import Fields, SchemaFile
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
@@ -55,6 +55,8 @@ def _fault(field: Field, request: Iterable[Field]) -> tuple[str, str] | None:
     if asked is None:
         hint = did_you_mean(field.name, known, f"its fields are {listed(known)}")
         return f"the request has no field '{field.name}' to repeat", hint
+    if _has_float(field.type):
+        return f"{field.name} cannot be an echo: a NaN equals nothing, and digits are lost", "remove echo"
     if not _holds(field.type, asked.type):
         return f"{field.name} cannot hold every {field.name} of the request", "give both the same type"
     return None
@@ -62,6 +64,11 @@ def _fault(field: Field, request: Iterable[Field]) -> tuple[str, str] | None:
 
 def _settable(field: Field) -> bool:
     return not isinstance(field.type, Scalar) or field.type.settable
+
+
+def _has_float(kind: FieldType) -> bool:
+    number = kind.item if isinstance(kind, Array) else kind
+    return isinstance(number, Scalar) and isinstance(number.meaning, Float)
 
 
 def _holds(kind: FieldType, other: FieldType) -> bool:

@@ -130,7 +130,7 @@ class BitSpec(_Mapping):
 class FieldSpec(Fact):
     """A field of a message, or a named type that fields can have."""
 
-    type: str = Field(description="u8-u64, i8-i64, bool, fixed32.32, bytes[..], text[..], u16[..] or a name")
+    type: str = Field(description="u8, i32, f64, bool, fixed32.32, bytes[..], text[..], u16[..] or a name")
     byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
     groups: GroupSpec | None = Field(default=None, description="Sent in groups of fewer than eight bits")
     parts: list[WholeRange] | None = Field(

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 _RANGE = re.compile(r"\s*(?P<first>[^.\s]\S*?)\s*\.\.\s*(?P<last>\S+)\s*\Z")
 _RATIONAL = re.compile(
-    r"""\s*(?P<sign>[-+]?)(?P<top>[0-9]{1,40}(?:\.[0-9]{1,40})?)\s*
+    r"""\s*(?P<sign>[-+]?)(?P<top>[0-9]{1,40}(?:\.[0-9]{1,40})?(?:e[-+]?[0-9]{1,3})?)\s*
     (?:/\s*(?:(?P<base>[0-9]{1,10})\^(?P<power>[0-9]{1,4})|(?P<below>[0-9]{1,40})))?\s*\Z""",
     re.ASCII | re.VERBOSE,
 )

@@ -7,10 +7,10 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Protocol
 
-from qlinkgen.model.types import DOUBLE_BITS, Enum, Flags, Scalar, Scaling, Settable
+from qlinkgen.model.types import DOUBLE_BITS, Enum, Flags, Float, Scalar, Scaling, Settable
 from qlinkgen.schema.constants import MAX_BITS
 from qlinkgen.schema.location import Location
-from qlinkgen.schema.notation import Range, shown
+from qlinkgen.schema.notation import Range, rational, shown
 from qlinkgen.schema.report import did_you_mean, listed
 
 Written = int | bool | Decimal | str | list[int]
@@ -38,6 +38,8 @@ def quantified(scalar: Scalar, spec: Quantity, what: str, location: Location) ->
             location.reject(spec, ("scale", "offset"), what, "remove it, or use an integer type")  # type: ignore[arg-type]
         else:
             scalar = _scaled(scalar, spec.scale, spec.offset, location)
+    if isinstance(scalar.meaning, Float):
+        return scalar if spec.range is None else _bounded(scalar, scalar.meaning, spec.range, location)
     if spec.range is not None:
         return _ranged(scalar, spec.range, "range", scalar.scaling, location)
     return scalar if spec.raw_range is None else _ranged(scalar, spec.raw_range, "raw_range", None, location)
@@ -88,6 +90,21 @@ def _ranged(scalar: Scalar, limits: Range, key: str, scaling: Scaling | None, lo
     return replace(scalar, minimum=low, maximum=high)
 
 
+def _bounded(scalar: Scalar, kind: Float, limits: Range, location: Location) -> Scalar:
+    """A floating-point number with a range; its bounds are the nearest numbers."""
+    try:
+        low, high = (_rounded(kind, end) for end in (limits.first, limits.last))
+    except OverflowError:
+        location.fault("range-does-not-fit", "range", f"a bound does not fit {kind.name}", "use a wider type")
+        return scalar
+    return replace(scalar, meaning=replace(kind, bounds=(low, high)))
+
+
+def _rounded(kind: Float, number: Fraction) -> float:
+    """The nearest number that the type holds; 0.0 for -0.0. Raises OverflowError."""
+    return kind.value(kind.raw(float(number))) + 0.0
+
+
 def _bits(scalar: Scalar) -> str:
     return f"{scalar.bits} {'signed' if scalar.signed else 'unsigned'} bits"
 
@@ -107,6 +124,8 @@ def _step_hint(scaling: Scaling | None) -> str:
 
 def defaulted(scalar: Scalar, value: Written | None, key: str, location: Location) -> Scalar:
     """Apply the default or constant of a field to a scalar; without one, the number nearest to 0."""
+    if isinstance(scalar.meaning, Float):
+        return _float_default(scalar, scalar.meaning, value, key, location)
     if value is None:
         nearest = min(max(0, scalar.minimum), scalar.maximum)
         return replace(scalar, default=nearest, role=Settable(required=nearest != 0))
@@ -130,6 +149,34 @@ def defaulted(scalar: Scalar, value: Written | None, key: str, location: Locatio
         )
         return scalar
     return replace(scalar, default=raw)
+
+
+def _float_default(
+    scalar: Scalar, kind: Float, value: Written | None, key: str, location: Location
+) -> Scalar:
+    """Like `defaulted`, for a floating-point number: the nearest number that the type holds."""
+    if value is None:
+        low, high = kind.bounds or (0.0, 0.0)
+        nearest = min(max(0.0, low), high)
+        return replace(scalar, default=kind.raw(nearest), role=Settable(required=nearest != 0))
+    if isinstance(value, str) and value in ("nan", "inf", "-inf"):
+        number = float(value)
+    else:
+        try:
+            number = _rounded(kind, rational(value))
+        except ValueError:
+            hint = "write a number, nan, inf or -inf"
+            location.fault("wrong-type", key, f"{shown(value)} is not a number", hint)
+            return scalar
+        except OverflowError:
+            what = f"{shown(value)} does not fit {kind.name}"
+            location.fault("value-does-not-fit", key, what, "use a wider type or another number")
+            return scalar
+    if not kind.allows(number):
+        low, high = kind.bounds or (0.0, 0.0)
+        location.fault("default-out-of-range", key, f"{shown(value)} is out of range", f"use {low}..{high}")
+        return scalar
+    return replace(scalar, default=kind.raw(number))
 
 
 def _raw(scalar: Scalar, value: Written, key: str, location: Location) -> int | None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, assert_never
 
 from qlinkgen.model.types import (
     Chunk,
@@ -14,6 +14,7 @@ from qlinkgen.model.types import (
     Count,
     Enum,
     Flags,
+    Float,
     Reserved,
     Scalar,
     Scaling,
@@ -28,10 +29,11 @@ from qlinkgen.schema.numbers import defaulted, quantified
 from qlinkgen.schema.report import did_you_mean
 
 FIXED = re.compile(r"(?P<sign>u?)fixed(?P<whole>[0-9]{1,2})\.(?P<fraction>[0-9]{1,2})\Z", re.ASCII)
+FLOAT = re.compile(r"f(?P<bits>16|32|64)\Z", re.ASCII)
 #: Built-in types other than integers.
 KEYWORDS = ("bool", "bytes", "text")
 
-Meaning = Enum | Flags | Literal["bool"] | None
+Meaning = Enum | Flags | Float | Literal["bool"] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +48,17 @@ class Plain:
     @property
     def what(self) -> str:
         """Its kind, for messages."""
-        if self.meaning == "bool":
-            return "bool"
-        return (
-            "a number"
-            if self.meaning is None
-            else f"{type(self.meaning).__name__.lower()} {self.meaning.name}"
-        )
+        match self.meaning:
+            case Enum() | Flags():
+                return f"{self.meaning.kind} {self.meaning.name}"
+            case Float():
+                return self.meaning.name
+            case "bool":
+                return "bool"
+            case None:
+                return "a number"
+            case _:
+                assert_never(self.meaning)
 
     def fits(self, width: int) -> bool:
         """Whether every named value fits ``width`` bits."""
@@ -117,6 +123,8 @@ class ScalarBuilder:
             return Plain(
                 int(match["whole"]) + int(match["fraction"]), signed=not match["sign"], scaling=scaling
             )
+        if match := FLOAT.match(base):
+            return Plain(int(match["bits"]), signed=False, meaning=Float(int(match["bits"])))
         if match := INTEGER.match(base):
             return Plain(int(match["bits"]), signed=match["sign"] == "i")
         return None
@@ -146,6 +154,12 @@ class ScalarBuilder:
             location.fault("bad-width", "type", f"{base} has {bits} bits", f"use 1 to {MAX_BITS}")
             return None
         groups = spec.groups or self._file.groups
+        if groups is not None and FLOAT.match(base):
+            hint = "use an integer, or whole bytes"
+            location.fault(
+                "bad-width", "type", f"{base} cannot be sent in groups of {groups.bits} bits", hint
+            )
+            return None
         if groups is not None:
             parts = tuple(spec.parts or [(0, bits - 1)])
             if not _covered(parts, bits):
@@ -194,3 +208,5 @@ def _check_keys(spec: FieldSpec, plain: Plain, location: Location) -> None:
         )
     if plain.meaning == "bool" or isinstance(plain.meaning, Flags):
         location.reject(spec, ("range", "raw_range"), plain.what)
+    if isinstance(plain.meaning, Float):
+        location.reject(spec, ("raw_range",), plain.what, "use range")

@@ -11,7 +11,7 @@ from qlinkgen.schema.file_model import FieldSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
 from qlinkgen.schema.report import Reporter
-from qlinkgen.schema.scalars import FIXED, KEYWORDS, ScalarBuilder
+from qlinkgen.schema.scalars import FIXED, FLOAT, KEYWORDS, ScalarBuilder
 from qlinkgen.schema.source import Path
 
 _GROUPS = ("enums", "flags", "types")
@@ -43,7 +43,7 @@ class TypeBuilder:
         for group in _GROUPS:
             for name in getattr(self._file, group):
                 path = (group, name)
-                if name in KEYWORDS or INTEGER.match(name) or FIXED.match(name):
+                if name in KEYWORDS or any(each.match(name) for each in (INTEGER, FIXED, FLOAT)):
                     what = f"'{name}' is a built-in type"
                     self._report.error("type-clash", path, what, "rename it", of_key=True, needs=())
                 elif name in seen:
@@ -111,7 +111,12 @@ class TypeBuilder:
             self._note_unbounded(text, location)
             if not is_plain_item(spec, plain, text.base, location):
                 return None
-            item = self._scalars.build(_bare(spec, text.base), text.base, plain, location)
+            inherited = "default" not in location.written and not isinstance(spec.default, list)
+            item = self._scalars.build(
+                _item(spec, text.base, with_default=inherited), text.base, plain, location
+            )
+            if inherited:
+                spec = spec.model_copy(update={"default": None})
             return build_array(item, spec, text, self._payload_max, location) if item else None
         if spec.bits is None:
             return self._scalars.build(spec, text.base, plain, location)
@@ -175,6 +180,13 @@ class TypeBuilder:
             update={key: getattr(spec, key) for key in spec.model_fields_set if key != "type"}
         )
         return merged, TypeText(below.base, below.count if text.count is None else text.count)
+
+
+def _item(spec: FieldSpec, base: str, *, with_default: bool) -> FieldSpec:
+    """The keys of the items of an array, and perhaps the default of the named type of each."""
+    keys = ["byteorder", "groups", "parts", "scale", "offset", "unit", "range", "raw_range"]
+    keys += ["default"] if with_default else []
+    return FieldSpec(type=base).model_copy(update={key: getattr(spec, key) for key in keys})
 
 
 def _bare(spec: FieldSpec, base: str) -> FieldSpec:

@@ -12,6 +12,7 @@ from qlinkgen.model.message import Field, Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Length, NamedValue, Scalar, Scaling
 from qlinkgen.model.values import (
     BadValue,
+    Item,
     Json,
     check_items,
     from_json,
@@ -147,7 +148,7 @@ def test_json_has_names_where_there_are_any() -> None:
         ([10, 2], "x[0]: 10 is out of range 2..9"),
     ],
 )
-def test_items_are_counted_and_in_range(items: list[int], text: str) -> None:
+def test_items_are_counted_and_in_range(items: list[Item], text: str) -> None:
     _checked(_LIST, items, text)
 
 
@@ -156,7 +157,7 @@ def test_one_item_is_one_item() -> None:
     _checked(_value(Array(_U8, Length(0, 0))), [1], "x: 1 item; at most 0")
 
 
-def _checked(value: Value, items: list[int], text: str) -> None:
+def _checked(value: Value, items: list[Item], text: str) -> None:
     if not text:
         check_items(value, items)
         return

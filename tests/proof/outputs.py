@@ -66,8 +66,13 @@ class Output(typing.Protocol):
 
 def plain_numbers(fields: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of construct, with labels and flags as numbers, like other outputs."""
-    named = EnumIntegerString | EnumInteger | Container
-    return {name: int(value) if isinstance(value, named) else value for name, value in fields.items()}
+    return {name: _plain(value) for name, value in fields.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
+    return int(value) if isinstance(value, EnumIntegerString | EnumInteger | Container) else value
 
 
 class ConstructOutput:

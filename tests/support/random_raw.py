@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import random
 
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.types import Array, Blob, Flags, Scalar
+from qlinkgen.model.types import Array, Blob, Flags, Float, Scalar
 
 Raw = int | list[int] | bytes
 
@@ -61,6 +62,9 @@ def _random(value: Value, rng: random.Random) -> Raw:
 def _number(kind: Scalar, rng: random.Random) -> int:
     if kind.meaning == "bool":
         return rng.randrange(2)
+    if isinstance(kind.meaning, Float):
+        raw = rng.randint(*rng.choice(kind.meaning.legal))
+        return kind.default if math.isnan(kind.physical(raw)) else raw
     low, high = kind.minimum, kind.maximum
     number = rng.choice(
         (low, high, rng.randint(low, high), rng.randint(low, high), min(high, max(low, 0xA5)))

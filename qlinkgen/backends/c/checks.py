@@ -8,7 +8,7 @@ from typing import assert_never
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import literal, scalar_type, storage, unsigned, unsigned_type
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.expr import Clear, Limit, Within
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.payload import conditions, limits
 
 
@@ -27,7 +27,9 @@ def refused_when_received(number: Scalar, value: str) -> list[str]:
     return broken(conditions(number), value, held, number.bits, signed=number.signed)
 
 
-def broken(rules: Iterable[Limit], value: str, held: Within, bits: int, *, signed: bool = False) -> list[str]:
+def broken(
+    rules: Iterable[Condition], value: str, held: Within, bits: int, *, signed: bool = False
+) -> list[str]:
     """Conditions that hold if a rule is violated; the value has ``bits`` bits and is in ``held``."""
     terms: list[str] = []
     for rule in rules:
@@ -35,11 +37,19 @@ def broken(rules: Iterable[Limit], value: str, held: Within, bits: int, *, signe
             case Within():
                 terms += [f"{value} < {literal(rule.low, bits, signed=signed)}"] * (rule.low > held.low)
                 terms += [f"{value} > {literal(rule.high, bits, signed=signed)}"] * (rule.high < held.high)
+            case OneOf():
+                terms.append(_outside(rule, value, held, bits, signed=signed))
             case Clear():
                 terms.append(f"({value} & {unsigned(rule.mask, bits, hexadecimal=True)}) != 0U")
             case _:
                 assert_never(rule)
     return terms
+
+
+def _outside(rule: OneOf, value: str, held: Within, bits: int, *, signed: bool) -> str:
+    """The condition that holds outside of all ranges."""
+    terms = [condition(broken([each], value, held, bits, signed=signed)) for each in rule.ranges]
+    return terms[0] if len(terms) == 1 else " && ".join(f"({term})" for term in terms)
 
 
 def condition(terms: list[str]) -> str:

@@ -9,7 +9,7 @@ from qlinkgen.backends import c_text
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Enum, Flags, Length, Scalar
+from qlinkgen.model.types import Enum, Flags, Float, Length, Scalar
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -117,6 +117,9 @@ def _facts(scalar: Scalar) -> list[str]:
     match scalar.meaning:
         case Enum() | Flags():
             facts.append(f"{scalar.meaning.kind} {scalar.meaning.name}")
+        case Float():
+            facts.append(f"bits of an {scalar.meaning.name}")
+            facts += ["{}..{}".format(*scalar.meaning.bounds)] if scalar.meaning.bounds else []
         case "bool" | None:
             pass
         case _:

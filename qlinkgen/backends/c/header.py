@@ -23,6 +23,7 @@ from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake
+from qlinkgen.model.types import Float
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.payload import BytesStep
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -45,6 +46,7 @@ class HeadView:
     has_table: bool
     extended: list[int]
     nearest: list[Rounding]
+    floats: list[str]
     types: list[Kind]
 
 
@@ -216,9 +218,16 @@ class Header:
             has_bytes=bool(runs),
             has_table=isinstance(check, CrcView),
             extended=sorted(self._layouts.extended),
+            floats=self._floats(),
             nearest=nearest_helpers(self._types, self._plan.messages),
             types=list(self._types.named.values()),
         )
+
+    def _floats(self) -> list[str]:
+        """The types of floating-point numbers in use; f16 is converted by way of f32."""
+        meanings = (each.meaning for each in self._types.numbers())
+        found = {each.name for each in meanings if isinstance(each, Float)}
+        return sorted(found | ({"f32"} if "f16" in found else set()))
 
     def _byte_runs(self) -> list[BytesStep]:
         steps = (step for message in self._plan.messages for step in message.payload.steps)

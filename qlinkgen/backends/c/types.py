@@ -91,7 +91,7 @@ class Types:
         Fields may narrow a type; the most frequent variant becomes the C type.
         """
         found: dict[str, Counter[Scalar]] = {}
-        for number in self._numbers():
+        for number in self.numbers():
             if number.type_name and not isinstance(number.meaning, Enum | Flags) and number.meaning != "bool":
                 found.setdefault(number.type_name, Counter())[_kept(number)] += 1
         return {name: self._kind(name, counts.most_common(1)[0][0]) for name, counts in found.items()}
@@ -122,7 +122,8 @@ class Types:
         title = c_text.comment_line(f"Type {name}{': ' if title else ''}{title}")
         return Kind(f"{self._names.prefix}_{self._names.type_stem(name)}", title, number, named=True)
 
-    def _numbers(self) -> Iterator[Scalar]:
+    def numbers(self) -> Iterator[Scalar]:
+        """The numbers of all values."""
         for message in self._plan.messages:
             for each in message.payload.settable:
                 match each:

@@ -10,7 +10,7 @@ from typing import assert_never
 from qlinkgen.backends.conformance.sources import Header, JsonObject, Sources
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.naming import record_key
-from qlinkgen.model.values import Native, default_of, from_json, raw_from_native
+from qlinkgen.model.values import Native, default_of, from_json, raw_number
 from qlinkgen.plan import MessagePlan, Plan
 from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
 
@@ -173,14 +173,16 @@ def _value(header: Header, value: Value, step: ValueStep | Member | RunStep, ent
     match step:
         case ValueStep() | Member():
             raw = entry.get("raw", {}).get(value.name)
-            raw = raw_from_native(value, native) if raw is None else raw
+            raw = raw_number(value.name, step.number, native) if raw is None else raw
             return number_bytes(raw, header.width(step.number))
         case BytesStep():
             assert isinstance(native, bytes | str)
             items = native.encode("ascii") if isinstance(native, str) else native
         case ItemsStep():
             assert isinstance(native, list)
-            items = b"".join(number_bytes(item, _item(header, step)) for item in native)
+            raws = entry.get("raw", {}).get(value.name)
+            raws = [raw_number(value.name, step.number, item) for item in native] if raws is None else raws
+            items = b"".join(number_bytes(item, _item(header, step)) for item in raws)
         case _:
             assert_never(step)
     counted = _counted(header, step)

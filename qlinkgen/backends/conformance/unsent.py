@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from qlinkgen.backends.conformance.rows import Right, number_bytes, value_sizes
 from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.model.message import Message
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Float, Scalar
 from qlinkgen.plan import MessagePlan
 from qlinkgen.plan.payload import Member, ValueStep
 
@@ -36,8 +37,11 @@ def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsen
 
 
 def _outside(scalar: Scalar, size: int) -> Iterator[int]:
-    """The nearest numbers out of range that the struct can hold; none for a bool."""
+    """The nearest numbers out of range that the struct can hold; none for a bool, NaN for a float."""
     if scalar.meaning == "bool":
+        return
+    if isinstance(scalar.meaning, Float):
+        yield from [scalar.meaning.raw(math.nan)] if scalar.meaning.bounds else []
         return
     least, most = (
         (-(1 << 8 * size - 1), (1 << 8 * size - 1) - 1) if scalar.signed else (0, (1 << 8 * size) - 1)

@@ -58,6 +58,7 @@ def _head(protocol: Protocol) -> str:
 
 def _imports(everything: tuple[Definition, ...]) -> str:
     names = {name for each in everything for name in used(each.node)} - {each.name for each in everything}
+    names.discard("float")
     by_origin: dict[str, list[str]] = {}
     for name in sorted(names, key=_order):
         by_origin.setdefault(_ORIGINS.get(name, "construct"), []).append(name)

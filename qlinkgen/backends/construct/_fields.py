@@ -144,15 +144,15 @@ def _unsigned(value: object, bits: int, signed: bool, path: str) -> int:
 
 
 class Ranged(Adapter):
-    """An integer from minimum to maximum."""
+    """A number from minimum to maximum."""
 
-    def __init__(self, subcon: Construct, minimum: int, maximum: int) -> None:
+    def __init__(self, subcon: Construct, minimum: float, maximum: float) -> None:
         super().__init__(subcon)
         self.minimum = minimum
         self.maximum = maximum
 
-    def _decode(self, obj: object, context: Container, path: str) -> int:
-        if not isinstance(obj, int) or not self.minimum <= obj <= self.maximum:
+    def _decode(self, obj: object, context: Container, path: str) -> float:
+        if not isinstance(obj, int | float) or not self.minimum <= obj <= self.maximum:
             raise ValidationError(
                 f"{obj!r} is not in {self.minimum}..{self.maximum}", path=path
             )

@@ -46,7 +46,7 @@ class Live:
 def live(protocol: Protocol, options: Options | None = None) -> Live:
     """The structures of a protocol."""
     modules = ("construct", f"{__package__}._fields", f"{__package__}._frames")
-    names: dict[str, Value] = {"Decimal": Decimal}
+    names: dict[str, Value] = {"Decimal": Decimal, "float": float}
     for module in modules:
         names |= vars(importlib.import_module(module))
     return Live(evaluate(definitions(plan_of(protocol, options)), names))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import keyword
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
@@ -11,9 +12,9 @@ from typing import assert_never
 from qlinkgen.backends.construct.tree import Call, Definition, Named, Node, Number, Ref, Sequence, hexadecimal
 from qlinkgen.model import naming
 from qlinkgen.model.integer import Integer
-from qlinkgen.model.types import Enum, Flags, Scalar, byte_chunks
+from qlinkgen.model.types import Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
-from qlinkgen.plan.expr import Clear, Limit, Within
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -43,6 +44,13 @@ def integer(kind: Integer, *, signed: bool | None = None) -> Node:
         return Ref(f"Int{kind.bits}{'s' if signed else 'u'}{kind.byteorder[0]}")
     flags = {"signed": signed, "swapped": kind.byteorder == "little"}
     return Call("BytesInteger", (kind.size,), tuple((key, True) for key, value in flags.items() if value))
+
+
+def _raw(number: Scalar, kind: Integer) -> Node:
+    """The construct of a number before conditions and conversions."""
+    if isinstance(number.meaning, Float) and kind.byteorder is not None:
+        return Ref(f"Float{kind.bits}{kind.byteorder[0]}")
+    return integer(kind)
 
 
 class Names:
@@ -112,9 +120,9 @@ class Types:
             for step in message.payload.steps:
                 match step:
                     case ValueStep():
-                        yield step.number, integer(step.integer)
+                        yield step.number, _raw(step.number, step.integer)
                     case ItemsStep():
-                        yield step.number, integer(step.item)
+                        yield step.number, _raw(step.number, step.item)
                     case BitsStep():
                         yield from ((each.number, _bits(each)) for each in step.members)
                     case ConstantStep() | ReservedStep() | CountStep() | BytesStep():
@@ -127,7 +135,7 @@ class Types:
         node, meaning = _converted(number, raw), number.meaning
         same = self._usual.get(name := _name(number)) == node
         match meaning:
-            case "bool" | None:
+            case Float() | "bool" | None:
                 return Ref(self._names[name]) if same else node
             case Enum():
                 return self._labels(name, node, same=same)
@@ -163,7 +171,9 @@ class _Field:
     def of(self, step: Step) -> Named:
         match step:
             case ValueStep():
-                return self._named(step, self._value(step.number, integer(step.integer)), step.number.unit)
+                return self._named(
+                    step, self._value(step.number, _raw(step.number, step.integer)), step.number.unit
+                )
             case ConstantStep():
                 return self._named(step, Call("Const", (step.value, integer(step.integer))))
             case ReservedStep():
@@ -181,8 +191,9 @@ class _Field:
                 )
                 return self._run(step, kind, (), default)
             case ItemsStep():
-                item = self._types.of(step.number, integer(step.item))
-                return self._run(step, "ArrayField", (item,), Sequence(step.default))
+                item = self._types.of(step.number, _raw(step.number, step.item))
+                items = Sequence(tuple(_shown(step.number, each) for each in step.default))
+                return self._run(step, "ArrayField", (item,), items)
             case _:
                 assert_never(step)
 
@@ -200,10 +211,16 @@ class _Field:
         return Named(member.name, self._value(member.number, bits), self._inner[member.name])
 
     def _value(self, number: Scalar, raw: Node) -> Node:
-        default = native_from_raw(number, number.default)
-        assert isinstance(default, int | float | Decimal)
-        shown = _decimal(default) if isinstance(default, Decimal) else default
-        return Call("Default", (self._types.of(number, raw), shown))
+        return Call("Default", (self._types.of(number, raw), _shown(number, number.default)))
+
+
+def _shown(number: Scalar, raw: int) -> Node:
+    """The native value of a raw number."""
+    value = native_from_raw(number, raw)
+    if isinstance(value, Decimal):
+        return _decimal(value)
+    finite = not isinstance(value, float) or math.isfinite(value)
+    return value if finite else Call("float", (str(value),))
 
 
 def _decimal(number: Decimal) -> Call:
@@ -217,7 +234,7 @@ def _name(number: Scalar) -> str:
     match meaning:
         case Enum() | Flags():
             return meaning.name
-        case "bool" | None:
+        case Float() | "bool" | None:
             return number.type_name
         case _:
             assert_never(meaning)
@@ -231,6 +248,8 @@ def _bits(member: Member) -> Node:
 def _converted(number: Scalar, raw: Node) -> Node:
     """An integer with its conditions and its conversion, without labels."""
     node = raw
+    if isinstance(number.meaning, Float):
+        return Call("Ranged", (raw, *number.meaning.bounds)) if number.meaning.bounds else raw
     for each in conditions(number):
         node = _limited(node, each)
     if number.meaning == "bool":
@@ -242,12 +261,14 @@ def _converted(number: Scalar, raw: Node) -> Node:
     return node
 
 
-def _limited(node: Node, limit: Limit) -> Node:
+def _limited(node: Node, limit: Condition) -> Node:
     match limit:
         case Within():
             return Call("Ranged", (node, limit.low, limit.high))
         case Clear():
             return Call("Clear", (node, hexadecimal(limit.mask)))
+        case OneOf():
+            raise AssertionError("only floating-point numbers have several ranges")
         case _:
             assert_never(limit)
 

@@ -27,10 +27,15 @@ A codec needs only the standard library and `_support` in this folder.
 
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The module of a protocol and the files of its package, by path."""
-    support = importlib.resources.files(__package__).joinpath("_support.py").read_text("utf-8")
+    text = render(plan_of(protocol, options))
+    support = ["_support.py", *(["_rules.py"] if "\nfrom ._rules import" in text else [])]
+    folder = importlib.resources.files(__package__)
     return {
-        f"{options.package}/{file_stem(protocol.name)}.py": render(plan_of(protocol, options)),
-        f"{options.package}/_support.py": copied("_support.py", support),
+        f"{options.package}/{file_stem(protocol.name)}.py": text,
+        **{
+            f"{options.package}/{name}": copied(name, folder.joinpath(name).read_text("utf-8"))
+            for name in support
+        },
         **package(options),
     }
 

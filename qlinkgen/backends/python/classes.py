@@ -226,7 +226,7 @@ class ClassBuilder:
         arguments = [f"{address}: int{default}"] if address else []
         arguments += [values.argument(each, place) for each in message.payload.settable]
         body = [f"self.{address} = {address}"] if address else []
-        body += [values.assignment(each) for each in message.payload.settable]
+        body += [values.assignment(each, place) for each in message.payload.settable]
         taken = ["self", "*", *arguments] if arguments else ["self"]
         return [*wrapped("def __init__(", taken, ") -> None:", 4), *indented(body or ["pass"])]
 

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.backends.python import integers, values
+from qlinkgen.backends.python import floats, integers, values
 from qlinkgen.backends.python.layout import WIDTH, indented, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer
-from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.model.types import Enum, Flags, Float, Scalar
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -341,6 +341,9 @@ class Decoder:
 
     def _value(self, step: ValueStep, at: Size) -> None:
         raw, target = f"{step.name}_raw", f"message.{attribute(step.name)}"
+        if isinstance(step.number.meaning, Float):
+            self._float(step, step.number.meaning, target, at)
+            return
         if (
             _is_plain(step.number)
             and not step.conditions
@@ -353,6 +356,19 @@ class Decoder:
         for rule in step.conditions:
             self._refuse(integers.broken(rule, raw), step.name, raw, _offset(step))
         self._values += assigned(target, step.number, raw, self.scales.get(step.name, ""), self.place)
+
+    def _float(self, step: ValueStep, kind: Float, target: str, at: Size) -> None:
+        row, raw, legal = self._row(at), f"{step.name}_raw", floats.holds(kind, f"{step.name}_raw")
+        number = raw if legal else target
+        code = floats.letter(step.number, step.integer, self.place.byteorder)
+        row.codes.append(code or f"{step.integer.size}s")
+        row.targets.append(number if code else raw)
+        if not code:
+            taken = f'{self.place.use("unpack")}("{floats.format_of(kind, step.integer)}", {raw})'
+            self._values.append(f"({number},) = {taken}")
+        if legal:
+            self._refuse(f"not {legal[0]}", step.name, raw, _offset(step))
+            self._values.append(f"{target} = {raw}")
 
     def _count_step(self, step: CountStep, at: Size) -> None:
         """A count has been read with the sizes, except in a payload with a single struct."""
@@ -416,7 +432,8 @@ class Decoder:
         self._open = False
 
     def _items(self, step: ItemsStep, at: Size) -> None:
-        target, code = f"message.{attribute(step.name)}", integers.letter(step.item, self.place.byteorder)
+        target, kind = f"message.{attribute(step.name)}", step.number.meaning
+        code = floats.letter(step.number, step.item, self.place.byteorder)
         if code and step.fixed:
             row = self._row(at, starred=True)
             row.codes.append(f"{step.length.maximum}{code}")
@@ -425,15 +442,18 @@ class Decoder:
             row = self._row(at, starred=True)
             row.codes.append(f"{{n}}{code}")
             row.targets.append(f"*{target}")
-        elif code:
-            text = f'f"{self.place.prefix}{{{step.name}_count}}{code}"'
+        elif code or isinstance(kind, Float):
+            count = str(step.length.maximum) if step.fixed else f"{{{step.name}_count}}"
+            text = floats.format_of(kind, step.item, count) if isinstance(kind, Float) else ""
+            text = f'{"" if step.fixed else "f"}"{text or f"{self.place.prefix}{count}{code}"}"'
             taken = f"{self.place.use('unpack_from')}({text}, {self.place.data}, {self._from(at)})"
             self._slices += [*self._start(at), f"{target} = list({taken})"]
             self._open = False
         else:
             self._odd_items(step, target, at)
-        for rule in step.conditions:
-            test = f"not all({integers.holds(rule, 'item')} for item in {target})"
+        rules = [integers.holds(rule, "item") for rule in step.conditions]
+        for rule in floats.holds(kind, "item") if isinstance(kind, Float) else rules:
+            test = f"not all({rule} for item in {target})"
             self._refuse(test, step.name, target, _offset(step))
 
     def _odd_items(self, step: ItemsStep, target: str, at: Size) -> None:
@@ -469,7 +489,7 @@ def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) ->
             return wrapped(f"{target} = {members}", [raw, raw], ")", _INDENT)
         case "bool":
             return [f"{target} = {raw} == 1"]
-        case Flags() | None:
+        case Flags() | Float() | None:
             pass
         case _:
             assert_never(meaning)
@@ -489,7 +509,7 @@ def _is_plain(number: Scalar) -> bool:
     match number.meaning:
         case Flags() | None:
             return number.scaling is None
-        case Enum() | "bool":
+        case Enum() | Float() | "bool":
             return False
         case _:
             assert_never(number.meaning)

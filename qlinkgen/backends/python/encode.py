@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.backends.python import integers
+from qlinkgen.backends.python import floats, integers
 from qlinkgen.backends.python.layout import (
     literal,
     wrapped,
@@ -14,7 +14,7 @@ from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer
-from qlinkgen.model.types import Scalar
+from qlinkgen.model.types import Float, Scalar
 from qlinkgen.plan.expr import Condition, Within
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -197,7 +197,9 @@ class Encoder:
 
     def _value(self, step: ValueStep) -> None:
         source, plain = f"self.{attribute(step.name)}", integers.letter(step.integer, self.place.byteorder)
-        if step.number.scaling is not None:
+        if isinstance(step.number.meaning, Float):
+            self._float(step, step.number.meaning, source)
+        elif step.number.scaling is not None:
             self._lines.append(f"{step.name}_raw = {self.scales[step.name]}.raw({source})")
             self._integer(step.integer, f"{step.name}_raw")
         elif plain:  # struct checks type and range
@@ -206,6 +208,15 @@ class Encoder:
         else:
             self._indexed(step.name, step.number)
             self._integer(step.integer, f"{step.name}_raw")
+
+    def _float(self, step: ValueStep, kind: Float, source: str) -> None:
+        """Add a number, which struct converts and checks."""
+        self._terms += floats.holds(kind, source)
+        if code := floats.letter(step.number, step.integer, self.place.byteorder):
+            self._add(code, source)
+        else:
+            form = floats.format_of(kind, step.integer)
+            self._add(f"{step.integer.size}s", f'{self.place.use("pack")}("{form}", {source})')
 
     def _indexed(self, name: str, number: Scalar) -> None:
         """Assign a value to a local as an int, and check its range."""
@@ -241,10 +252,21 @@ class Encoder:
             self._pieces.append(f"{step.name}_raw")
 
     def _items(self, step: ItemsStep) -> None:
-        source, code = f"self.{attribute(step.name)}", integers.letter(step.item, self.place.byteorder)
+        source, kind = f"self.{attribute(step.name)}", step.number.meaning
+        code = floats.letter(step.number, step.item, self.place.byteorder)
         if step.fixed:
             self._terms.append(f"len({source}) == {step.length.maximum}")
-        if not code or step.conditions:
+        if isinstance(kind, Float):
+            self._terms += [f"all({legal} for item in {source})" for legal in floats.holds(kind, "item")]
+            if not code:
+                count = str(step.length.maximum) if step.fixed else f"{{{step.name}_count}}"
+                text = f'{"" if step.fixed else "f"}"{floats.format_of(kind, step.item, count)}"'
+                data = f"{self.place.use('pack')}({text}, *{source})"
+                self._add(
+                    f"{step.length.maximum * step.item_size}s", data
+                ) if step.fixed else self._pieces.append(data)
+                return
+        elif not code or step.conditions:
             self._odd_items(step, source)
             return
         if step.fixed:

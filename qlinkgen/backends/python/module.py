@@ -26,8 +26,9 @@ from qlinkgen.plan.tree import Plan
 #: Names of the support module that every module re-exports.
 _PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
 #: Names of struct and of other modules; all others are imported from the support module.
-_STRUCT = ("Struct", "pack", "unpack_from")
-_ELSEWHERE = ("Decimal", "index", *_STRUCT)
+_STRUCT = ("Struct", "pack", "unpack", "unpack_from")
+_RULES = ("FloatRule", "ListRule")
+_ELSEWHERE = ("Decimal", "index", *_STRUCT, *_RULES)
 
 
 def render(plan: Plan) -> str:
@@ -59,6 +60,7 @@ class Imports:
     struct_error: bool
     decimal: bool
     index: bool
+    rules: Sequence[str]
     support: Sequence[str]
     callable: bool
     typing: Sequence[str]
@@ -190,6 +192,7 @@ class Module:
             struct_error=True,
             decimal="Decimal" in used,
             index="index" in used,
+            rules=[name for name in _RULES if name in used],
             support=sorted(used - set(_ELSEWHERE), key=imported),
             callable=isinstance(view, UniqueView),
             typing=sorted(typing),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from qlinkgen.backends.python.integers import letter
+from qlinkgen.backends.python.floats import letter
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.types import Length
 from qlinkgen.plan.payload import ItemsStep, PayloadPlan
@@ -34,7 +34,7 @@ def tabled(payload: PayloadPlan, byteorder: ByteOrder) -> ItemsStep | None:
     if len(payload.runs) != 1 or len(arrays) != 1 or payload.runs[0] is not arrays[0]:
         return None
     only = arrays[0]
-    return only if letter(only.item, byteorder) and only.length.maximum <= MANY_ITEMS else None
+    return only if letter(only.number, only.item, byteorder) and only.length.maximum <= MANY_ITEMS else None
 
 
 def counts_of(length: Length) -> str:

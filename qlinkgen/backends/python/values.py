@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from decimal import Decimal
 from typing import assert_never
@@ -11,7 +12,7 @@ from qlinkgen.backends.python.layout import Call, literal
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.message import Value
-from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.model.types import Enum, Flags, Float, Scalar
 from qlinkgen.model.values import Native, native_from_raw
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -45,7 +46,7 @@ def annotation(each: Settable, place: Place) -> str:
     """Type of the attribute."""
     match each:
         case ItemsStep():
-            return "list[int]"
+            return f"list[{_number_type(each.number, place)}]"
         case BytesStep():
             return "str" if each.text else "bytes"
         case ValueStep() | Member():
@@ -60,7 +61,7 @@ def _number_type(number: Scalar, place: Place) -> str:
             return f"{place.classes[enum.name]} | int"
         case "bool":
             return "bool"
-        case Flags() | None:
+        case Flags() | Float() | None:
             return place.use("Decimal") if number.number == "decimal" else number.number
         case _:
             assert_never(number.meaning)
@@ -76,11 +77,11 @@ def argument(each: Settable, place: Place) -> str:
     return f"{name}: {kind} = {default(each, place)}"
 
 
-def assignment(each: Settable) -> str:
+def assignment(each: Settable, place: Place) -> str:
     """The statement that stores an argument; each message gets a new list as a default."""
     name = attribute(each.name)
     if isinstance(each, ItemsStep) and not each.required:
-        return f"self.{name} = {list(each.default)} if {name} is None else {name}"
+        return f"self.{name} = {default(each, place)} if {name} is None else {name}"
     return f"self.{name} = {name}"
 
 
@@ -93,7 +94,7 @@ def default(each: Settable, place: Place) -> str:
     """Expression for the default."""
     match each:
         case ItemsStep():
-            return str(list(each.default))
+            return f"[{', '.join(_number(each.number, raw, place) for raw in each.default)}]"
         case BytesStep() if each.text and place.texts:
             return python_text.literal(each.default.decode("ascii"))
         case BytesStep() if each.text:
@@ -101,20 +102,21 @@ def default(each: Settable, place: Place) -> str:
         case BytesStep():
             return literal(each.default)
         case ValueStep() | Member():
-            return _default_number(each.number, place)
+            return _number(each.number, each.number.default, place)
         case _:
             assert_never(each)
 
 
-def _default_number(number: Scalar, place: Place) -> str:
+def _number(number: Scalar, raw: int, place: Place) -> str:
+    """Expression for the native value of a raw number."""
     match number.meaning:
         case Enum() as enum:
-            member = enum.name_of(number.default)
-            return f"{place.classes[enum.name]}.{member.upper()}" if member else str(number.default)
+            member = enum.name_of(raw)
+            return f"{place.classes[enum.name]}.{member.upper()}" if member else str(raw)
         case Flags():
-            return f"0x{number.default:X}" if number.default else "0"
-        case "bool" | None:
-            return _native(native_from_raw(number, number.default))
+            return f"0x{raw:X}" if raw else "0"
+        case Float() | "bool" | None:
+            return _native(native_from_raw(number, raw))
         case _:
             assert_never(number.meaning)
 
@@ -123,6 +125,8 @@ def _native(value: Native) -> str:
     if isinstance(value, Decimal):
         whole = value == value.to_integral_value()
         return f"Decimal({value})" if whole else f'Decimal("{value}")'
+    if isinstance(value, float) and not math.isfinite(value):
+        return f'float("{value}")'
     return repr(value)
 
 
@@ -171,6 +175,9 @@ def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
             return [_rule(place, kind, name, step.length.minimum, step.length.maximum)]
         case ItemsStep():
             length, item = step.length, step.number
+            if isinstance(item.meaning, Float):
+                inner = _number_rule(step.name, item, place, scales)
+                return [Call(place.use("ListRule"), [str(length.minimum), str(length.maximum), inner.flat])]
             bounds = (length.minimum, length.maximum, item.minimum, item.maximum)
             return [_rule(place, "ArrayRule", name, *bounds, unit=item.unit)]
         case ValueStep():
@@ -190,6 +197,8 @@ def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, 
     match number.meaning:
         case Flags(reserved_zero=True) as flags:
             return _rule(place, "MaskRule", name, f"0x{flags.mask:X}")
+        case Float() as kind:
+            return _rule(place, "FloatRule", name, kind.bits, *(kind.bounds or ()), unit=number.unit)
         case Flags() | Enum() | "bool" | None:
             return _rule(place, "IntRule", name, number.minimum, number.maximum, unit=number.unit)
         case _:
@@ -218,6 +227,8 @@ def _facts(each: Settable, place: Place) -> str:
             return f"{span(each.length.minimum, each.length.maximum)} {kind}"
         case ItemsStep():
             item, items = each.number, span(each.length.minimum, each.length.maximum)
+            if isinstance(item.meaning, Float):
+                return f"{items} items, each {_number_facts(item, place)}"
             return f"{items} items, each {item.minimum}..{item.maximum}{_of(item)}"
         case ValueStep() | Member():
             return _number_facts(each.number, place)
@@ -231,11 +242,13 @@ def _number_facts(number: Scalar, place: Place) -> str:
             return f"masks of {place.classes[flags.name]}"
         case Enum() | "bool":
             return ""
-        case None:
+        case Float() as kind if kind.bounds is None:
+            return f"{kind.name}{_of(number)}"
+        case Float() | None:
             pass
         case _:
             assert_never(number.meaning)
-    low, high = sorted((number.physical(number.minimum), number.physical(number.maximum)))
+    low, high = number.span
     step = f" in steps of {number.scaling.scale}" if number.scaling else ""
     return f"{low}..{high}{_of(number)}{step}"
 

@@ -101,9 +101,17 @@ def _shown(good: Good) -> Mapping[str, Json]:
     for value, step in zip(good.message.message.values, good.message.payload.settable, strict=True):
         number = good.values[value.name]
         shown = fields[value.name] = to_json(value, _native(step, number))
-        if isinstance(number, int) and (type(shown) is not int or shown != number):
+        if _differs(shown, number):
             raw[value.name] = number
     return {"fields": fields, "raw": raw} if raw else {"fields": fields}
+
+
+def _differs(shown: Json, raw: Raw) -> bool:
+    """Whether the JSON value of a number, or of an item of a list, is not its raw integer."""
+    if isinstance(raw, list):
+        assert isinstance(shown, list)
+        return any(map(_differs, shown, raw))
+    return isinstance(raw, int) and (type(shown) is not int or shown != raw)
 
 
 def _native(step: ValueStep | Member | RunStep, raw: Raw) -> Native:
@@ -115,8 +123,12 @@ def _native(step: ValueStep | Member | RunStep, raw: Raw) -> Native:
         case BytesStep(text=True):
             assert isinstance(raw, bytes)
             return raw.decode("ascii")
-        case BytesStep() | ItemsStep():
+        case BytesStep():
+            assert isinstance(raw, bytes)
             return raw
+        case ItemsStep():
+            assert isinstance(raw, list)
+            return [native_from_raw(step.number, item) for item in raw]
         case _:
             assert_never(step)
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import assert_never
 
 from qlinkgen.model.integer import Integer, unpack_chunks
-from qlinkgen.model.types import Length, Scalar
+from qlinkgen.model.types import Float, Length, Scalar
 from qlinkgen.plan.content import Raw, broken, default_of
 from qlinkgen.plan.expr import Clear
 from qlinkgen.plan.payload import (
@@ -94,8 +95,17 @@ class Rule:
         return number
 
 
+def _end(scalar: Scalar, which: int) -> int:
+    """The raw minimum or maximum."""
+    if not isinstance(scalar.meaning, Float):
+        return (scalar.minimum, scalar.maximum)[which]
+    return scalar.meaning.raw(float(scalar.span[which]))
+
+
 def _fitting(scalar: Scalar, pattern: int) -> int:
     """The pattern in as many low bytes as the range allows; the default if it does not fit at all."""
+    if isinstance(scalar.meaning, Float):
+        return pattern if _is_legal(scalar.meaning, pattern) else scalar.default
     for bits in range(scalar.bits, 0, -8):
         number = scalar.integer.signed_value(pattern & (1 << bits) - 1)
         if scalar.minimum <= number <= scalar.maximum:
@@ -108,15 +118,29 @@ def filled(pattern: bytes) -> Rule:
     return Rule(_fitting, lambda length: length.maximum, lambda index: pattern[index % len(pattern)], pattern)
 
 
-MINIMUM = Rule(lambda scalar, _: scalar.minimum, lambda length: length.minimum, lambda _: 0x00)
-MAXIMUM = Rule(lambda scalar, _: scalar.maximum, lambda length: length.maximum, lambda _: 0xFF)
+MINIMUM = Rule(lambda scalar, _: _end(scalar, 0), lambda length: length.minimum, lambda _: 0x00)
+MAXIMUM = Rule(lambda scalar, _: _end(scalar, 1), lambda length: length.maximum, lambda _: 0xFF)
 A5 = filled(b"\xa5")
+
+
+def _random(scalar: Scalar, chance: Chance) -> int:
+    if not isinstance(scalar.meaning, Float):
+        return chance.between(scalar.minimum, scalar.maximum)
+    ranges = scalar.meaning.legal
+    pattern = chance.between(*ranges[chance.between(0, len(ranges) - 1)])
+    return pattern if _is_legal(scalar.meaning, pattern) else scalar.default
+
+
+def _is_legal(kind: Float, pattern: int) -> bool:
+    """Whether a pattern is legal and every target preserves its bits, which it does not for a NaN."""
+    number = kind.value(pattern)
+    return kind.allows(number) and not math.isnan(number)
 
 
 def random(chance: Chance) -> Rule:
     """Random legal values."""
     return Rule(
-        lambda scalar, _: chance.between(scalar.minimum, scalar.maximum),
+        lambda scalar, _: _random(scalar, chance),
         lambda length: chance.between(length.minimum, length.maximum),
         lambda _: chance.between(0, 0xFF),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Sequence
 
@@ -40,11 +41,25 @@ def _run(kind: Run, rng: random.Random, mark: int) -> Raw:
 
 
 def _number(kind: Number, rng: random.Random, mark: int) -> int:
+    if kind.real:
+        return _real(kind, rng)
     low, high = kind.low, kind.high
     number = rng.choice(
         (low, high, rng.randint(low, high), rng.randint(low, high), min(high, max(low, mark)))
     )
     return number & ~kind.forbidden if kind.forbidden else number
+
+
+def _real(kind: Number, rng: random.Random) -> int:
+    """The bits of a legal floating-point number."""
+    raws = [
+        kind.pattern(each)
+        for each in (0.0, -0.0, 1.0, 0.1, -2.5, math.inf, -math.inf, math.nan, *(kind.bounds or ()))
+    ]
+    raws += [1, kind.pattern(math.inf) - 1, kind.default, *(rng.randint(0, kind.high) for _ in range(4))]
+    low, high = kind.bounds or (-math.inf, math.inf)
+    legal = [raw for raw in map(kind.told, raws) if kind.bounds is None or low <= kind.number(raw) <= high]
+    return rng.choice(legal)
 
 
 def address(message: Message, rng: random.Random) -> int:

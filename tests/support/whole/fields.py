@@ -188,7 +188,8 @@ class FieldMaker:
         rng = self.rng
         made: Callable[[], tuple[Any, int]] = rng.choice(
             (self._plain, self._plain, self._plain, self._ranged, self._truth, self._of_enum, self._of_flags,
-             self._scaled, self._fixed_point, self._constant, self._reserved, self._grouped, self._of_named)
+             self._scaled, self._fixed_point, self._constant, self._reserved, self._grouped, self._of_named,
+             self._real)
         )  # fmt: skip
         return made()
 
@@ -270,6 +271,25 @@ class FieldMaker:
         kind, bits = self.rng.choice(kinds)
         return kind, self._bytes_of(f"u{bits}", {})
 
+    def _real(self) -> tuple[Any, int]:
+        """A floating-point number."""
+        rng, kind = self.rng, self.rng.choice(("f16", "f32", "f32", "f64"))
+        if self.shape.groups:
+            return self._plain()
+        size = int(kind[1:]) // 8
+        spec: Doc = {"type": kind}
+        if rng.random() < 0.3:
+            spec["byteorder"] = rng.choice(("big", "little"))
+        if rng.random() < 0.3:
+            low, high = rng.choice(
+                ((-1, 1), (0, 100), ("-0.1", "0.1"), (-5, 0), (1, "2.5"), (-9, "-1/3"), (2, 2))
+            )
+            return spec | {"range": f"{low}..{high}"}, size
+        if rng.random() < 0.5:
+            key = rng.choice(("default", "default", "const"))
+            spec[key] = rng.choice((0, 1, -2.5, 0.1, "1/3", "-inf", "1e4"))
+        return spec, size
+
     def _constant(self) -> tuple[Any, int]:
         kind, order, size = self._integer()
         low, high = _limits(kind)
@@ -302,8 +322,11 @@ class FieldMaker:
         return name, self._packet_size(name)
 
     def _item(self) -> tuple[str, Doc, int]:
-        kind, order, size = self._integer()
-        return kind, order, size
+        if not self.shape.groups and self.rng.random() < 0.2:
+            kind = self.rng.choice(("f16", "f32", "f64"))
+            order: Doc = {"byteorder": self.rng.choice(("big", "little"))} if self.rng.random() < 0.3 else {}
+            return kind, order, int(kind[1:]) // 8
+        return self._integer()
 
     def _fixed_run(self) -> tuple[Any, int]:
         rng, number = self.rng, self.rng.choice((1, 2, 3, 4, 9))

@@ -84,9 +84,13 @@ class Target:
 def native(kind: Number | Run, raw: Raw) -> Any:
     """An int, bool, float or Decimal in the unit; bytes, text, a list."""
     if isinstance(kind, Run):
+        if kind.item and isinstance(raw, list):
+            return [native(kind.item, each) for each in raw]
         return bytes(raw).decode("ascii") if kind.text else raw
     assert isinstance(raw, int)
     exact = kind.native(raw)
+    if isinstance(exact, float):
+        return exact
     if kind.scale is None or not isinstance(exact, Fraction):
         return exact
     if kind.scale.denominator == kind.offset.denominator == 1:
@@ -101,7 +105,17 @@ def native(kind: Number | Run, raw: Raw) -> Any:
 def raw_of(kind: Number | Run, found: Any) -> Raw:
     """The integer that represents a value. Raises TypeError or ValueError for a value without one."""
     if isinstance(kind, Run):
-        return list(found) if kind.item else found.encode("ascii") if kind.text else bytes(found)
+        if kind.item:
+            return [_number_of(kind.item, each) for each in found]
+        return found.encode("ascii") if kind.text else bytes(found)
+    return _number_of(kind, found)
+
+
+def _number_of(kind: Number, found: Any) -> int:
+    if kind.real:
+        if not isinstance(found, float):
+            raise TypeError(f"{found!r} is of a wrong type")
+        return kind.pattern(found)
     if kind.scale is None:
         if isinstance(found, bool) != kind.truth:
             raise TypeError(f"{found!r} is of a wrong type")
@@ -110,6 +124,14 @@ def raw_of(kind: Number | Run, found: Any) -> Raw:
     if found != native(kind, raw):
         raise ValueError(f"{found!r} is not exact")
     return raw
+
+
+def told(kind: Number | Run, raw: Raw) -> Raw:
+    """A raw value without what a NaN does not preserve."""
+    if isinstance(raw, list):
+        assert isinstance(kind, Run)
+        return [kind.item.told(each) if kind.item else each for each in raw]
+    return kind.told(raw) if isinstance(kind, Number) and isinstance(raw, int) else raw
 
 
 class PythonTarget(Target):
@@ -207,7 +229,8 @@ class InterpreterTarget(Target):
     def _seen(self, decoded: Decoded) -> Seen:
         found = decoded.values
         shape = self.reference.by_name[decoded.message.name]
-        return Seen(shape.name, decoded.address, {name: found[name] for name, _ in shape.values()})
+        values = {name: told(kind, found[name]) for name, kind in shape.values()}
+        return Seen(shape.name, decoded.address, values)
 
     def events(self, direction: Direction, stream: bytes, asked: Sequence[bytes] = ()) -> list[Heard]:
         """The events of a stream."""
@@ -313,7 +336,10 @@ class CTarget(Target):
         """See Target."""
         context = (request.hex(),) if request else ()
         address, *found = self._ask("decode", message.name, wire.hex() or "-", *context)
-        values = {name: _raw(kind, word) for (name, kind), word in zip(message.values(), found, strict=True)}
+        values = {
+            name: told(kind, _raw(kind, word))
+            for (name, kind), word in zip(message.values(), found, strict=True)
+        }
         return Seen(message.name, None if address == "-" else int(address), values)
 
     def events(self, direction: Direction, stream: bytes) -> list[Heard]:

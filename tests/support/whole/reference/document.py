@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -13,6 +15,9 @@ import yaml
 Doc = dict[str, Any]
 Direction = Literal["request", "response", "message"]
 Role = Literal["value", "constant", "reserved", "count"]
+
+
+_REALS = {16: ">e", 32: ">f", 64: ">d"}
 
 
 class _Loader(yaml.CSafeLoader):
@@ -46,11 +51,30 @@ class Number:
     truth: bool = False
     #: Bits that must be zero.
     forbidden: int = 0
+    #: The integer is the bits of a floating-point number, perhaps with bounds.
+    real: bool = False
+    bounds: tuple[float, float] | None = None
 
-    def native(self, raw: int) -> Fraction | int | bool:
+    def number(self, raw: int) -> float:
+        """The floating-point number of bits."""
+        return float(struct.unpack(_REALS[self.bits], raw.to_bytes(self.bits // 8, "big"))[0])
+
+    def pattern(self, number: float) -> int:
+        """The bits of a floating-point number; of every NaN the same."""
+        return int.from_bytes(
+            struct.pack(_REALS[self.bits], math.nan if math.isnan(number) else number), "big"
+        )
+
+    def told(self, raw: int) -> int:
+        """A received integer without what a NaN does not preserve."""
+        return self.pattern(math.nan) if self.real and math.isnan(self.number(raw)) else raw
+
+    def native(self, raw: int) -> Fraction | int | bool | float:
         """The value in the unit, exactly."""
         if self.truth:
             return bool(raw)
+        if self.real:
+            return self.number(raw)
         return raw if self.scale is None else raw * self.scale + self.offset
 
 
@@ -259,7 +283,8 @@ class Fields:
         pieces = self._pieces(bits, spec)
         low = 0 if not signed else -(1 << bits - 1)
         high = 1 if truth else (1 << bits - signed) - 1
-        return Number(bits, signed, pieces, low, high, 0, scale, Fraction(0), truth, forbidden)
+        real = base in ("f16", "f32", "f64")
+        return Number(bits, signed, pieces, low, high, 0, scale, Fraction(0), truth, forbidden, real)
 
     def _carrier(self, base: str) -> tuple[int, bool, Fraction | None, bool, int]:
         if base == "bool":
@@ -303,6 +328,10 @@ class Fields:
     def _with_default(self, number: Number, base: str, spec: Doc, key: str) -> Number:
         """Without a default, the number nearest to 0."""
         given = spec.get(key)
+        if number.real:
+            low, high = number.bounds or (-math.inf, math.inf)
+            nearest = min(max(0.0, low), high) if given is None else _real(given)
+            return replace(number, default=number.pattern(nearest))
         if given is None:
             return replace(number, default=min(max(0, number.low), number.high))
         if isinstance(given, bool):
@@ -312,6 +341,11 @@ class Fields:
             member = names[given]
             return replace(number, default=member["value"] if isinstance(member, dict) else member)
         return replace(number, default=int((exact(given) - number.offset) / (number.scale or 1)))
+
+
+def _real(given: object) -> float:
+    text = str(given)
+    return float(text) if text in ("nan", "inf", "-inf") else float(exact(given))
 
 
 def _named_bits(flags: Doc) -> int:
@@ -324,6 +358,9 @@ def _quantified(number: Number, spec: Doc) -> Number:
     if "scale" in spec or "offset" in spec:
         scale = exact(spec["scale"]) if "scale" in spec else number.scale or Fraction(1)
         number = replace(number, scale=scale, offset=exact(spec.get("offset", 0)))
+    if "range" in spec and number.real:
+        low_end, high_end = (number.number(number.pattern(float(end))) for end in span(spec["range"]))
+        return replace(number, bounds=(low_end, high_end))
     if "range" in spec:
         ends = [(end - number.offset) / (number.scale or 1) for end in span(spec["range"])]
         number = replace(number, low=int(min(ends)), high=int(max(ends)))

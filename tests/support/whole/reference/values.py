@@ -36,6 +36,8 @@ def stray(pieces: Sequence[tuple[int, int]], data: bytes) -> bool:
 
 def check(number: Number, raw: int) -> None:
     """Check the range of a number. Raises Wrong."""
+    if number.bounds and not number.bounds[0] <= number.number(raw) <= number.bounds[1]:
+        raise Wrong("range", str(raw))
     if not number.low <= raw <= number.high or raw & number.forbidden:
         raise Wrong("range", str(raw))
 
@@ -116,7 +118,7 @@ def _decoded(slot: Slot, data: bytes) -> dict[str, Raw]:
         if raw != kind.default:
             raise Wrong("range", slot.name)
         return {}
-    return {slot.name: raw}
+    return {slot.name: kind.told(raw)}
 
 
 def _signed(number: Number, raw: int) -> int:
@@ -127,7 +129,7 @@ def _signed(number: Number, raw: int) -> int:
 def _checked(number: Number, raw: int) -> int:
     raw = _signed(number, raw)
     check(number, raw)
-    return raw
+    return number.told(raw)
 
 
 def _decoded_run(kind: Run, data: bytes) -> Raw:
