@@ -19,6 +19,7 @@
         * `PortLost`: the port disappeared while in use
         * `CapabilityMissing`: the port does not support an operation
     * `HexFileError`: an Intel HEX file cannot be sent to a node (also a `ValueError`)
+    * `ImportFileError`: nothing can be imported from a file of another format (also a `ValueError`)
     * `ExtraMissing`: an optional dependency is not installed (also an `ImportError`)
 
 Generated modules do not import this module; they define their own `EncodeError` and `DecodeError`.
@@ -43,6 +44,7 @@ __all__ = [
     "GenerationError",
     "HexFileError",
     "IllegalCommand",
+    "ImportFileError",
     "LinkError",
     "LoadError",
     "NoReply",
@@ -266,6 +268,26 @@ class CapabilityMissing(PortError):
 
 class HexFileError(QlinkgenError, ValueError):
     """An Intel HEX file cannot be sent to a node. Nothing has been sent.
+
+    Attributes:
+        message: what was seen, the rule, and the fix.
+        file: path of the file as given by the user.
+        line: line, from 1; 0 for the file as a whole.
+    """
+
+    def __init__(self, message: str, *, file: str = "", line: int = 0) -> None:
+        super().__init__(message)
+        self.message = message
+        self.file = file
+        self.line = line
+
+    def __str__(self) -> str:
+        """Return `file:line: message`."""
+        return ":".join([*filter(None, (self.file, str(self.line or ""))), f" {self.message}"]).lstrip()
+
+
+class ImportFileError(QlinkgenError, ValueError):
+    """Nothing can be imported from a file of another format.
 
     Attributes:
         message: what was seen, the rule, and the fix.

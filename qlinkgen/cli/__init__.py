@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import keyword
 
 import click
 
@@ -15,6 +16,7 @@ COMMANDS = {
     "generate": "Write Python, C, construct and vectors for protocols, or check that they are up to date.",
     "lint": "Check schema files; report every error with its line, column, rule and fix.",
     "list": "List the protocols of qlinkgen.",
+    "import": "Write a schema from a file of another format, such as a C header.",
     "show": "Show a protocol or a message: layout, sizes, transactions.",
     "encode": "Encode values as wire bytes.",
     "decode": "Decode wire bytes: one JSON object per line.",
@@ -40,7 +42,8 @@ class LazyGroup(click.Group):
         """Import a command when it is used."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"qlinkgen.cli.{cmd_name}").command
+        module = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
+        command: click.Command = importlib.import_module(f"qlinkgen.cli.{module}").command
         if not any(each.name == "debug" for each in command.params):
             command.params.append(debug_option(hidden=True))  # to be appended to a failed command line
         return command

@@ -30,6 +30,7 @@ DOCUMENTS = [
     "docs/tutorial.md",
     "docs/cli.md",
     "docs/library.md",
+    "docs/import.md",
     "docs/plan.md",
     "docs/quick-start.md",
     "docs/write-a-slave.md",

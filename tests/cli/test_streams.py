@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import io
 import os
 import subprocess
@@ -22,6 +21,8 @@ from tests.cli.test_boundary import COMMAND, ENVIRONMENT
 RUNS: dict[str, tuple[list[str], int]] = {
     "generate": (["--target", "vectors", "-o", "OUT", "thermo.yaml"], 0),
     "lint": (["qlink"], 0),
+    "list": ([], 0),
+    "import": (["header", "thermo.yaml"], 1),
     "show": (["qlink"], 0),
     "encode": (["qlink", "motor_position", "--node", "3"], 0),
     "decode": (["qlink", "a5a504210315e8"], 0),
@@ -152,7 +153,9 @@ FAULTS: list[Exception] = [
 def test_a_fault_of_our_own_is_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str, debug: str
 ) -> None:
-    group = importlib.import_module(f"qlinkgen.cli.{command}").command
+    group = cli.get_command(click.Context(cli), command)
+    if isinstance(group, click.Group):
+        group = group.commands[RUNS[command][0][0]]
     assert isinstance(group, click.Command)
     arguments = [command, *RUNS[command][0]]
     arguments = ["--debug", *arguments] if debug == "before" else arguments
