@@ -190,8 +190,9 @@ def _size(found: Dissection, fault: Fault) -> Words:
 
 
 def _check(found: Dissection, fault: Fault) -> Words:
-    part, received, expected = fault.of, fault.seen or 0, found.expected or 0
+    part, received = fault.of, fault.seen or 0
     assert isinstance(part, CheckPart)
+    expected = found.expected[part.name]
     text = check_text(part.check, found.plan.frame)
     rule = f"{part.name} is {check_number(part, received)}, but {text} gives {check_number(part, expected)}"
     if part.check.chained:

@@ -20,7 +20,7 @@ from qlinkgen.plan.describe import (
     transparency_text,
     type_text,
 )
-from qlinkgen.plan.framing import CheckPart, Envelope, FramePlan, PayloadPart
+from qlinkgen.plan.framing import CheckPart, Envelope, FramePlan, Part, PayloadPart
 from qlinkgen.plan.payload import BitsStep, BytesStep, ItemsStep, Step, least_size
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -41,16 +41,23 @@ def parts_table(
     table = Table(columns, title, frozenset({"offset", "bytes"}))
     for index, part in enumerate(envelope.parts):
         after = index > envelope.payload_at
-        chained = frame.needs_request and frame.check is not None and not isinstance(part, CheckPart)
         table.add(
             f"{envelope.offset(part)}{'+n' if after else ''}",
             part.name,
             span_text(part.least, part.most) if isinstance(part, PayloadPart) else part.size,
-            "yes" if coverage and (envelope.covered(part) or chained) else "",
+            _covered(frame, envelope, part) if coverage else "",
             part_text(part, frame),
             sections.get(part.name, ""),
         )
     return table
+
+
+def _covered(frame: FramePlan, envelope: Envelope, part: Part) -> str:
+    """Return the check values that cover a part; "yes" if there is only one."""
+    if frame.needs_request and frame.check is not None:
+        return "" if isinstance(part, CheckPart) else "yes"
+    names = [each.name for each in envelope.checks if part.name in each.check.over]
+    return ", ".join(names) if len(envelope.checks) > 1 else "yes" if names else ""
 
 
 def show_frame_plan(plan: Plan) -> None:

@@ -107,10 +107,10 @@ def _mark(found: Dissection, part: MarkPart, span: Span) -> str:
 
 def _check(found: Dissection, part: CheckPart, span: Span) -> str:
     received = check_number(part, span.number or 0)
-    if found.expected is None:
+    if part.name not in found.expected:
         return f"{received}, not checked"
     if span.fault:
-        return f"{received}, computed {check_number(part, found.expected)}"
+        return f"{received}, computed {check_number(part, found.expected[part.name])}"
     return f"{received}, right" + ("" if part.check.complete else " (the bits that are sent)")
 
 

@@ -6,12 +6,13 @@ Every target checks a whole frame in this order:
 2. in wire order, up to the end of the header: a wrong constant is ``frame``, a wrong inserted byte
    ``stuffing``, a length out of range ``length``; in a frame without a length an unknown message number is
    ``unknown``, and a count out of range ``length``;
-3. a wrong constant after the payload: ``frame``; where only the payload is stuffed, a wrong inserted byte is
+3. a wrong check value over parts of the header alone, before the payload: ``crc``;
+4. a wrong constant after the payload: ``frame``; where only the payload is stuffed, a wrong inserted byte is
    ``stuffing`` and a payload that is too long ``length``;
-4. bytes after the end: ``length``;
-5. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
-6. a message number that the direction does not have: ``unknown``;
-7. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address, ``range``.
+5. bytes after the end: ``length``;
+6. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
+7. a message number that the direction does not have: ``unknown``;
+8. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address, ``range``.
 
 A marked frame has no length: a payload size that its message cannot have is ``frame``, as are a wrong header
 or end, and bytes after the end. In a frame without leading constants an unknown number or an illegal address
@@ -97,7 +98,7 @@ class Codec:
         return transparency.rule.stuff(payload) if isinstance(transparency, PayloadStuffing) else payload
 
     def cells(self, message: MessagePlan, sent: bytes, address: int = 0) -> dict[str, bytes]:
-        """The bytes of each part except the check value."""
+        """The bytes of each part except the check values."""
         return {
             part.name: _cell(part, sent, message.id, address)
             for part in message.envelope.parts
@@ -105,11 +106,13 @@ class Codec:
         }
 
     def join(self, message: MessagePlan, cells: Mapping[str, bytes], request: bytes = b"") -> bytes:
-        """The frame of these parts as sent; computes the check value if it is not among them."""
-        part, transparency = message.envelope.check, self.plan.frame.transparency
-        if part is not None and part.name not in cells:
-            cells = {**cells, part.name: part.check.pack(self.check_value(message.envelope, cells, request))}
-        frame = b"".join(cells[each.name] for each in message.envelope.parts)
+        """The frame of these parts as sent; computes the check values that are not among them."""
+        envelope, transparency = message.envelope, self.plan.frame.transparency
+        for part in envelope.filling:
+            if part.name not in cells:
+                value = self.check_value(part, envelope, cells, request)
+                cells = {**cells, part.name: part.check.pack(value)}
+        frame = b"".join(cells[each.name] for each in envelope.parts)
         match transparency:
             case FrameStuffing():
                 return transparency.stuff(frame)
@@ -118,10 +121,11 @@ class Codec:
             case _:
                 assert_never(transparency)
 
-    def check_value(self, envelope: Envelope, cells: Mapping[str, bytes], request: bytes = b"") -> int:
+    @staticmethod
+    def check_value(
+        part: CheckPart, envelope: Envelope, cells: Mapping[str, bytes], request: bytes = b""
+    ) -> int:
         """The check value over the bytes of the covered parts as sent."""
-        part = envelope.check
-        assert part is not None
         if part.check.chained:
             return part.check.of(request[1:], cells[envelope.payload.name], start=request[0])
         return part.check.of(b"".join(cells[name] for name in part.check.over))
@@ -159,8 +163,8 @@ class Codec:
         """Check a frame whose parts have been read and decode its message. Raises BadFrame."""
         message = self.plan.known(direction).get(-1 if taken.number is None else taken.number)
         envelope = message.envelope if message else self.plan.frame.envelopes[direction]
-        if part := envelope.check:
-            right = part.check.pack(self.check_value(envelope, taken.cells, request))
+        for part in envelope.checks:
+            right = part.check.pack(self.check_value(part, envelope, taken.cells, request))
             if taken.cells[part.name] != right:
                 refusal = part.check.rejected is not None and part.check.pack(part.check.rejected)
                 raise BadFrame("illegal" if taken.cells[part.name] == refusal else "crc", taken.end)

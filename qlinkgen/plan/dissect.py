@@ -111,6 +111,7 @@ class _Walk:
         self.wanted: dict[str, int] = {}
         self.spans: list[Span] = []
         self.faults: list[Fault] = []
+        self.expected: dict[str, int] = {}
         #: The preamble is missing, so the length may be any byte.
         self.no_preamble = False
         #: A count is out of range; the payload is assumed to be the rest.
@@ -122,14 +123,12 @@ class _Walk:
         if front is not None:
             self._divide(front)
             self._close()
-            expected = self._judge()
-        else:
-            expected = None
+            self._judge()
         faults = sorted(self.faults, key=lambda fault: fault.kind != self.kind)
         return Dissection(
             self.plan, self.direction, self.wire, self.request, self.message, self.number, self.address,
             tuple(sorted(self.spans, key=lambda span: span.places[0])),
-            tuple(dict.fromkeys(faults)), self.kind, self.cells, expected,
+            tuple(dict.fromkeys(faults)), self.kind, self.cells, self.expected,
         )  # fmt: skip
 
     # Places
@@ -342,9 +341,8 @@ class _Walk:
 
     # Checks
 
-    def _judge(self) -> int | None:
-        """Check the parts in wire order. Returns the right check value, None if unknown."""
-        expected: int | None = None
+    def _judge(self) -> None:
+        """Check the parts in wire order."""
         for part in self.envelope.parts:
             match part:
                 case ConstantPart():
@@ -360,12 +358,11 @@ class _Walk:
                 case PayloadPart():
                     self._payload(part)
                 case CheckPart():
-                    expected = self._check(part)
+                    self._check(part)
                 case _:
                     assert_never(part)
         if self.frame.needs_request and self.direction == "response" and self.message is None:
             self._fault("unknown", Rule.MESSAGE, 0, seen=self.number)
-        return expected
 
     def _constant(self, part: ConstantPart) -> None:
         data, places = self._found(part).data, self._found(part).places
@@ -413,29 +410,38 @@ class _Walk:
                 self._fault("frame", Rule.END, cell.places[0], part, part.address_of(byte))
         self._span(part, byte, kind)
 
-    def _check(self, part: CheckPart) -> int | None:
+    def _check(self, part: CheckPart) -> None:
         data, check = self._found(part).data, part.check
-        covered = [each for each in self.envelope.parts if self.envelope.covered(each)]
+        covered = [each for each in self.envelope.parts if each.name in check.over]
         if len(data) < part.size or any(map(self._short, covered)) or (check.chained and not self.message):
             self._span(part, None)
-            return None
+            return
         cells = {name: cell.sent if self.alone else cell.data for name, cell in self.cells.items()}
-        right = check.pack(self.codec.check_value(self.envelope, cells, self.request))
+        right = check.pack(self.codec.check_value(part, self.envelope, cells, self.request))
         received, expected = check.unpack(data), check.unpack(right)
+        if data != right and self._displaced(part):
+            self._span(part, received)
+            return
+        self.expected[part.name] = expected
         if data == right:
             self._span(part, received)
-            return expected
-        # Wrong stuffing or a wrong length shifts the bytes, so the check value is meaningless.
-        if self.no_preamble or any(
-            each.rule in (Rule.STUFFING, Rule.LENGTH, Rule.WHOLE) for each in self.faults
-        ):
-            self._span(part, received)
-            return None
+            return
         refused = check.rejected is not None and data == check.pack(check.rejected)
         kind, rule = ("illegal", Rule.REFUSED) if refused else ("crc", Rule.CHECK)
         self._fault(kind, rule, self._found(part).places[0], part, received)
         self._span(part, received, kind)
-        return expected
+
+    def _displaced(self, part: CheckPart) -> bool:
+        """Whether wrong stuffing or a wrong length shifts the bytes, so the check value is meaningless."""
+        if self.no_preamble:
+            return True
+        if part not in self.envelope.header_checks:
+            return any(each.rule in (Rule.STUFFING, Rule.LENGTH, Rule.WHOLE) for each in self.faults)
+        end = max(self._found(each).places[-1] for each in self.envelope.front)
+        return any(
+            each.rule is Rule.LENGTH or (each.rule is Rule.STUFFING and each.at <= end)
+            for each in self.faults
+        )
 
     # Payload
 

@@ -287,10 +287,33 @@ class Envelope:
         """The address, None if it shares a byte or is not sent."""
         return next((part for part in self.parts if isinstance(part, AddressPart)), None)
 
-    @property
+    @cached_property
+    def checks(self) -> tuple[CheckPart, ...]:
+        """The check values in wire order."""
+        return tuple(part for part in self.parts if isinstance(part, CheckPart))
+
+    @cached_property
     def check(self) -> CheckPart | None:
-        """The check value, None where there is none."""
-        return next((part for part in self.parts if isinstance(part, CheckPart)), None)
+        """The check value whose algorithm can be replaced: the last over the payload, else the last."""
+        over = [part for part in self.checks if self.payload.name in part.check.over]
+        return (over or self.checks or (None,))[-1]
+
+    @cached_property
+    def header_checks(self) -> tuple[CheckPart, ...]:
+        """Check values of the header alone, which a receiver verifies before the payload."""
+        front = {part.name for part in self.front}
+        return tuple(part for part in self.checks if part in self.front and front.issuperset(part.check.over))
+
+    @cached_property
+    def filling(self) -> tuple[CheckPart, ...]:
+        """The check values in the order in which they are computed: after those that they cover."""
+        left, done = list(self.checks), list[CheckPart]()
+        while left:
+            names = {part.name for part in left}
+            part = next(part for part in left if names.isdisjoint(part.check.over))
+            left.remove(part)
+            done.append(part)
+        return tuple(done)
 
     def offset(self, wanted: Part) -> int:
         """Offset of a part; the payload counts as empty."""
@@ -310,16 +333,15 @@ class Envelope:
         )
 
     def covered(self, part: Part) -> bool:
-        """Whether the check value covers the part."""
+        """Whether the main check value covers the part."""
         return self.check is not None and part.name in self.check.check.over
 
-    @cached_property
-    def coverage(self) -> tuple[tuple[Part, ...], ...]:
-        """Covered parts, adjacent ones grouped."""
+    def coverage(self, check: CheckPart) -> tuple[tuple[Part, ...], ...]:
+        """The parts that a check value covers, adjacent ones grouped."""
         runs: list[list[Part]] = []
         last = -2
         for index, part in enumerate(self.parts):
-            if self.covered(part):
+            if part.name in check.check.over:
                 if index == last + 1:
                     runs[-1].append(part)
                 else:
@@ -355,7 +377,7 @@ class FramePlan:
 
     @property
     def check(self) -> Check | None:
-        """The check value, None where there is none."""
+        """The main check value, None where there is none."""
         part = self.envelope.check
         return part.check if part else None
 
@@ -474,12 +496,13 @@ def _unique(envelope: Envelope, stuffing: FrameStuffing) -> bool:
         return False
     if length is None or envelope.parts[1] is not length or length.size != 1:
         return False
-    if length.least <= rule.after[0] <= length.most or check is None or envelope.parts[-1] is not check:
+    if length.least <= rule.after[0] <= length.most or envelope.checks != envelope.parts[-1:]:
         return False
+    assert check is not None
     inner = envelope.parts[1:-1]
     plain = not any(isinstance(part, ConstantPart) for part in inner)
     number = envelope.id is not None and envelope.id.size == 1
-    return plain and number and envelope.coverage == (inner,) and check.check.regular is not None
+    return plain and number and envelope.coverage(check) == (inner,) and check.check.regular is not None
 
 
 def _marked(frame: MarkedFrame) -> FramePlan:

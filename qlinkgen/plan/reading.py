@@ -184,7 +184,7 @@ class FrameReader:
         self._bare = isinstance(plan.receiver, Rescan) and plan.receiver.bare
 
     def read(self, wire: bytes, start: int = 0, *, hunting: bool = False) -> Taken:
-        """The frame that begins at ``start``; check value and contents are not checked.
+        """The frame that begins at ``start``; contents, and check values over them, are not checked.
 
         Raises NoFrame, Incomplete or BadFrame.
         """
@@ -193,6 +193,7 @@ class FrameReader:
         length = 0
         for part in self._envelope.front:
             length = self._head(cursor, part, taken) or length
+        self._check_header(cursor, taken)
         sent = self._payload(cursor, taken, length)
         for part in self._envelope.back:
             taken.cells[part.name] = self._take(cursor, part, part.size)
@@ -218,10 +219,20 @@ class FrameReader:
                 data = self._take(cursor, part, part.size)
                 taken.cells[part.name] = data
                 return self._number(cursor, part, part.integer.unpack(data), taken)
-            case MarkPart() | PayloadPart() | CheckPart():
+            case CheckPart():
+                taken.cells[part.name] = self._take(cursor, part, part.size)
+                return 0
+            case MarkPart() | PayloadPart():
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
+
+    def _check_header(self, cursor: Cursor, taken: Taken) -> None:
+        """Verify the check values of the header: a receiver does not wait for a payload of a wrong length."""
+        for part in self._envelope.header_checks:
+            value = part.check.of(b"".join(taken.cells[name] for name in part.check.over))
+            if taken.cells[part.name] != part.check.pack(value):
+                raise BadFrame("crc", cursor.at)
 
     def _number(
         self, cursor: Cursor, part: LengthPart | IdPart | AddressPart, value: int, taken: Taken

@@ -132,7 +132,7 @@ class Dissection:
         faults: the violated rules, the one of `kind` first; () if `kind` is "".
         kind: the kind of error that `Codec.decode` raises, "" for a valid frame.
         cells: the parts found.
-        expected: the right check value, None if it is not known.
+        expected: the right check values that are known, by part.
     """
 
     plan: Plan
@@ -146,4 +146,4 @@ class Dissection:
     faults: tuple[Fault, ...]
     kind: str
     cells: Mapping[str, Cell]
-    expected: int | None
+    expected: Mapping[str, int]

@@ -28,6 +28,14 @@ def payload_bounds(file: SchemaFile) -> tuple[int, int]:
     )
 
 
+def _main_check(specs: Mapping[str, PartSpec]) -> str:
+    """The check value whose algorithm can be replaced: the last over the payload, else the last."""
+    checks = [name for name, spec in specs.items() if spec.told == "checksum"]
+    payload = next((name for name, spec in specs.items() if spec.told == "payload"), "")
+    over = [name for name in checks if payload in (specs[name].over or ())]
+    return (over or checks or [""])[-1]
+
+
 class FrameBuilder:
     """Builds the frame of one file."""
 
@@ -36,6 +44,8 @@ class FrameBuilder:
         self._file = file
         self._report = report
         self._parts = PartBuilder(file, report, crc)
+        #: Builds check values whose algorithm ``crc`` does not replace.
+        self._others = PartBuilder(file, report, None)
 
     def build(self) -> Frame | None:
         """The frame; None after an error that prevents building it."""
@@ -70,26 +80,41 @@ class FrameBuilder:
         path: Path = ("frame", "parts")
         if not self._parts.roles_fit(specs, ("message", "payload"), path):
             return None
-        parts = tuple(self._parts.build(name, spec, specs, (*path, name)) for name, spec in specs.items())
+        main = _main_check(specs)
+        parts = tuple(
+            (self._parts if name == main else self._others).build(name, spec, specs, (*path, name))
+            for name, spec in specs.items()
+        )
         spec = self._file.frame
         stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
         frame = DelimitedFrame(parts, stuffing, spec.doc, spec.section)
         self._check_order(frame, path)
+        if self._is_circular(frame, path):
+            return None
         self._check_length(frame, path)
         check_unique(frame, self._report)
         return frame
 
     def _check_order(self, frame: DelimitedFrame, path: Path) -> None:
-        """Check that length, id and address precede the payload, and the checksum follows it."""
+        """Check that length, id and address precede the payload."""
         names = [part.name for part in frame.parts]
         payload = names.index(frame.payload.name)
         for index, part in enumerate(frame.parts):
             if part.role in ("length", "message", "address") and index > payload:
                 what, hint = f"{part.name} follows the payload", "move it before the payload"
                 self._parts.fault("bad-frame", (*path, part.name), what, hint)
-            elif part.role == "checksum" and index < payload:
-                what, hint = f"{part.name} precedes the payload", "move it after the payload"
-                self._parts.fault("bad-frame", (*path, part.name), what, hint)
+
+    def _is_circular(self, frame: DelimitedFrame, path: Path) -> bool:
+        """Report check values that cover each other."""
+        left = {part.name: part.checksum.over for part in frame.parts if part.checksum}
+        while free := [name for name, over in left.items() if left.keys().isdisjoint(over)]:
+            left = {name: over for name, over in left.items() if name not in free}
+        if left:
+            name = next(iter(left))
+            what = f"the check values {listed(left)} cover each other"
+            place, hint = (*path, name, "over"), "omit one of them from over"
+            self._report.error("check-cycle", place, what, hint, of_key=True)
+        return bool(left)
 
     def _check_length(self, frame: DelimitedFrame, path: Path) -> None:
         length = frame.part("length")
@@ -201,13 +226,17 @@ class FrameBuilder:
         )
 
     def _packet_roles_fit(self, specs: Mapping[str, PartSpec], path: Path) -> bool:
+        checks = [name for name, spec in specs.items() if spec.told == "checksum"]
+        for name in checks[1:]:
+            what = f"{name} and {checks[0]} are both the check value"
+            self._parts.fault("bad-packet", (*path, name), what, "a packet has one check value")
         wrong = [name for name, spec in specs.items() if spec.told not in _PACKET_ROLES]
         for name in wrong:
             what = f"a part with role {specs[name].told} is not allowed in a packet"
             self._parts.fault(
                 "bad-packet", (*path, name), what, f"use {listed(_PACKET_ROLES)}, or a frame of parts"
             )
-        return not wrong
+        return not wrong and len(checks) < 2
 
     def _packet_checksum(self, spec: PartSpec, specs: Mapping[str, PartSpec], place: Path) -> Checksum | None:
         self._parts.reject(

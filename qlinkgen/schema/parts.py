@@ -14,7 +14,7 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _INTEGERS = {"u8": 1, "u16": 2, "u24": 3, "u32": 4, "u64": 8}
-_SINGLE_ROLES = ("length", "message", "address", "payload", "checksum")
+_SINGLE_ROLES = ("length", "message", "address", "payload")
 _ROLE_KEYS = {
     "constant": ("value", "text"),
     "length": ("type", "byteorder", "counts"),
@@ -49,7 +49,7 @@ class PartBuilder:
         self._crc = crc
 
     def roles_fit(self, specs: Mapping[str, PartSpec], needed: Sequence[str], path: Path) -> bool:
-        """Check that every part and each required role has its role, and each but constant occurs once."""
+        """Check that every part has a role, required roles are present, and most occur once."""
         roles = [spec.told for spec in specs.values()]
         fit = True
         for name in (name for name, spec in specs.items() if spec.told is None):
@@ -65,12 +65,12 @@ class PartBuilder:
                 first = next(other for other, each in specs.items() if each.told == spec.told)
                 what, hint = (
                     f"{name} and {first} are both the {spec.told}",
-                    "a frame has one of each role but constant",
+                    "a frame has one of each role but constant and checksum",
                 )
                 self.fault("bad-frame", (*path, name), what, hint)
                 fit = False
         for role in needed:
-            if role not in roles:
+            if role not in roles and None not in roles:
                 what, hint = f"the frame has no {role}", f"add a part with role: {role}"
                 self._report.error("bad-frame", path, what, hint, of_key=True, absent=True)
                 fit = False

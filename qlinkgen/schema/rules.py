@@ -171,6 +171,11 @@ _ALL = (
         "Bits would be lost; use sent to select the bits on the wire.",
     ),
     Rule(
+        "check-cycle",
+        "Check values do not cover each other.",
+        "Each would have to be computed before the other.",
+    ),
+    Rule(
         "part-order",
         "Parts are listed once, in wire order.",
         "A checksum depends on the order of the bytes.",

@@ -17,8 +17,13 @@ def algorithm_macro(algorithm: Algorithm) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SumView:
-    """A check value that is not a CRC: start, the statements of a step, and its result."""
+    """A check value that is not a CRC: start, the statements of a step, and its result.
 
+    Attributes:
+        key: what the names of its functions begin with, after the prefix of the protocol.
+    """
+
+    key: str
     name: str
     width: int
     type: str
@@ -38,8 +43,15 @@ class Choice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrcView:
-    """A CRC and the code of a step."""
+    """A CRC and the code of a step.
 
+    Attributes:
+        key: what the names of its functions begin with, after the prefix of the protocol.
+        macros: the same of its macros.
+    """
+
+    key: str
+    macros: str
     name: str
     macro: str
     width: int
@@ -68,22 +80,23 @@ class CrcView:
 CheckView = SumView | CrcView
 
 
-def render(algorithm: Checksum) -> CheckView:
-    """The check value for the template.
+def render(algorithm: Checksum, number: int = 1) -> CheckView:
+    """The check value for the template; users cannot replace an algorithm after the first.
 
     Raises:
         GenerationError: the CRC is not supported.
     """
+    key = "check" if number == 1 else f"check_{number}"
     match algorithm:
         case Sum():
             kind = unsigned_type(algorithm.width)
-            return _render_sum(algorithm, [f"return ({kind})(sum + byte);"], finished(algorithm))
+            return _render_sum(key, algorithm, [f"return ({kind})(sum + byte);"], finished(algorithm))
         case Xor():
-            return _render_sum(algorithm, ["return (uint8_t)(sum ^ byte);"], "sum")
+            return _render_sum(key, algorithm, ["return (uint8_t)(sum ^ byte);"], "sum")
         case Fletcher():
-            return _render_sum(algorithm, _fletcher_step(algorithm), "sum")
+            return _render_sum(key, algorithm, _fletcher_step(algorithm), "sum")
         case Algorithm():
-            return _render_crc(algorithm)
+            return _render_crc(key, algorithm, "CRC" if number == 1 else f"CRC_{number}")
         case _:
             assert_never(algorithm)
 
@@ -94,9 +107,10 @@ def finished(algorithm: Sum) -> str:
     return {"plain": "sum", "inverted": f"({kind})~sum", "zero": f"({kind})(0U - sum)"}[algorithm.form]
 
 
-def _render_sum(algorithm: Sum | Xor | Fletcher, step: list[str], result: str) -> SumView:
+def _render_sum(key: str, algorithm: Sum | Xor | Fletcher, step: list[str], result: str) -> SumView:
     width, start = algorithm.width, f"{algorithm.start}U"
     return SumView(
+        key=key,
         name=algorithm.name,
         width=width,
         type=unsigned_type(width),
@@ -120,14 +134,16 @@ def _fletcher_step(algorithm: Fletcher) -> list[str]:
     ]
 
 
-def _render_crc(algorithm: Algorithm) -> CrcView:
+def _render_crc(key: str, algorithm: Algorithm, macros: str) -> CrcView:
     if algorithm.width not in (8, 16, 24, 32, 64):
         raise GenerationError(f"{algorithm.name}: not supported in C; use a CRC of whole bytes")
     turned = algorithm.refin != algorithm.refout
-    selectable = algorithm.width == 16 and not turned
+    selectable = algorithm.width == 16 and not turned and key == "check"
     width, kind = algorithm.width, unsigned_type(algorithm.width)
     # A CRC of 24 bits needs a mask in its wider type; one of 8 bits is shifted out completely.
     return CrcView(
+        key=key,
+        macros=macros,
         name=algorithm.name,
         macro=algorithm_macro(algorithm),
         width=width,

@@ -61,9 +61,14 @@ class FrameSection:
     plan: Plan
     view: FrameView
     views: Mapping[str, View]
-    check: crc.CheckView | None
+    algorithms: Sequence[crc.CheckView]
     templates: tuple[str, ...]
     receiver: str
+
+    @property
+    def check(self) -> crc.CheckView | None:
+        """The algorithm of the main check value, None if there is none."""
+        return self.algorithms[0] if self.algorithms else None
 
     @property
     def rescans(self) -> bool:
@@ -150,17 +155,16 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
         case Hunt() | Rescan():
             views = parts_views(plan, layouts)
             frame = "frame_stuffed" if views.stuffed else "frame_plain"
-            templates = ("place", frame, "wrap", "frame_public")
+            templates = ("place", "values", frame, "wrap", "frame_public")
             kind = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
-            value = crc.render(check.algorithm) if check else None
-            return FrameSection(plan, views.f, views.others, value, templates, kind)
+            return FrameSection(plan, views.f, views.others, views.algorithms, templates, kind)
         case Marks():
-            value = crc.render(check.algorithm) if check else None
+            value = [crc.render(check.algorithm)] if check else []
             marked: Mapping[str, View] = {"place": PLACE, "marked": marked_view(plan)}
             view = frame_view(plan, check_optional=bool(check))
             return FrameSection(plan, view, marked, value, ("place", "marked", "wrap"), "receiver_marked")
         case InStep():
             packet = {"packet": packet_view(plan)}
-            return FrameSection(plan, frame_view(plan), packet, None, ("packet",), "receiver_packet")
+            return FrameSection(plan, frame_view(plan), packet, (), ("packet",), "receiver_packet")
         case _:
             assert_never(receiver)

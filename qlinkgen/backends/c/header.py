@@ -117,10 +117,10 @@ class Header:
         return list(dict.fromkeys(group for group in groups if group))
 
     def _check_value(self) -> str:
-        check = self._section.check
-        if check is None:
-            return ""
-        return "\n" + self._place("crc" if isinstance(check, CrcView) else "sum", crc=check)
+        return "".join(
+            "\n" + self._place("crc" if isinstance(each, CrcView) else "sum", crc=each)
+            for each in self._section.algorithms
+        )
 
     def _directions(self) -> list[str]:
         """Ids and sizes of messages that a receiver needs to find the end of a frame."""

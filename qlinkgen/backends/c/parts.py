@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import assert_never
 
+from qlinkgen.backends.c.crc import CheckView, render
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import grouped, unsigned, unsigned_type
+from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.naming import address_member
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.framing import (
@@ -61,6 +64,16 @@ def sender_of(frame: FramePlan) -> Sender:
 
 
 @dataclass(frozen=True, slots=True)
+class ValueView:
+    """A function that computes a check value: its name, the name of the part, and statements."""
+
+    function: str
+    part: str
+    algorithm: CheckView
+    updates: list[str]
+
+
+@dataclass(frozen=True)
 class PartWriter:
     """Prints the envelope of a frame.
 
@@ -98,6 +111,12 @@ class PartWriter:
         """The parts of a body."""
         return self.envelope.parts[1:] if self.lead else self.envelope.parts
 
+    @property
+    def alone(self) -> CheckPart | None:
+        """The only check value, if it follows the payload: wrapping and scanning compute it in passing."""
+        checks = self.envelope.checks
+        return checks[0] if len(checks) == 1 and checks[0] in self.envelope.back else None
+
     # To the wire
 
     def put_header(self, place: str, sent: str) -> list[str]:
@@ -126,7 +145,7 @@ class PartWriter:
 
     def put_check(self, place: str, value: str) -> list[str]:
         """Statements that write the check value; the payload ends at ``place``."""
-        part = self.envelope.check
+        part = self.alone
         return put_check(part.check, place, self._at(part), value) if part else []
 
     # From the wire
@@ -164,12 +183,17 @@ class PartWriter:
                 case IdPart() | AddressPart() if bare:
                     before.add(type(part))
                     yield from self._header_check(f"{reached}{end}U", before, directed)
-                case IdPart() | AddressPart():
+                case IdPart() | AddressPart() | CheckPart():
                     pass
-                case CheckPart() | PayloadPart() | MarkPart():
+                case PayloadPart() | MarkPart():
                     raise AssertionError(f"{part.name} is not a part of a header")
                 case _:
                     assert_never(part)
+        if self.envelope.header_checks:
+            yield f"if ({reached}{self.head}U) {{"
+            for check in self.envelope.header_checks:
+                yield from (f"    {line}" for line in self.judge(check, "body", "body", "0U"))
+            yield "}"
 
     def _announced(self, length: LengthPart, *, all_there: bool) -> Iterator[str]:
         if test := length_bounds(length, self.get(length)):
@@ -204,35 +228,41 @@ class PartWriter:
 
     def check_differs(self, place: str, value: str) -> str:
         """The condition for a received check value other than ``value``."""
-        part = self.envelope.check
+        part = self.alone
         return differs(part.check, place, self._at(part), value) if part else ""
 
     # The check value
 
     @property
     def lead_updates(self) -> list[str]:
-        """Statements that update the check value with the lead, none if it is not covered."""
-        covered = self.lead and self.envelope.covered(self.envelope.parts[0])
-        return [f"value = {self.prefix}_check_update(value, {in_hex(b)});" for b in self.lead if covered]
+        """Statements that update the only check value with the lead, none if it is not covered."""
+        return self._lead_updates(self.alone, "check") if self.alone else []
+
+    def _lead_updates(self, check: CheckPart, key: str) -> list[str]:
+        covered = self.lead and self.envelope.parts[0].name in check.check.over
+        return [f"value = {self.prefix}_{key}_update(value, {in_hex(b)});" for b in self.lead if covered]
 
     @property
     def covers_body(self) -> bool:
-        """Whether the check value covers the whole body before it and can be computed byte by byte."""
-        check, parts = self.envelope.check, self.parts()
+        """Whether the only check value covers the whole body before it and can be computed byte by byte."""
+        check, parts = self.alone, self.parts()
         covered = tuple(part for part in parts if self.envelope.covered(part))
         return check is not None and covered == parts[: parts.index(check)]
 
     def covered_loops(self, array: str, start: str, payload_end: str) -> list[str]:
-        """Loops that update the check value with the covered bytes of an array."""
+        """Loops that update the only check value with the covered bytes of an array."""
+        return self._loops(self.alone, "check", array, start, payload_end) if self.alone else []
+
+    def _loops(self, check: CheckPart, key: str, array: str, start: str, payload_end: str) -> list[str]:
         lines: list[str] = []
-        for run in self.envelope.coverage:
+        for run in self.envelope.coverage(check):
             parts = [part for part in run if part in self.parts()]
             if parts:
                 first = self._place(parts[0], start, payload_end)
                 end = self._place(parts[-1], start, payload_end, after=True)
                 lines += [
                     f"for (size_t covered = {first}; covered < ({end}); ++covered) {{",
-                    f"    value = {self.prefix}_check_update(value, {array}[covered]);",
+                    f"    value = {self.prefix}_{key}_update(value, {array}[covered]);",
                     "}",
                 ]
         return lines
@@ -242,6 +272,58 @@ class PartWriter:
             return payload_end
         base = payload_end if part in self.envelope.back else start
         return _sum(base, self._at(part) + (part.size if after else 0))
+
+    # Several check values, or one before the payload
+
+    @cached_property
+    def algorithms(self) -> Mapping[Checksum, CheckView]:
+        """Each algorithm of the frame, the main one first."""
+        parts = sorted(self.envelope.checks, key=lambda part: part is not self.envelope.check)
+        found = dict.fromkeys(part.check.algorithm for part in parts)
+        return {each: render(each, number) for number, each in enumerate(found, 1)}
+
+    @property
+    def values(self) -> list[ValueView]:
+        """The functions that compute check values; none if the only one is computed in passing."""
+        return [self._value(part) for part in self.envelope.filling] if self.alone is None else []
+
+    def _value(self, part: CheckPart) -> ValueView:
+        algorithm = self.algorithms[part.check.algorithm]
+        loops = self._loops(part, algorithm.key, "body", "0", "payload_end")
+        updates = self._lead_updates(part, algorithm.key) + loops
+        if not any("payload_end" in line for line in updates):
+            updates.insert(0, "(void)payload_end;")
+        return ValueView(self._function(part), part.name, algorithm, updates)
+
+    def _function(self, part: CheckPart) -> str:
+        return f"{self.prefix}_value_{self.envelope.checks.index(part) + 1}_"
+
+    def fills(self, body: str, end: str, payload_end: str) -> list[str]:
+        """Statements that compute and write the check values of a body; ``end`` is the end of its payload."""
+        lines: list[str] = []
+        for part in self.envelope.filling if self.alone is None else ():
+            place = end if part in self.envelope.back else body
+            lines += [*self._computed(part, body, payload_end)]
+            lines += [f"    {line}" for line in put_check(part.check, place, self._at(part), "value")]
+            lines.append("}")
+        return lines
+
+    def judges(self, body: str, end: str, payload_end: str) -> list[str]:
+        """Statements that verify the check values that are not verified before the payload."""
+        late = [part for part in self.envelope.checks if part not in self.envelope.header_checks]
+        parts = late if self.alone is None else []
+        return [line for part in parts for line in self.judge(part, body, end, payload_end)]
+
+    def judge(self, part: CheckPart, body: str, end: str, payload_end: str) -> list[str]:
+        """Statements that verify a check value."""
+        place = end if part in self.envelope.back else body
+        test = differs(part.check, place, self._at(part), "value")
+        wrong = refusal(test, f"{self.prefix.upper()}_ERROR_CRC")
+        return [*self._computed(part, body, payload_end), *(f"    {line}" for line in wrong), "}"]
+
+    def _computed(self, part: CheckPart, body: str, payload_end: str) -> list[str]:
+        kind = self.algorithms[part.check.algorithm].type
+        return ["{", f"    const {kind} value = {self._function(part)}({body}, {payload_end});"]
 
     # Places
 

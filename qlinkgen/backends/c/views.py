@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
-from qlinkgen.backends.c.parts import PartWriter, in_hex, length_bounds, sender_of
+from qlinkgen.backends.c.parts import PartWriter, ValueView, in_hex, length_bounds, sender_of
 from qlinkgen.plan.framing import ByLength, ByMessage, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import Plan
@@ -106,6 +107,8 @@ class PartsView:
     Attributes:
         late_insert: an inserted byte may follow the last byte.
         judged: without a check value, only valid contents confirm a frame.
+        values: functions for check values, none if the only one is computed in passing.
+        judges: statements that verify them.
     """
 
     late_insert: bool
@@ -120,11 +123,13 @@ class PartsView:
     address_value: str
     wrong_tail: str
     check_differs: str
+    values: list[ValueView]
+    judges: list[str]
 
     @property
     def reads_tail(self) -> bool:
         """Whether bytes after the payload are checked."""
-        return bool(self.wrong_tail or self.check_differs)
+        return bool(self.wrong_tail or self.check_differs or any("end[" in line for line in self.judges))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,9 +139,15 @@ class PlainView:
     put_header: list[str]
     put_trailer: list[str]
     put_check: list[str]
+    fills: list[str]
     update_sent: list[str]
     update_received: list[str]
     head_checks: list[str]
+
+    @property
+    def writes_end(self) -> bool:
+        """Whether bytes after the payload are written here."""
+        return any("end[" in line for line in (*self.put_trailer, *self.put_check, *self.fills))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,6 +162,7 @@ class StuffedView:
     put_header: list[str]
     put_trailer: list[str]
     put_check: list[str]
+    fills: list[str]
     update_before: list[str]
     update_lead: list[str]
     update_received: list[str]
@@ -161,6 +173,11 @@ class StuffedView:
     due_when_sent: str
     due_when_received: str
     hunts: bool
+
+    @property
+    def writes_end(self) -> bool:
+        """Whether bytes after the payload are written before the pass over them."""
+        return any("trailer[" in line for line in (*self.put_trailer, *self.put_check, *self.fills))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -192,6 +209,7 @@ class HuntView:
 class PartsViews:
     """All views of a delimited frame, by name in templates; None if one does not apply."""
 
+    algorithms: Sequence[CheckView]
     f: FrameView
     place: PlaceView
     parts: PartsView
@@ -234,6 +252,7 @@ def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
     stuffing, frame = writer.stuffing, frame_view(plan, body_size=body_size, max_wire=plan.frame.max_wire)
     directed = frame.pass_decode_direction
     return PartsViews(
+        algorithms=list(writer.algorithms.values()),
         f=frame,
         place=PlaceView(
             tailed=rule is not None,
@@ -264,6 +283,8 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
         address_value=writer.get(envelope.address),
         wrong_tail=writer.wrong_tail("end"),
         check_differs=writer.check_differs("end", "value"),
+        values=writer.values,
+        judges=writer.judges("body", "end", f"payload + {writer.head}U"),
     )
 
 
@@ -273,6 +294,7 @@ def _plain(writer: PartWriter, directed: str) -> PlainView:
         put_header=writer.put_header("wire", "sent"),
         put_trailer=writer.put_trailer("end"),
         put_check=writer.put_check("end", "value"),
+        fills=writer.fills("wire", "end", f"{header}U + sent"),
         update_sent=writer.covered_loops("wire", "0", f"{header}U + sent"),
         update_received=writer.covered_loops("wire", "0", f"payload + {header}U"),
         head_checks=list(writer.head_checks("size", directed, all_there=True)),
@@ -282,7 +304,7 @@ def _plain(writer: PartWriter, directed: str) -> PlainView:
 def _stuffed(writer: PartWriter, stuffing: FrameStuffing, directed: str) -> StuffedView:
     tail, both = writer.envelope.trailer_size, writer.head + writer.envelope.trailer_size
     front, back = stuffing.front - len(writer.lead), stuffing.back
-    part = writer.envelope.check
+    part = writer.alone
     sent = writer.covered_loops("wire", f"(capacity - {both}U - size)", f"(capacity - {tail}U)")
     received = writer.covered_loops("body", "0", f"payload + {writer.head}U")
     sent_from = f"(from > (capacity - {both - front}U - size))" if front else ""
@@ -296,6 +318,7 @@ def _stuffed(writer: PartWriter, stuffing: FrameStuffing, directed: str) -> Stuf
         put_header=writer.put_header("head", "size"),
         put_trailer=writer.put_trailer("trailer"),
         put_check=writer.put_check("trailer", "value"),
+        fills=writer.fills("head", "trailer", f"{writer.head}U + size"),
         update_before=writer.lead_updates + ([] if writer.covers_body else sent),
         update_lead=writer.lead_updates,
         update_received=[] if writer.covers_body else received,

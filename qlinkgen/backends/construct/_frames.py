@@ -278,14 +278,14 @@ class Frame(Construct):
         self.hunt = hunt
         self.bare = bare
         self.payload = next(part for part in parts if isinstance(part, Payload))
-        self.check = next((part for part in parts if isinstance(part, Check)), None)
+        self.checks = [part for part in parts if isinstance(part, Check)]
 
     def overhead(self, message: Message) -> int:
         """Size of the frame of a message without its payload."""
         return sum(
             _size(part)
             for part in self.parts
-            if message.checksum or part is not self.check
+            if message.checksum or not isinstance(part, Check)
         )
 
     def wrap(
@@ -302,8 +302,12 @@ class Frame(Construct):
         cells = {
             part.name: self._cell(part, shown, sent, address) for part in self.parts
         }
-        if self.check and message.checksum:
-            cells[self.check.name] = self.check.value(cells, request)
+        left = self.checks if message.checksum else []
+        while left:  # a check value may cover others
+            names = {part.name for part in left}
+            part = next(part for part in left if names.isdisjoint(part.over))
+            cells[part.name] = part.value(cells, request)
+            left = [each for each in left if each is not part]
         inner = [
             part.name for part in self.parts if stuffing and part.name in stuffing.over
         ]
@@ -372,11 +376,11 @@ class Frame(Construct):
     ) -> Container:
         """Check a frame in cells: check value, message, sizes, values, address. Returns its message."""
         found = self.by_id.get(number)
-        if self.check and (found is None or found.checksum):
-            sent, expected = cells[self.check.name], self.check.value(cells, request)
+        for check in self.checks if found is None or found.checksum else ():
+            sent, expected = cells[check.name], check.value(cells, request)
             if sent != expected:
-                rejected = self.check.rejected
-                refused = rejected is not None and sent == self.check.packed(rejected)
+                rejected = check.rejected
+                refused = rejected is not None and sent == check.packed(rejected)
                 kind = "illegal" if refused else "crc"
                 raise FrameError(
                     kind, f"received {sent.hex()}, expected {expected.hex()}"
@@ -476,6 +480,7 @@ class DelimitedFrame(Frame):
         numbers: dict[type, int] = {}
         for part in self.parts:
             if isinstance(part, Payload):
+                self._header(cells)
                 cells[part.name] = self._sent(source, part, numbers)
             elif isinstance(part, Constant) and Payload not in numbers:
                 cells[part.name] = self._constant(source, part)
@@ -485,6 +490,14 @@ class DelimitedFrame(Frame):
         payload = self._plain(cells)
         source.end()
         return self._judged(cells, numbers[Id], payload, numbers.get(Address, 0))
+
+    def _header(self, cells: Mapping[str, bytes]) -> None:
+        """Verify check values of the header alone."""
+        for check in self.checks:
+            if {check.name, *check.over} <= cells.keys():
+                expected = check.value(cells, b"")
+                if cells[check.name] != expected:
+                    raise FrameError("crc", f"{check.name} is not {expected.hex()}")
 
     def _constant(self, source: _Wire, part: Constant) -> bytes:
         for index in range(len(part.data)):
@@ -570,8 +583,8 @@ class MarkedFrame(Frame):
             )
         size = len(wire) - self.overhead(message)
         cells = {self.payload.name: wire[1 : 1 + size]}
-        if self.check:
-            cells[self.check.name] = wire[1 + size : -1]
+        if self.checks:
+            cells[self.checks[0].name] = wire[1 + size : -1]
         return self._judged(cells, number, wire[1 : 1 + size], address)
 
 

@@ -30,7 +30,10 @@ from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, Se
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Names of definitions other than messages and types.
-_OWN_NAMES = ("ALGORITHM", "LAYOUT", "MESSAGES", "REQUEST_FRAME", "RESPONSE_FRAME", "FRAME", "CRC")
+_OWN_NAMES = (
+    *("ALGORITHM", "LAYOUT", "MESSAGES", "REQUEST_FRAME", "RESPONSE_FRAME", "FRAME", "CRC"),
+    *(f"ALGORITHM_{number}" for number in range(2, 10)),
+)
 
 
 def definitions(plan: Plan) -> tuple[Definition, ...]:
@@ -74,8 +77,8 @@ def _message(message: MessagePlan, types: Types) -> Call:
 
 def _frames(plan: Plan, messages: Mapping[str, str]) -> Iterator[Definition]:
     frame = plan.frame
-    if frame.check is not None:
-        yield Definition("ALGORITHM", _algorithm(frame.check.algorithm), frame.check.algorithm.name)
+    for algorithm, name in _algorithms(frame.envelope).items():
+        yield Definition(name, _algorithm(algorithm), algorithm.name)
     stated = plan.protocol.frame
     if not frame.needs_request:
         yield Definition("LAYOUT", _layout(frame.envelope), comment(stated.doc, stated.section))
@@ -87,6 +90,15 @@ def _frames(plan: Plan, messages: Mapping[str, str]) -> Iterator[Definition]:
         frames.append(Ref(name))
         yield Definition(name, _frame(frame, layout, chosen))
     yield Definition("MESSAGES", Call("messages_of", tuple(frames)), "Payloads by full name.")
+
+
+def _algorithms(envelope: Envelope) -> Mapping[catalogue.Checksum, str]:
+    """The name of each algorithm of a frame, the main one first."""
+    parts = sorted(envelope.checks, key=lambda part: part is not envelope.check)
+    found = dict.fromkeys(part.check.algorithm for part in parts)
+    return {
+        each: "ALGORITHM" if number == 1 else f"ALGORITHM_{number}" for number, each in enumerate(found, 1)
+    }
 
 
 def _algorithm(algorithm: catalogue.Checksum) -> Call:
@@ -159,7 +171,11 @@ def _check(part: CheckPart, envelope: Envelope) -> Call:
     word = (("word", check.word),) if check.chained else ()
     rejected = (("rejected", check.rejected),) if check.rejected is not None else ()
     mask = hexadecimal(check.mask, (check.algorithm.width + 3) // 4)
-    return Call("Check", (part.name, Ref("ALGORITHM"), integer(kind), mask, over), (*word, *rejected))
+    return Call(
+        "Check",
+        (part.name, Ref(_algorithms(envelope)[check.algorithm]), integer(kind), mask, over),
+        (*word, *rejected),
+    )
 
 
 def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:

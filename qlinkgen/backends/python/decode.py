@@ -153,9 +153,9 @@ class Decoder:
                 # The receiver relies on this comparison of length and size.
                 number = self._size(part.integer, f"{part.name}_part", at)
                 self._sizes += [f"if {number} != {self._length(part)}:", self._bad_layout]
-            case LengthPart() | IdPart() | ConstantPart():
+            case LengthPart() | IdPart() | ConstantPart() | CheckPart():
                 self._row(at).codes.append(f"{part.size}x")
-            case MarkPart() | PayloadPart() | CheckPart():
+            case MarkPart() | PayloadPart():
                 raise AssertionError(f"{part.name} is not read by a message's class")
             case _:
                 assert_never(part)

@@ -153,21 +153,38 @@ class StuffingView:
 
 @dataclass(frozen=True)
 class PlacedCheck:
-    """A check value, its offsets in the frame, and the expression for the bytes that it covers."""
+    """A check value, its offsets in the frame, and the expression for the bytes that it covers.
 
+    Attributes:
+        mark: what the names of its functions end with, "" for the main one.
+        main: another algorithm can replace it.
+        early: it is verified before the payload.
+    """
+
+    name: str
     view: CheckView
     start: str
     end: str
-    last: bool
     covered: str
+    mark: str
+    main: bool
+    early: bool
 
 
 @dataclass(frozen=True)
 class PartsView:
-    """Any other delimited frame."""
+    """Any other delimited frame.
+
+    Attributes:
+        checks: the check values in wire order.
+        filling: the same in the order in which they are computed.
+        blank: size of the check value at the end of the frame, 0 if something else is there.
+    """
 
     title: str
-    placed: PlacedCheck | None
+    checks: Sequence[PlacedCheck]
+    filling: Sequence[PlacedCheck]
+    blank: int
     address: AddressView | None
     length: LengthView | None
     stuffing: StuffingView | None
@@ -189,9 +206,14 @@ class PartsView:
     template = "delimited"
 
     @property
+    def main(self) -> PlacedCheck | None:
+        """The main check value, None if there is none."""
+        return next((each for each in self.checks if each.main), None)
+
+    @property
     def check(self) -> CheckView | None:
-        """The check value, None if there is none."""
-        return self.placed.view if self.placed else None
+        """The algorithm of the main check value, None if there is none."""
+        return self.main.view if self.main else None
 
     @property
     def no_frame(self) -> Sequence[HeadCheck]:
@@ -286,11 +308,11 @@ def _by_id(messages: Sequence[MessagePlan], attribute: str = "") -> str:
 # Parts of views
 
 
-def _check_view(check: Check) -> CheckView:
+def _check_view(check: Check, mark: str = "") -> CheckView:
     algorithm = check.algorithm
     selectable = isinstance(algorithm, Algorithm) and algorithm.width == 16
     maker, arguments = _algorithm(algorithm)
-    definition = wrapped(f"_CHECKSUM = {maker}(", arguments, ")", 0)
+    definition = wrapped(f"_CHECKSUM{mark} = {maker}(", arguments, ")", 0)
     return CheckView(definition, check.size, check.regular or "", _check_bytes(check), selectable, maker)
 
 
@@ -430,9 +452,13 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
     number, address = envelope.id, _address_view(plan)
     assert number is not None
     length = _length_view(plan, envelope)
+    checks, filling = _all_placed(envelope)
+    last = envelope.parts[-1]
     return PartsView(
         title=title,
-        placed=_placed(envelope),
+        checks=checks,
+        filling=filling,
+        blank=last.size if isinstance(last, CheckPart) else 0,
         address=address,
         length=length,
         stuffing=_stuffing(plan),
@@ -515,31 +541,40 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                     yield HeadCheck(f"len(head) >= {end} and _number(head) not in known", no_frame, "number")
                 if known and envelope.address is not None:
                     yield HeadCheck(f"len(head) >= {end} and not _allowed(head, known)", no_frame, "address")
-            case IdPart() | AddressPart():
+            case IdPart() | AddressPart() | CheckPart():
                 pass
-            case MarkPart() | PayloadPart() | CheckPart():
+            case MarkPart() | PayloadPart():
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
 
 
-def _placed(envelope: Envelope) -> PlacedCheck | None:
-    part = envelope.check
-    if part is None:
-        return None
-    start = -envelope.from_end(part)
-    end = start + part.size
+def _placed(envelope: Envelope, part: CheckPart, mark: str) -> PlacedCheck:
+    """The view of a check value."""
     covered = " + ".join(
         f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
-        for run in envelope.coverage
+        for run in envelope.coverage(part)
     )
     return PlacedCheck(
-        view=_check_view(part.check),
-        start=str(start),
-        end=str(end) if end else "",
-        last=envelope.parts[-1] is part,
-        covered=covered or 'b""',
+        name=part.name,
+        view=_check_view(part.check, mark),
+        start=_edge(envelope, part),
+        end=_edge(envelope, part, after=True),
+        covered=covered,
+        mark=mark,
+        main=part is envelope.check,
+        early=part in envelope.header_checks,
     )
+
+
+def _all_placed(envelope: Envelope) -> tuple[list[PlacedCheck], list[PlacedCheck]]:
+    """The views of all check values in wire order, and in the order in which they are computed."""
+    others = [part for part in envelope.checks if part is not envelope.check]
+    views = {
+        part.name: _placed(envelope, part, f"_{others.index(part) + 2}" if part in others else "")
+        for part in envelope.checks
+    }
+    return list(views.values()), [views[part.name] for part in envelope.filling]
 
 
 def _edge(envelope: Envelope, part: Part, *, after: bool = False) -> str:

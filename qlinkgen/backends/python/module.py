@@ -178,7 +178,7 @@ class Module:
                 used |= {"UNREAD", "UNREADABLE", *(["Struct"] if view.whole_sizes else [])}
                 typing |= {"Any"}
             case PartsView():
-                pass
+                used |= {each.view.maker for each in view.checks}
             case MarkedView():
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():

@@ -193,11 +193,21 @@ class _Frame:
 
     def _checks(self, part: CheckPart) -> Iterator[tuple[str, int]]:
         mask, refusal = part.check.mask, part.check.rejected
-        value = self._codec.check_value(self._envelope, self._cells, self._good.request) & mask
+        value = self._value(part) & mask
         bits = (1 << bit for bit in range(mask.bit_length()) if mask >> bit & 1)
         yield "a bit is flipped", next(value ^ bit for bit in bits if value ^ bit != refusal)
         if refusal is not None:
             yield "the command is refused", refusal
+
+    def _value(self, part: CheckPart) -> int:
+        """The right check value."""
+        cells = dict(self._cells)
+        for each in self._envelope.filling:
+            value = self._codec.check_value(each, self._envelope, cells, self._good.request)
+            if each is part:
+                return value
+            cells[each.name] = each.check.pack(value)
+        raise AssertionError(part.name)
 
     def _payloads(self) -> Iterator[tuple[str, bytes]]:
         plan, payload, length = self._message.payload, self._good.payload, self._envelope.length

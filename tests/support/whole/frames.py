@@ -143,6 +143,8 @@ class _Parts:
         if self._chance(0.08) and not strict:
             self._add("fence", {"role": "constant", "value": "5A"})
         self._checked(names, whole=strict)
+        while self._chance(0.2) and not strict:
+            self._also_checked(names)
         if self._chance(0.3) and not strict:
             names["end"] = self._add("end", {"role": "constant", "value": self.rng.choice(_ENDS)})
         if "length" in names:
@@ -196,6 +198,30 @@ class _Parts:
                 (["0..6", "8..14"], ["8..15"], ["0..3", "4..7", "8..11", "12..15"], ["7..14", "0..6"])
             )
         names["checksum"] = self._add("crc", spec)
+
+    def _also_checked(self, names: Doc) -> None:
+        """One more check value at any place, often in the header and over it alone."""
+        rng, others = self.rng, list(self.parts)
+        algorithm, width = _algorithm(rng)
+        front = others[: others.index(names["payload"])]
+        covered = front if front and self._chance(0.5) else others
+        covered = [name for name in covered if rng.random() < 0.7] or covered[:1]
+        spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
+        name = self._add("head", spec | _order(rng))
+        least = 1 if "lead" in names else 0
+        place = rng.randint(least, len(front) if self._chance(0.7) else len(others))
+        others.insert(place, name)
+        ordered = {each: self.parts[each] for each in others}
+        self.parts.clear()
+        self.parts.update(ordered)
+        for each, part in self.parts.items():
+            # No two check values cover each other.
+            if "over" in part and each not in self._under(name) and self._chance(0.6):
+                part["over"] = [other for other in others if other in (name, *part["over"])]
+
+    def _under(self, name: str) -> set[str]:
+        """A part, and the parts that it covers, directly or through others."""
+        return {name}.union(*(self._under(each) for each in self.parts[name].get("over", ())))
 
     def _counts(self, names: Doc, *, hunted: bool, every: bool) -> None:
         counted = [

@@ -1,0 +1,118 @@
+"""Check values anywhere in a frame: by hand, and the same in every output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from qlinkgen.backends import python
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.dissect import dissect
+from qlinkgen.plan.receive import receiver
+from qlinkgen.plan.spans import Rule
+from qlinkgen.plan.tree import Plan
+from qlinkgen.schema import loads
+from tests.support.whole.trial import Effort, run_text
+
+_HEAD = """\
+qlinkgen: 1
+protocol: {name: tank, title: Tank, revision: "1", source: Example, doc: A tank}
+byteorder: big
+bus: {kind: master_slave}
+messages:
+  log: {id: 5, fields: {note: "bytes[0..40]"}}
+  state: {id: 6, direction: response, fields: {level: {type: u16, range: 0..1000}}}
+frame:
+  parts:
+"""
+_TWO = """\
+    start: AA
+    length: {type: u8, counts: [data]}
+    code: {role: message, type: u8}
+    head: {type: u8, algorithm: xor8, over: [length, code]}
+    data: {role: payload, size: 0..40}
+    sum: {type: u16, algorithm: sum16, over: [start, head, data]}
+"""
+SHAPES = {
+    "a check value of the header, and one over it": _TWO,
+    "one before the payload that covers the end": """\
+    start: AA 55
+    crc: {type: u16, byteorder: little, algorithm: crc-16/modbus, over: [start, length, code, data, stop]}
+    length: {type: u16, counts: [crc, data, stop]}
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..40}
+    stop: 0D 0A
+""",
+    "one that comes first, and covers another": """\
+    all: {type: u32, algorithm: adler-32, over: [kind, code, length, data, sum]}
+    kind: 11
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    data: {role: payload, size: 0..40}
+    sum: {type: u8, algorithm: sum8-zero, over: [length, data]}
+    stop: 03
+""",
+    "two of one algorithm in a stuffed frame": """\
+    start: A5 A5
+    length: {type: u8, counts: [data]}
+    code: {role: message, type: u8}
+    head: {type: u16, algorithm: crc-16/xmodem, over: [start, code]}
+    data: {role: payload, size: 0..40}
+    crc: {type: u16, algorithm: crc-16/xmodem, over: [data]}
+  stuffing: {after: 0xA5, insert: 0x00, exempt: [start]}
+""",
+}
+
+
+def plan(parts: str) -> Plan:
+    protocol, faults = loads(_HEAD + parts, "tank.yaml")
+    assert protocol, faults
+    return plan_of(protocol)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("parts", SHAPES.values(), ids=SHAPES)
+def test_outputs_agree(parts: str, require_tool: Callable[..., str]) -> None:
+    for compiler, package in (("gcc", "gcc"), ("g++", "g++"), ("clang", "clang"), ("clang++", "clang")):
+        require_tool(compiler, package=package)
+    outcome = run_text(_HEAD + parts, effort=Effort(streams=40, every=True))
+    assert not outcome.refused
+    assert not outcome.differences, outcome.report()
+
+
+def test_a_frame_by_hand() -> None:
+    # 03 ^ 05 = 06; AA + 06 + 01 + 02 + 03 = 00B6.
+    frame = bytes.fromhex("aa 03 05 06 010203 00b6")
+    assert Codec(plan(_TWO)).encode("log", {"note": b"\1\2\3"}) == frame
+
+
+def test_a_wrong_header_is_refused_before_its_payload() -> None:
+    """The length is wrong; the next frame is delivered without waiting for the bytes that it announces."""
+    found = plan(_TWO)
+    good = Codec(found).encode("state", {"level": 7})
+    wrong = bytes.fromhex("aa 28 06 00")
+    machine = receiver(found, "response")
+    events = [event for byte in wrong + good for event in machine.feed(byte)]
+    assert [(event.kind, event.at, event.raw) for event in events] == [
+        ("crc", 3, wrong),
+        ("message", len(wrong + good) - 1, good),
+    ]
+    decoder = python.load(found.protocol).StreamDecoder("response")
+    assert [type(each).__name__ for each in decoder.feed(wrong + good)] == ["Fault", "State"]
+
+
+def test_explain_names_the_wrong_one() -> None:
+    found = plan(_TWO)
+    for wire, part in (("aa 03 05 07 010203 00b7", "head"), ("aa 03 05 06 010203 00b7", "sum")):
+        seen = dissect(found, bytes.fromhex(wire), "request")
+        assert seen.kind == "crc"
+        assert [(fault.rule, getattr(fault.of, "name", "")) for fault in seen.faults] == [(Rule.CHECK, part)]
+
+
+def test_another_algorithm_replaces_the_one_over_the_payload() -> None:
+    protocol, faults = loads(_HEAD + _TWO, "tank.yaml", crc="crc-16/modbus")
+    assert protocol, faults
+    names = [part.check.algorithm.name for part in plan_of(protocol).frame.envelope.checks]
+    assert names == ["xor8", "crc-16/modbus"]
