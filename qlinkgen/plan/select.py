@@ -7,7 +7,7 @@ from typing import Literal
 
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Enum, Flags, Scalar
+from qlinkgen.model.types import Array, Enum, Flags, Scalar
 
 Role = Literal["both", "master", "slave"]
 
@@ -60,6 +60,7 @@ def received_directions(protocol: Protocol, role: Role) -> tuple[Direction, ...]
 
 def named(messages: tuple[Message, ...]) -> frozenset[str]:
     """Names of the enums and flags that the messages use."""
-    scalars = (value.type for message in messages for value in message.values)
+    types = (value.type for message in messages for value in message.values)
+    scalars = (each.item if isinstance(each, Array) else each for each in types)
     meanings = (scalar.meaning for scalar in scalars if isinstance(scalar, Scalar))
     return frozenset(each.name for each in meanings if isinstance(each, Enum | Flags))

@@ -11,10 +11,9 @@ from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, byte_string, shown, whole_range
 from qlinkgen.schema.numbers import defaulted, quantified
-from qlinkgen.schema.scalars import Meaning, Plain, ScalarBuilder
+from qlinkgen.schema.scalars import Meaning, ScalarBuilder
 
 _NUMBER_KEYS = ("byteorder", "groups", "parts", "scale", "offset", "range", "raw_range", "counts", "bits")
-_ITEM_KEYS = ("scale", "offset", "range", "raw_range", "const", "reserved", "counts", "bits")
 _WHOLE_KEYS = ("const", "reserved", "counts", "bits")
 _CONTAINER_KEYS = ("scale", "offset", "range", "raw_range", "default", "const", "reserved", "counts", "unit")
 
@@ -88,53 +87,33 @@ def _bytes(value: object) -> bytes:
 def build_array(
     item: Scalar, spec: FieldSpec, text: TypeText, payload_max: int, location: Location
 ) -> Array | None:
-    """An array of integers."""
-    length = build_length(text, item.size, payload_max, location)
-    if length is None:
-        return None
-    default = _array_default(spec, item, length, location)
-    required = spec.default is None and length.minimum > 0 and item.default == 0
-    return Array(item, length, default + (item.default,) * (length.minimum - len(default)), required)
-
-
-def _array_default(spec: FieldSpec, item: Scalar, length: Length, location: Location) -> tuple[int, ...]:
-    if spec.default is None:
-        return ()
-    if not isinstance(spec.default, list):
-        location.fault(
-            "wrong-type", "default", f"{shown(spec.default)} is not a list", "write a list, like [1, 2]"
-        )
-        return ()
-    if len(spec.default) > length.maximum:
-        what = f"the default has {len(spec.default)} items"
-        location.fault("value-does-not-fit", "default", what, f"write at most {length.maximum}")
-        return ()
-    for value in spec.default:
-        if not item.minimum <= value <= item.maximum:
-            hint = f"write numbers from {item.minimum} to {item.maximum}"
-            location.fault("value-does-not-fit", "default", f"{value} does not fit an item", hint)
-            return ()
-    return tuple(spec.default)
-
-
-def is_plain_item(spec: FieldSpec, plain: Plain, base: str, location: Location) -> bool:
-    """Check that an array can hold the type, and that keys apply to its items."""
-    if isinstance(plain.meaning, Float):
-        location.reject(spec, _WHOLE_KEYS, "an array")
-        return True
-    if plain.meaning is not None or plain.scaling is not None:
-        hint = "use u8 to i64, or a field for each"
-        location.fault("bad-array", "type", f"an array cannot hold '{base}', only plain integers", hint)
-        return False
-    for key in _ITEM_KEYS:
+    """An array; ``item`` has the default of each item, which is that of its named type if it has one."""
+    for key in _WHOLE_KEYS:
         if getattr(spec, key) in (None, False):
             continue
         if key in location.written:
             location.reject(spec, (key,), "an array")
         else:
-            what = f"an array holds plain integers, but the type of its items has '{key}'"
-            location.fault("bad-array", "type", what, "use u8 to i64, or a field for each")
-    return True
+            what = f"the items of an array cannot have '{key}', as their type has"
+            location.fault("bad-array", "type", what, "use a field for each")
+    length = build_length(text, item.size, payload_max, location)
+    if length is None:
+        return None
+    given = isinstance(spec.default, list) or "default" in location.written
+    default = _array_default(spec.default, item, length, location) if given else ()
+    required = spec.default is None and length.minimum > 0
+    return Array(item, length, default + (item.default,) * (length.minimum - len(default)), required)
+
+
+def _array_default(given: object, item: Scalar, length: Length, location: Location) -> tuple[int, ...]:
+    if not isinstance(given, list):
+        location.fault("wrong-type", "default", f"{shown(given)} is not a list", "write a list, like [1, 2]")
+        return ()
+    if len(given) > length.maximum:
+        what = f"the default has {len(given)} items"
+        location.fault("value-does-not-fit", "default", what, f"write at most {length.maximum}")
+        return ()
+    return tuple(defaulted(item, value, "default", location).default for value in given)
 
 
 def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, location: Location) -> Bits:

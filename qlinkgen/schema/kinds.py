@@ -48,13 +48,11 @@ def _characters(value: object) -> object:
 
 
 def _scalar(value: object) -> object:
-    if isinstance(value, list) and all(
-        isinstance(item, int) and not isinstance(item, bool) for item in value
-    ):
+    if isinstance(value, list) and all(isinstance(item, int | Decimal | str) for item in value):
         return value
     if value is None or isinstance(value, dict | list):
         raise ValueError(
-            f"{shown(value)} is not a value; write a number, true, false, text or a list of whole numbers"
+            f"{shown(value)} is not a value; write a number, true, false, text or a list of these"
         )
     return value
 
@@ -127,11 +125,9 @@ Time = Annotated[
     notation.Duration, PlainValidator(notation.duration), _json("3 bytes, 260 us, 10 ms or 1 s", "string")
 ]
 ScalarValue = Annotated[
-    int | bool | Decimal | str | list[int],
+    int | bool | Decimal | str | list[int | bool | Decimal | str],
     PlainValidator(_scalar),
-    _json(
-        "A number, true or false, text, or a list of whole numbers", "number", "boolean", "string", "array"
-    ),
+    _json("A number, true or false, text, or a list of these", "number", "boolean", "string", "array"),
 ]
 Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "string", "integer", "boolean")]
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]

@@ -13,7 +13,7 @@ from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import Range, rational, shown
 from qlinkgen.schema.report import did_you_mean, listed
 
-Written = int | bool | Decimal | str | list[int]
+Written = int | bool | Decimal | str | list[int | bool | Decimal | str]
 
 
 class Quantity(Protocol):

@@ -127,7 +127,11 @@ _ALL = (
         "At most one field of a message takes the rest of the payload.",
         "The boundary between two such fields is unknown; give one of them a count.",
     ),
-    Rule("bad-array", "Arrays hold plain integers.", "Use separate fields for scaled or named values."),
+    Rule(
+        "bad-array",
+        "An array has at least one item of one integer or floating-point type.",
+        "Use separate fields for values that differ.",
+    ),
     Rule(
         "payload-too-long",
         "A message's payload fits the frame.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from qlinkgen.model.types import Array, FieldType, Scalar
-from qlinkgen.schema.compounds import build_array, build_bits, build_blob, is_plain_item
+from qlinkgen.schema.compounds import build_array, build_bits, build_blob
 from qlinkgen.schema.constants import INTEGER, build_enum, build_flags
 from qlinkgen.schema.file_model import FieldSpec, SchemaFile
 from qlinkgen.schema.location import Location
@@ -109,14 +109,7 @@ class TypeBuilder:
             return None
         if text.count is not None:
             self._note_unbounded(text, location)
-            if not is_plain_item(spec, plain, text.base, location):
-                return None
-            inherited = "default" not in location.written and not isinstance(spec.default, list)
-            item = self._scalars.build(
-                _item(spec, text.base, with_default=inherited), text.base, plain, location
-            )
-            if inherited:
-                spec = spec.model_copy(update={"default": None})
+            item = self._scalars.build(_item(spec, text.base, location), text.base, plain, location)
             return build_array(item, spec, text, self._payload_max, location) if item else None
         if spec.bits is None:
             return self._scalars.build(spec, text.base, plain, location)
@@ -182,10 +175,10 @@ class TypeBuilder:
         return merged, TypeText(below.base, below.count if text.count is None else text.count)
 
 
-def _item(spec: FieldSpec, base: str, *, with_default: bool) -> FieldSpec:
-    """The keys of the items of an array, and perhaps the default of the named type of each."""
+def _item(spec: FieldSpec, base: str, location: Location) -> FieldSpec:
+    """The keys of the items of an array, with the default of their named type."""
     keys = ["byteorder", "groups", "parts", "scale", "offset", "unit", "range", "raw_range"]
-    keys += ["default"] if with_default else []
+    keys += ["default"] if "default" not in location.written and not isinstance(spec.default, list) else []
     return FieldSpec(type=base).model_copy(update={key: getattr(spec, key) for key in keys})
 
 

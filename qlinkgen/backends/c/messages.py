@@ -143,7 +143,7 @@ class MessageWriter:
 
     def _scale(self, plan: MessagePlan, each: Settable) -> Kind | None:
         """The conversion of a field, None if its named type has it."""
-        if isinstance(each, BytesStep | ItemsStep):
+        if isinstance(each, BytesStep):
             return None
         kind = self._types.conversions(plan.message, each.name, each.number)
         return None if kind is None or kind.named else kind
@@ -203,7 +203,7 @@ def nearest_helpers(types: Types, messages: tuple[MessagePlan, ...]) -> list[Rou
         types.conversions(message.message, each.name, each.number)
         for message in messages
         for each in message.payload.settable
-        if isinstance(each, ValueStep | Member)
+        if not isinstance(each, BytesStep)
     )
     return [
         Rounding(plain.removesuffix("_t"), plain, *(("0U", "1U") if plain.startswith("u") else ("0", "1")))

@@ -24,7 +24,6 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
-    Member,
     PayloadPlan,
     ReservedStep,
     Step,
@@ -193,7 +192,7 @@ class ClassBuilder:
         """The constant that converts each scaled value, named after its type or else its field."""
         found = {}
         for each in message.payload.settable:
-            if isinstance(each, ValueStep | Member) and each.number.scaling is not None:
+            if not isinstance(each, BytesStep) and each.number.scaling is not None:
                 found[each.name] = self._scale(each.name, each.number)
         return found
 

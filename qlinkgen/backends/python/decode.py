@@ -375,7 +375,7 @@ class Decoder:
         local, offset = f"{step.name}_raw", _offset(step)
         if self._tabled:
             number = self._size(step.integer, local, at, step.name, offset)
-            items = f"len(message.{attribute(step.run)})"
+            items = f"len({_items_of(self._tabled)})"
             expected = f"{step.scale} * {items}" if step.scale > 1 else items
             self._sizes += [f"if {number} != {expected}:", self._bad_layout]
         elif (taken := integers.get(step.integer, local, self.place.byteorder)).stray:
@@ -432,7 +432,8 @@ class Decoder:
         self._open = False
 
     def _items(self, step: ItemsStep, at: Size) -> None:
-        target, kind = f"message.{attribute(step.name)}", step.number.meaning
+        kind, plain = step.number.meaning, _is_plain(step.number)
+        whole, target = f"message.{attribute(step.name)}", _items_of(step)
         code = floats.letter(step.number, step.item, self.place.byteorder)
         if code and step.fixed:
             row = self._row(at, starred=True)
@@ -455,6 +456,9 @@ class Decoder:
         for rule in floats.holds(kind, "item") if isinstance(kind, Float) else rules:
             test = f"not all({rule} for item in {target})"
             self._refuse(test, step.name, target, _offset(step))
+        if not plain:
+            item = converted(step.number, "item", self.scales.get(step.name, ""), self.place)
+            self._values.append(f"{whole} = [{item} for item in {target}]")
 
     def _odd_items(self, step: ItemsStep, target: str, at: Size) -> None:
         """Unpack items that struct does not support, or not in this byte order."""
@@ -480,28 +484,40 @@ class Decoder:
         self._values.append(f"{target} = [{number} {places}]")
 
 
+def _items_of(step: ItemsStep) -> str:
+    """The variable of the items as on the wire."""
+    return f"message.{attribute(step.name)}" if _is_plain(step.number) else f"{step.name}_items"
+
+
 def assigned(target: str, number: Scalar, raw: str, scale: str, place: Place) -> list[str]:
     """Statements that assign an attribute from a raw number."""
+    if isinstance(number.meaning, Enum):
+        members = f"{place.classes[number.meaning.name]}.members.get("
+        return wrapped(f"{target} = {members}", [raw, raw], ")", _INDENT)
+    return [f"{target} = {converted(number, raw, scale, place)}"]
+
+
+def converted(number: Scalar, raw: str, scale: str, place: Place) -> str:
+    """The native value of a raw number, which must be a plain name."""
     meaning, scaling = number.meaning, number.scaling
     match meaning:
         case Enum():
-            members = f"{place.classes[meaning.name]}.members.get("
-            return wrapped(f"{target} = {members}", [raw, raw], ")", _INDENT)
+            return f"{place.classes[meaning.name]}.members.get({raw}, {raw})"
         case "bool":
-            return [f"{target} = {raw} == 1"]
+            return f"{raw} == 1"
         case Flags() | Float() | None:
             pass
         case _:
             assert_never(meaning)
     if scaling is None:
-        return [f"{target} = {raw}"]
+        return raw
     if number.number == "decimal":
-        return [f"{target} = {scale}.value({raw})"]
+        return f"{scale}.value({raw})"
     product = raw if scaling.factor == 1 else f"{raw} * {scaling.factor}"
     total = f"{product} {'+' if scaling.bias > 0 else '-'} {abs(scaling.bias)}" if scaling.bias else product
     if scaling.divisor == 1:
-        return [f"{target} = {total}"]
-    return [f"{target} = {f'({total})' if scaling.bias else total} / {scaling.divisor}"]
+        return total
+    return f"{f'({total})' if scaling.bias else total} / {scaling.divisor}"
 
 
 def _is_plain(number: Scalar) -> bool:
@@ -509,7 +525,9 @@ def _is_plain(number: Scalar) -> bool:
     match number.meaning:
         case Flags() | None:
             return number.scaling is None
-        case Enum() | Float() | "bool":
+        case Float():
+            return True
+        case Enum() | "bool":
             return False
         case _:
             assert_never(number.meaning)

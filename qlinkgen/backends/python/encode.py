@@ -266,9 +266,18 @@ class Encoder:
                     f"{step.length.maximum * step.item_size}s", data
                 ) if step.fixed else self._pieces.append(data)
                 return
-        elif not code or step.conditions:
-            self._odd_items(step, source)
-            return
+        else:
+            if step.number.scaling is not None:
+                self._lines.append(
+                    f"{step.name}_items = [{self.scales[step.name]}.raw(item) for item in {source}]"
+                )
+                source = f"{step.name}_items"
+            if not code:
+                self._odd_items(step, source)
+                return
+            self._terms += [
+                f"all({integers.holds(rule, 'item')} for item in {source})" for rule in step.conditions
+            ]
         if step.fixed:
             self._add(f"{step.length.maximum}{code}", f"*{source}")
         elif step is self._tabled:

@@ -175,8 +175,8 @@ def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
             return [_rule(place, kind, name, step.length.minimum, step.length.maximum)]
         case ItemsStep():
             length, item = step.length, step.number
-            if isinstance(item.meaning, Float):
-                inner = _number_rule(step.name, item, place, scales)
+            inner = _number_rule(step.name, item, place, scales)
+            if inner.name != "IntRule":
                 return [Call(place.use("ListRule"), [str(length.minimum), str(length.maximum), inner.flat])]
             bounds = (length.minimum, length.maximum, item.minimum, item.maximum)
             return [_rule(place, "ArrayRule", name, *bounds, unit=item.unit)]
@@ -226,10 +226,8 @@ def _facts(each: Settable, place: Place) -> str:
             kind = "characters" if each.text else "bytes"
             return f"{span(each.length.minimum, each.length.maximum)} {kind}"
         case ItemsStep():
-            item, items = each.number, span(each.length.minimum, each.length.maximum)
-            if isinstance(item.meaning, Float):
-                return f"{items} items, each {_number_facts(item, place)}"
-            return f"{items} items, each {item.minimum}..{item.maximum}{_of(item)}"
+            items, facts = span(each.length.minimum, each.length.maximum), _number_facts(each.number, place)
+            return f"{items} items, each {facts}" if facts else f"{items} items"
         case ValueStep() | Member():
             return _number_facts(each.number, place)
         case _:

@@ -77,7 +77,7 @@ class FieldMaker:
         text = repr({key: document.get(key) for key in ("commands", "messages")})
         for group in ("types", "enums", "flags"):
             for name in reversed(list(document.get(group, {}))):
-                if f"'{name}'" not in text:
+                if f"'{name}'" not in text and f"'{name}[" not in text:
                     del document[group][name]
                 elif group == "types":
                     text += repr(document[group][name])
@@ -322,11 +322,40 @@ class FieldMaker:
         return name, self._packet_size(name)
 
     def _item(self) -> tuple[str, Doc, int]:
+        if self.rng.random() < 0.4:
+            return self._named_item()
         if not self.shape.groups and self.rng.random() < 0.2:
             kind = self.rng.choice(("f16", "f32", "f64"))
             order: Doc = {"byteorder": self.rng.choice(("big", "little"))} if self.rng.random() < 0.3 else {}
             return kind, order, int(kind[1:]) // 8
         return self._integer()
+
+    def _named_item(self) -> tuple[str, Doc, int]:
+        """An item with a meaning, a scale or a range."""
+        rng = self.rng
+        made = rng.choice(
+            (
+                self._truth,
+                self._of_enum,
+                self._of_flags,
+                self._scaled,
+                self._ranged,
+                self._fixed_point,
+                self._of_named,
+            )
+        )
+        spec, size = made()
+        written: Doc = {"type": spec} if isinstance(spec, str) else dict(spec)
+        whole = self._merged(written)
+        if not {"const", "reserved", "bits", "counts"}.isdisjoint(whole):
+            return self._integer()
+        keys = {key: value for key, value in written.items() if key not in ("type", "default", "doc")}
+        return written["type"], keys, size
+
+    def _merged(self, written: Doc) -> Doc:
+        """A field with the keys of its named type."""
+        named = self.named.get(written["type"], {})
+        return {**(named if isinstance(named, dict) else {}), **written}
 
     def _fixed_run(self) -> tuple[Any, int]:
         rng, number = self.rng, self.rng.choice((1, 2, 3, 4, 9))

@@ -267,15 +267,21 @@ class Fields:
         return Slot(name, self._with_default(number, base, spec, key), role)
 
     def _run(self, base: str, count: str, spec: Doc) -> Run:
-        item = None if base in ("bytes", "text") else self._number(base, spec)
+        item = None if base in ("bytes", "text") else _quantified(self._number(base, spec), spec)
+        listed = isinstance(spec.get("default"), list)
+        if item is not None:
+            item = self._with_default(item, base, {} if listed else spec, "default")
         low, high = whole_span(count) if count else (0, None)
         default: tuple[int, ...] = ()
-        if "default" in spec and item is not None:
-            default = tuple(spec["default"])
-        elif "default" in spec:
+        if listed and item is not None:
+            default = tuple(
+                self._with_default(item, base, {"default": each}, "default").default
+                for each in spec["default"]
+            )
+        elif "default" in spec and item is None:
             text = str(spec["default"])
             default = tuple(text.encode("ascii") if base == "text" else bytes.fromhex(text))
-        fill = ord(" ") if base == "text" else 0
+        fill = item.default if item else ord(" ") if base == "text" else 0
         return Run(item, base == "text", low, high, default + (fill,) * (low - len(default)))
 
     def _number(self, base: str, spec: Doc) -> Number:
