@@ -145,6 +145,11 @@ class Message:
                     assert_never(kind)
 
     @property
+    def echoes(self) -> tuple[str, ...]:
+        """Values that repeat the value of the same name in the request."""
+        return tuple(value.name for value in self.values if value.field.echo)
+
+    @property
     def docs(self) -> dict[str, str]:
         """Descriptions of fields and of the values inside them, by name."""
         found = {field.name: field.doc for field in self.fields}

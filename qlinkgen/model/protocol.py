@@ -9,7 +9,7 @@ from typing import assert_never
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.texts import Text, without_texts
-from qlinkgen.model.transaction import Bus, Command
+from qlinkgen.model.transaction import Bus, Command, Reply
 from qlinkgen.model.types import ByteOrder, Enum, Flags
 
 
@@ -88,6 +88,9 @@ class Protocol:
 
     def command_of(self, message: Message) -> Command | None:
         """The transaction of a message, None if it has none."""
-        return next(
-            (command for command in self.commands if message in (command.request, command.response)), None
-        )
+        return next((command for command in self.commands if message in command.messages), None)
+
+    def reply_of(self, message: Message) -> Reply | None:
+        """The reply that a message is, None for requests, responses and messages without a command."""
+        replies = (reply for command in self.commands for reply in command.replies)
+        return next((reply for reply in replies if reply.message is message), None)

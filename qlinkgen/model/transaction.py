@@ -14,6 +14,9 @@ from qlinkgen.model.texts import Labels, Text
 #: "answered_broadcast": one or all, and a broadcast is answered too, so that only one node may be on the bus;
 #: "none": the frame has no address.
 Addressing = Literal["node", "broadcast", "either", "answered_broadcast", "none"]
+#: "refused": the slave does not do it; "again": it asks for the request once more; "pending": the answer
+#: follows later; "done": an answer like the response, of another form.
+Means = Literal["refused", "again", "pending", "done"]
 BusKind = Literal["master_slave", "ring", "host"]
 
 
@@ -36,6 +39,47 @@ class Repeat:
 
 
 @dataclass(frozen=True, slots=True)
+class Case:
+    """Raw values from ``first`` to ``last`` of the field that decides what a reply means."""
+
+    first: int
+    last: int
+    means: Means
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """An answer other than the response."""
+
+    name: str
+    message: Message
+    #: What it means, unless a case says otherwise.
+    means: Means = "refused"
+    #: Value of the message that decides, "" if nothing does.
+    switch: str = ""
+    cases: tuple[Case, ...] = ()
+    #: Time from the first pending reply to the answer; None: that of the response.
+    within: Allowance | None = None
+    #: Time from a reply that asks for the request once more until it is sent.
+    after: Allowance = Allowance()
+
+    @property
+    def meanings(self) -> tuple[Means, ...]:
+        """Everything that it can mean."""
+        return tuple(dict.fromkeys((self.means, *(case.means for case in self.cases))))
+
+    def means_by(self, raw: int) -> Means:
+        """What it means with a raw value of the deciding field; the first case that has it counts."""
+        found = (case.means for case in self.cases if case.first <= raw <= case.last)
+        return next(found, self.means)
+
+    @property
+    def echoes(self) -> tuple[str, ...]:
+        """Values that repeat the value of the same name in the request."""
+        return self.message.echoes
+
+
+@dataclass(frozen=True, slots=True)
 class Command:
     """A transaction: a request and its response, None if it is not answered."""
 
@@ -51,14 +95,21 @@ class Command:
     doc: Text = ""
     section: Text = ""
     confirmed: bool = True
+    #: Answers other than the response.
+    replies: tuple[Reply, ...] = ()
     #: Protocol-specific attributes; names and values are declared in the schema.
     attributes: Labels = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def echoes(self) -> tuple[str, ...]:
         """Values of the response that repeat the value of the same name in the request."""
-        values = self.response.values if self.response else ()
-        return tuple(value.name for value in values if value.field.echo)
+        return self.response.echoes if self.response else ()
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """Its request, its response and its other replies."""
+        both = (self.request,) if self.response is None else (self.request, self.response)
+        return (*both, *(reply.message for reply in self.replies))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,21 @@ from typing import assert_never
 
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
-from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Repeat
+from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Repeat, Reply
 from qlinkgen.model.types import Scalar
-from qlinkgen.schema.file_model import CommandSpec, Fields, NoResponse, RepeatSpec, SchemaFile
+from qlinkgen.schema.file_model import (
+    AnswerSpec,
+    CommandSpec,
+    Fields,
+    NoResponse,
+    RepeatSpec,
+    SchemaFile,
+)
 from qlinkgen.schema.kinds import Label
-from qlinkgen.schema.messages import MessageBuilder
-from qlinkgen.schema.notation import Duration, shown
+from qlinkgen.schema.layouts import fields_of, fields_path
+from qlinkgen.schema.messages import MessageBuilder, Written
+from qlinkgen.schema.notation import AnswerId, Duration, shown
+from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
@@ -48,11 +57,13 @@ class CommandBuilder:
         self._build = messages
         self._frame = frame
         self._bus = bus
+        self._replies = ReplyBuilder(file, report, messages, frame)
         self.messages: list[Message] = []
         self.commands: list[Command] = []
 
     def build(self) -> None:
         """Fill :attr:`messages` and :attr:`commands`."""
+        self._replies.check_names()
         for name, spec in self._file.commands.items():
             self._command(name, spec, ("commands", name))
         for name, message in self._file.messages.items():
@@ -77,6 +88,7 @@ class CommandBuilder:
                 addressing=addressing,
                 response_within=_allowance(spec.response_within or self._file.bus.response_within),
                 repeat=self._repeat(spec.repeat or defaults.repeat, request, path),
+                replies=self._other_replies(name, response, addressing),
                 in_flight=spec.in_flight or defaults.in_flight or 1,
                 doc=spec.doc,
                 section=self._section(spec),
@@ -85,14 +97,23 @@ class CommandBuilder:
             ),
         )
 
+    def _other_replies(
+        self, name: str, response: Message | None, addressing: Addressing
+    ) -> tuple[Reply, ...]:
+        found = tuple(self._replies.of(name, addressing, answered=response is not None))
+        known = {message.name for message in self.messages}
+        self.messages += [each.message for each in found if each.message.name not in known]
+        return found
+
     def _section(self, spec: CommandSpec) -> str:
         return spec.section if spec.section is not None else self._file.defaults.section or ""
 
     def _directions(
         self, name: str, spec: CommandSpec, addressing: Addressing, path: Path
     ) -> tuple[Message, Message | None]:
-        request = self._file.defaults.request if spec.request is None else spec.request
-        response = self._file.defaults.response if spec.response is None else spec.response
+        defaults = self._file.defaults
+        request = defaults.request if spec.request is None else spec.request
+        response, answers = self._response(spec, path)
         if request is None:
             self._missing(
                 "bad-response",
@@ -106,13 +127,30 @@ class CommandBuilder:
             self._missing("bad-response", "response", path, f"{name} has no response", hint)
         self._check_answered(addressing, response, path)
         section, build = self._section(spec), self._build.directed
-        asked = build(name, spec, "request", request or {}, addressing=addressing, section=section)
+        place = (*path, "request") if spec.request is not None else ("defaults", "request")
+        written = Written("request", spec.id, (*path, "id"), request or {}, place)
+        asked = build(name, spec, written, addressing=addressing, section=section)
         self.messages.append(asked)
         if response is None or response == "none":
             return asked, None
-        answered = build(name, spec, "response", response, addressing=addressing, section=section)
+        answered = build(name, spec, answers, addressing=addressing, section=section)
         self.messages.append(answered)
         return asked, answered
+
+    def _response(self, spec: CommandSpec, path: Path) -> tuple[Fields | NoResponse | None, Written]:
+        """The fields of the response, "none" or None if nothing states them; and the message as written."""
+        own, common = spec.response, self._file.defaults.response
+        given, place = (own, (*path, "response")) if own is not None else (common, ("defaults", "response"))
+        fields = fields_of(given)
+        number, number_path = AnswerId(0, relative=True), (*path, "id")
+        for each, where in ((own, (*path, "response")), (common, ("defaults", "response"))):
+            if isinstance(each, AnswerSpec) and each.id is not None:
+                number, number_path = each.id, (*where, "id")
+                break
+        written = Written(
+            "response", number.of(spec.id), number_path, fields or {}, fields_path(given, place)
+        )
+        return "none" if given == "none" else fields, written
 
     def _missing(self, rule: str, key: str, path: Path, what: str, hint: str) -> None:
         """Report a key that is missing in a command and in the defaults."""
@@ -209,18 +247,22 @@ class CommandBuilder:
     # Relations between messages
 
     def _check_ids(self) -> None:
-        seen: dict[tuple[str, int], Path] = {}
+        seen: dict[tuple[str, int], Message] = {}
         for message in self.messages:
-            group = "commands" if message.name != message.command else "messages"
-            path = (group, message.command, "id")
+            path = self._build.id_places[message.name]
             self._check_id_fits(message, path)
             directions = ("request", "response") if message.direction == "message" else (message.direction,)
             for direction in directions:
-                other = seen.setdefault((direction, message.id), path)
-                if other != path:
-                    what = f"{message.command} has the id of {other[1]}, {message.id:#04x}"
-                    needs = (path, other)
+                other = seen.setdefault((direction, message.id), message)
+                if other is not message:
+                    what = f"{self._called(message)} has the id of {self._called(other)}, {message.id:#04x}"
+                    needs = (path, self._build.id_places[other.name])
                     self._report.error("overlapping-id", path, what, "use another id", needs=needs)
+
+    def _called(self, message: Message) -> str:
+        """The name of what states the number of a message: a command, or a message with one of its own."""
+        spec = self._file.commands.get(message.command)
+        return message.name if spec and spec.id != message.id else message.command
 
     def _check_id_fits(self, message: Message, path: Path) -> None:
         most = 0xFF
@@ -238,8 +280,9 @@ class CommandBuilder:
                 pass
             case _:
                 assert_never(self._frame)
-        if message.id > most:
-            what = f"id {message.id:#x} does not fit the frame"
+        if not 0 <= message.id <= most:
+            whose = f" of {message.name}" if path[-2:] != (message.command, "id") else ""
+            what = f"id {message.id:#x}{whose} does not fit the frame"
             self._report.error("id-does-not-fit", path, what, f"use 0..{most:#x}", needs=(path, ("frame",)))
 
     def _check_only(self) -> None:

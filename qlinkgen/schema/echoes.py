@@ -2,48 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Mapping
 from typing import assert_never
 
 from qlinkgen.model.message import Field
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Array, Bits, Blob, FieldType, Float, Length, Scalar
-from qlinkgen.schema.file_model import Fields, SchemaFile
+from qlinkgen.schema.file_model import SchemaFile
+from qlinkgen.schema.layouts import layouts
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-echo"
+_KINDS = {"request": "a request", "message": "a message without a request"}
 
 
-def check_echoes(file: SchemaFile, commands: Iterable[Command], report: Reporter) -> None:
-    """Check that every echo is in a response and repeats a field of its request."""
-    for fields, path, what in _unanswering(file):
-        for name, spec in fields.items():
+def check_echoes(
+    file: SchemaFile, commands: Iterable[Command], places: Mapping[str, Path], report: Reporter
+) -> None:
+    """Check that every echo is in an answer and repeats a field of its request.
+
+    ``places`` are the paths of the fields of messages.
+    """
+    for layout in layouts(file):
+        for name, spec in layout.fields.items() if layout.kind != "answer" else ():
             if spec.echo:
-                place = (*path, name, "echo")
+                place, what = (*layout.path, name, "echo"), _KINDS[layout.kind]
                 hint = "remove it; only a field of a response can be an echo"
                 report.error(_RULE, place, f"'echo' has no effect in {what}", hint, of_key=True)
     for command in commands:
-        paths = [_path(file, command.name, direction) for direction in ("request", "response")]
-        for field in command.response.fields if command.response else ():
-            if field.echo and (fault := _fault(field, command.request.fields)):
-                place = (*paths[1], field.name)
-                report.error(_RULE, (*place, "echo"), *fault, of_key=True, needs=(place, paths[0]))
-
-
-def _unanswering(file: SchemaFile) -> Iterator[tuple[Fields, Path, str]]:
-    """Fields that are not part of a response, their path, and a name for their message."""
-    yield file.defaults.request or {}, ("defaults", "request"), "a request"
-    for name, command in file.commands.items():
-        yield command.request or {}, ("commands", name, "request"), "a request"
-    for name, message in file.messages.items():
-        yield message.fields, ("messages", name, "fields"), "a message without a request"
-
-
-def _path(file: SchemaFile, name: str, direction: str) -> Path:
-    """The path of the fields of a command."""
-    written = getattr(file.commands[name], direction) is not None
-    return ("commands", name, direction) if written else ("defaults", direction)
+        asked, *answers = command.messages
+        for answer in answers:
+            for field in answer.fields:
+                if field.echo and (fault := _fault(field, asked.fields)):
+                    place = (*places[answer.name], field.name)
+                    needs = (place, places[asked.name])
+                    report.error(_RULE, (*place, "echo"), *fault, of_key=True, needs=needs)
 
 
 def _fault(field: Field, request: Iterable[Field]) -> tuple[str, str] | None:

@@ -25,6 +25,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from qlinkgen.schema.kinds import (
+    AnswerNumber,
     AnyRange,
     ByteText,
     Characters,
@@ -40,7 +41,7 @@ from qlinkgen.schema.kinds import (
     Time,
     WholeRange,
 )
-from qlinkgen.schema.notation import shown
+from qlinkgen.schema.notation import answer_id, shown
 
 #: Prefix of union branches in the location of a fault; keys of a file cannot begin with it.
 BRANCH = "\0"
@@ -340,14 +341,84 @@ Addressing = Literal["node", "broadcast", "either", "answered_broadcast", "none"
 NoResponse = Literal["none"]
 
 
+class AnswerSpec(_Mapping):
+    """The long form of a response: its number and its fields."""
+
+    id: AnswerNumber | None = Field(default=None, description="Its number, if it is not that of the request")
+    fields: Fields | None = Field(default=None, description="Its fields, in wire order")
+
+
+def _is_long(value: Mapping[str, object]) -> bool:
+    """Whether a response has the long form: only its keys, and values that no field has."""
+    if not value or not value.keys() <= {"id", "fields"}:
+        return False
+    if "fields" in value:
+        return isinstance(value["fields"], dict)
+    return not isinstance(value["id"], dict) and _is_answer_id(value["id"])
+
+
+def _is_answer_id(value: object) -> bool:
+    try:
+        answer_id(value)
+    except ValueError:
+        return False
+    return True
+
+
+class _AnyForm:
+    """Lets an editor accept a mapping that has two forms at once, such as an empty one."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        found = handler(core)
+        return {"anyOf": found["oneOf"]} if "oneOf" in found else found
+
+
 def _response_form(value: object) -> str:
-    return f"{BRANCH}none" if isinstance(value, str) else f"{BRANCH}fields"
+    if isinstance(value, str):
+        return f"{BRANCH}none"
+    long = isinstance(value, AnswerSpec) or (isinstance(value, dict) and _is_long(value))
+    return f"{BRANCH}long" if long else f"{BRANCH}fields"
 
 
 Response = Annotated[
-    Annotated[Fields, Tag(f"{BRANCH}fields")] | Annotated[NoResponse, Tag(f"{BRANCH}none")],
+    Annotated[Fields, Tag(f"{BRANCH}fields")]
+    | Annotated[AnswerSpec, Tag(f"{BRANCH}long")]
+    | Annotated[NoResponse, Tag(f"{BRANCH}none")],
     Discriminator(_response_form),
+    _AnyForm,
 ]
+
+Means = Literal["refused", "again", "pending", "done"]
+
+
+class MeansSpec(_Mapping):
+    """What a reply means, decided by one of its fields."""
+
+    switch: str | None = Field(default=None, description="Field of the reply that decides")
+    cases: dict[str | StrictInt, Means] = Field(
+        default_factory=dict, description="Meaning by value: a number, a range first..last, or a name"
+    )
+    default: Means = Field(default="refused", description="Meaning of all other values")
+
+
+class ReplySpec(Fact):
+    """An answer other than the response."""
+
+    id: AnswerNumber | None = Field(default=None, description="Its number: 0x15 or request.id + 0x80")
+    fields: Fields = Field(description="Its fields, in wire order")
+    means: Annotated[MeansSpec, ShortForm("default", "string")] = Field(
+        default_factory=MeansSpec, description="refused, again, pending or done; or by a field"
+    )
+    within: Time | None = Field(
+        default=None, description="Time from a pending reply to the answer; default: that of the response"
+    )
+    after: Time | None = Field(
+        default=None, description="Pause before the request is sent again; default: none"
+    )
+
+
+Replies = dict[str, ReplySpec]
 
 
 class DefaultsSpec(_Mapping):
@@ -355,7 +426,9 @@ class DefaultsSpec(_Mapping):
 
     section: Text | None = Field(default=None, description="Section of the source document")
     request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
-    response: Response | None = Field(default=None, description="Fields, {} for an empty response, or none")
+    response: Response | None = Field(
+        default=None, description="Fields, {} for an empty response, {id:, fields:}, or none"
+    )
     addressing: Addressing | None = Field(
         default=None, description="Nodes addressed, and which of them respond"
     )
@@ -372,7 +445,12 @@ class CommandSpec(Fact):
     )
     id: Id = Field(description="Its number in the frame")
     request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
-    response: Response | None = Field(default=None, description="Fields, {} for an empty response, or none")
+    response: Response | None = Field(
+        default=None, description="Fields, {} for an empty response, {id:, fields:}, or none"
+    )
+    replies: Replies = Field(
+        default_factory=dict, description="Answers other than the response; they replace those of the file"
+    )
     empty_request: Literal["defaults"] | None = Field(
         default=None, description="defaults: an empty payload is a request with every field at its default"
     )
@@ -413,6 +491,9 @@ class SchemaFile(_Mapping):
         default_factory=dict, description="Protocol-specific attributes of commands"
     )
     defaults: DefaultsSpec = Field(default_factory=DefaultsSpec, description="Defaults for commands")
+    replies: Replies = Field(
+        default_factory=dict, description="Answers other than the response, of all answered commands"
+    )
     commands: dict[str, CommandSpec] = Field(default_factory=dict, description="Transactions by name")
     messages: dict[str, MessageSpec] = Field(
         default_factory=dict, description="Messages without a response, by name"

@@ -133,4 +133,9 @@ Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "st
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
 Count = Annotated[StrictInt, Field(ge=1)]
 Id = Annotated[StrictInt, Field(ge=0)]
+AnswerNumber = Annotated[
+    notation.AnswerId,
+    PlainValidator(notation.answer_id),
+    _json("A number, or request.id + 0x80", "string", "integer"),
+]
 Order = Literal["big", "little"]

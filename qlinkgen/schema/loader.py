@@ -124,9 +124,9 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
     messages = MessageBuilder(file, report, fields, frame, bus)
     commands = CommandBuilder(file, report, messages, frame, bus)
     commands.build()
-    check_echoes(file, commands.commands, report)
+    check_echoes(file, commands.commands, messages.places, report)
     types.report_unused()
-    check_names(file, commands.messages, report)
+    check_names(file, commands.messages, messages.places, report)
     report_unconfirmed(file, report)
     if frame is None or report.failed:
         return None

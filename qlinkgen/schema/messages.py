@@ -2,18 +2,36 @@
 
 from __future__ import annotations
 
-from typing import assert_never
+from typing import NamedTuple, assert_never
 
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction, Field, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
 from qlinkgen.schema.fields import FieldBuilder, is_open
-from qlinkgen.schema.file_model import CommandSpec, Fields, MessageSpec, SchemaFile
+from qlinkgen.schema.file_model import CommandSpec, Fields, MessageSpec, ReplySpec, SchemaFile
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
 _FRAME: Path = ("frame",)
+
+
+class Written(NamedTuple):
+    """A message as written.
+
+    Attributes:
+        part: request, response, or the name of a reply or message.
+        number: its number.
+        number_path: the place that states it.
+        fields: its fields.
+        path: their place.
+    """
+
+    part: str
+    number: int
+    number_path: Path
+    fields: Fields
+    path: Path
 
 
 class MessageBuilder:
@@ -28,6 +46,9 @@ class MessageBuilder:
         self._fields = fields
         self._frame = frame
         self._bus = bus
+        #: Paths of the fields and of the number of each message, by its name.
+        self.places: dict[str, Path] = {}
+        self.id_places: dict[str, Path] = {}
 
     @property
     def addressed(self) -> bool:
@@ -37,26 +58,17 @@ class MessageBuilder:
         return isinstance(self._frame, MarkedFrame)
 
     def directed(
-        self,
-        name: str,
-        spec: CommandSpec,
-        direction: Direction,
-        fields: Fields,
-        *,
-        addressing: Addressing,
-        section: str,
+        self, name: str, spec: CommandSpec, layout: Written, *, addressing: Addressing, section: str
     ) -> Message:
         """Request or response of a command."""
-        path: Path = ("commands", name, direction)
-        if getattr(spec, direction) is None:
-            path = ("defaults", direction)
+        direction: Direction = "request" if layout.part == "request" else "response"
         ranges, default = self._addresses(addressing, direction)
         message = Message(
             name=f"{name}.{direction}",
             command=name,
             direction=direction,
-            id=spec.id,
-            fields=self._fields.build(fields, path),
+            id=layout.number,
+            fields=self._fields.build(layout.fields, layout.path),
             doc=spec.doc,
             section=section,
             confirmed=spec.confirmed,
@@ -65,8 +77,33 @@ class MessageBuilder:
             addresses=ranges,
             default_address=default,
         )
-        self._check(message, path)
+        self._add(message, layout)
         return message
+
+    def reply(self, command: str, spec: ReplySpec, layout: Written, *, addressing: Addressing) -> Message:
+        """An answer other than the response; ``command`` is "" if it is that of all."""
+        ranges, default = self._addresses(addressing, "response")
+        name = f"{command}.{layout.part}" if command else layout.part
+        message = Message(
+            name=name,
+            command=command or name,
+            direction="response",
+            id=layout.number,
+            fields=self._fields.build(layout.fields, layout.path),
+            doc=spec.doc,
+            section=spec.section,
+            confirmed=spec.confirmed,
+            checksum=self._has_checksum(command or name),
+            addresses=ranges,
+            default_address=default,
+        )
+        self._add(message, layout)
+        return message
+
+    def _add(self, message: Message, layout: Written) -> None:
+        self.places[message.name] = layout.path
+        self.id_places[message.name] = layout.number_path
+        self._check(message, layout.path)
 
     def single(self, name: str, spec: MessageSpec) -> Message:
         """A message without a response."""
@@ -85,7 +122,7 @@ class MessageBuilder:
             addresses=(nodes,) if nodes else (),
             default_address=nodes[0] if nodes else 0,
         )
-        self._check(message, path)
+        self._add(message, Written(name, spec.id, ("messages", name, "id"), spec.fields, path))
         if isinstance(self._frame, PacketFrame) and spec.direction != "request":
             what = f"{name} is not the response to a request"
             hint = "add direction: request, or make it a command"

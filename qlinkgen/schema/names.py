@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from qlinkgen.model import naming
 from qlinkgen.model.message import Message
@@ -11,7 +11,9 @@ from qlinkgen.model.naming import snake, upper
 from qlinkgen.model.types import Array, Blob, Scalar
 from qlinkgen.schema.file_model import Fields, SchemaFile
 from qlinkgen.schema.kinds import NAME_PATTERN
+from qlinkgen.schema.layouts import layouts
 from qlinkgen.schema.notation import shown
+from qlinkgen.schema.replies import reply_messages
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
@@ -28,8 +30,13 @@ _TYPE_MACROS = ("factor", "bias", "divisor")
 _GLOBAL_MACROS = ("ok", "max_payload_size", "max_wire_size", "enable_float")
 
 
-def check_names(file: SchemaFile, messages: Sequence[Message], report: Reporter) -> None:
-    """Check every name of a file: spelling, reserved words, clashes after conversion."""
+def check_names(
+    file: SchemaFile, messages: Sequence[Message], places: Mapping[str, Path], report: Reporter
+) -> None:
+    """Check every name of a file: spelling, reserved words, clashes after conversion.
+
+    ``places`` are the paths of the fields of messages.
+    """
     check = _Checker(report)
     check.spelling(file.protocol.name, ("protocol", "name"))
     check.constants(file)
@@ -40,14 +47,17 @@ def check_names(file: SchemaFile, messages: Sequence[Message], report: Reporter)
         check.spelling(name, ("commands", name))
     for name in file.messages:
         check.spelling(name, ("messages", name))
-    for fields, path in _field_groups(file):
-        check.fields(fields, path)
+    for path, replies in _reply_groups(file):
+        for name in replies:
+            check.spelling(name, (*path, name))
+    for layout in layouts(file):
+        check.fields(layout.fields, layout.path)
     for message in messages:
         for c in (False, True):
-            check.clashes(_attributes(message, address, c=c))
+            check.clashes(_attributes(message, places[message.name], address, c=c))
     check.clashes(_classes(file))
     check.clashes(_methods(file))
-    check.clashes(_macros(file, messages))
+    check.clashes(_macros(file, messages, places))
 
 
 class _Checker:
@@ -106,23 +116,15 @@ class _Checker:
                 self._error("name-clash", path, what, "rename one of them")
 
 
-def _field_groups(file: SchemaFile) -> Iterator[tuple[Fields, Path]]:
-    groups: list[tuple[object, Path]] = [
-        (file.defaults.request, ("defaults", "request")),
-        (file.defaults.response, ("defaults", "response")),
-    ]
-    for name, command in file.commands.items():
-        groups += [
-            (command.request, ("commands", name, "request")),
-            (command.response, ("commands", name, "response")),
-        ]
-    groups += [(message.fields, ("messages", name, "fields")) for name, message in file.messages.items()]
-    yield from ((fields, path) for fields, path in groups if isinstance(fields, dict))
+def _reply_groups(file: SchemaFile) -> Iterator[tuple[Path, Iterable[str]]]:
+    yield ("replies",), file.replies
+    yield from ((("commands", name, "replies"), each.replies) for name, each in file.commands.items())
 
 
-def _attributes(message: Message, address: str | None, *, c: bool) -> Iterator[tuple[str, str, Path]]:
+def _attributes(
+    message: Message, path: Path, address: str | None, *, c: bool
+) -> Iterator[tuple[str, str, Path]]:
     """Attributes of a message object, or members of its C struct."""
-    path = _fields_path(message)
     spelt = naming.member if c else naming.attribute
     if address is not None and not c:
         yield naming.address_attribute(address), f"the frame's '{address}'", path
@@ -136,13 +138,6 @@ def _attributes(message: Message, address: str | None, *, c: bool) -> Iterator[t
             yield f"{value.name}_{suffix}", f"the {suffix} of '{value.name}'", place
 
 
-def _fields_path(message: Message) -> Path:
-    group, last = (
-        ("commands", message.direction) if message.name != message.command else ("messages", "fields")
-    )
-    return group, message.command, last
-
-
 def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
     """Names of classes: enums, flags and messages."""
     messages = frozenset(map(naming.message_class, _messages(file)))
@@ -154,12 +149,15 @@ def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
         for direction in ("request", "response"):
             found = naming.message_class(f"{name}_{direction}")
             yield found, f"the {direction} of '{name}'", ("commands", name)
+    for name, path in reply_messages(file):
+        yield naming.message_class(snake(name)), f"the reply '{name}'", path
     for name in file.messages:
         yield naming.message_class(name), f"the message '{name}'", ("messages", name)
 
 
 def _messages(file: SchemaFile) -> Iterator[str]:
     yield from (f"{name}_{direction}" for name in file.commands for direction in ("request", "response"))
+    yield from (snake(name) for name, _ in reply_messages(file))
     yield from file.messages
 
 
@@ -169,6 +167,8 @@ def _methods(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
         yield naming.method(name), f"the command '{name}'", ("commands", name)
     for name in file.messages:
         yield naming.method(name), f"the message '{name}'", ("messages", name)
+    for name, path in reply_messages(file):
+        yield naming.method(snake(name)), f"the reply '{name}'", path
 
 
 def _class_base(file: SchemaFile, name: str) -> str:
@@ -177,7 +177,9 @@ def _class_base(file: SchemaFile, name: str) -> str:
     return f"{found}_message" if found in file.enums or found in file.flags else found
 
 
-def _macros(file: SchemaFile, messages: Sequence[Message]) -> Iterator[tuple[str, str, Path]]:
+def _macros(
+    file: SchemaFile, messages: Sequence[Message], places: Mapping[str, Path]
+) -> Iterator[tuple[str, str, Path]]:
     """Names of constants of the C header; its functions differ if they do."""
     prefix = upper(file.protocol.name)
     for name in _GLOBAL_MACROS:
@@ -188,7 +190,7 @@ def _macros(file: SchemaFile, messages: Sequence[Message]) -> Iterator[tuple[str
                 base = naming.stem(file.protocol.name, name, _KINDS[group])
                 result = f"{prefix}_{upper(base)}_{upper(member)}"
                 yield result, f"'{member}' of {name}", (group, name, "values", member)
-    for stem, owner, macros, path in (*_macro_owners(file, messages), *_conversions(file, messages)):
+    for stem, owner, macros, path in (*_macro_owners(file, messages), *_conversions(file, messages, places)):
         for macro in macros:
             yield f"{prefix}_{upper(stem)}_{upper(macro)}", f"a constant of {owner}", path
 
@@ -210,12 +212,14 @@ def _macro_owners(
     for name in file.commands:
         for direction in ("request", "response"):
             yield f"{name}_{direction}", f"{name}.{direction}", _MESSAGE_MACROS, ("commands", name)
+    for name, path in reply_messages(file):
+        yield _class_base(file, snake(name)), f"the reply '{name}'", _MESSAGE_MACROS, path
     for name in file.messages:
         yield _class_base(file, name), f"the message '{name}'", _MESSAGE_MACROS, ("messages", name)
 
 
 def _conversions(
-    file: SchemaFile, messages: Sequence[Message]
+    file: SchemaFile, messages: Sequence[Message], places: Mapping[str, Path]
 ) -> Iterator[tuple[str, str, Sequence[str], Path]]:
     """The same for scaled values that may have conversions of their own instead of those of their type.
 
@@ -227,7 +231,7 @@ def _conversions(
             if isinstance(value.type, Scalar):
                 variants.setdefault(value.type.type_name, set()).add(_converted(value.type))
     for message in messages:
-        path = _fields_path(message)
+        path = places[message.name]
         for value in message.values:
             if not isinstance(value.type, Scalar) or value.type.scaling is None:
                 continue

@@ -15,6 +15,9 @@ _RATIONAL = re.compile(
 )
 _HEX_NUMBER = re.compile(r"\s*[-+]?0x[0-9a-fA-F]{1,40}\s*\Z", re.ASCII)
 _HEX = re.compile(r"\s*(?:[0-9a-fA-F]{2}\s*)+\Z", re.ASCII)
+_ANSWER_ID = re.compile(
+    r"\s*request\.id\s*(?:(?P<sign>[+-])\s*(?P<number>0x[0-9A-Fa-f]+|0|[1-9][0-9]*)\s*)?\Z", re.ASCII
+)
 _DURATION = re.compile(
     r"\s*(?P<number>[0-9]{1,12}(?:\.[0-9]{1,12})?)\s*(?P<unit>bytes?|us|ms|s)\s*\Z", re.ASCII
 )
@@ -129,6 +132,30 @@ def duration(value: object) -> Duration:
             return Duration(byte_times=number)
         return Duration(seconds=number * _SECONDS[match["unit"]])
     raise ValueError(f"{shown(value)} is not a time; write 3 bytes, 260 us, 10 ms or 1 s")
+
+
+@dataclass(frozen=True, slots=True)
+class AnswerId:
+    """The number of an answer, or what is added to that of the request."""
+
+    number: int
+    relative: bool = False
+
+    def of(self, request: int) -> int:
+        """The number of the answer to a request, which may not fit the frame."""
+        return request + self.number if self.relative else self.number
+
+
+def answer_id(value: object) -> AnswerId:
+    """A number, or ``request.id``, ``request.id + 0x80``, ``request.id - 1``. Raises ValueError."""
+    if isinstance(value, AnswerId):
+        return value
+    if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
+        return AnswerId(int(value))
+    if isinstance(value, str) and (match := _ANSWER_ID.match(value)):
+        number = int(match["number"] or "0", 0)
+        return AnswerId(-number if match["sign"] == "-" else number, relative=True)
+    raise ValueError(f"{shown(value)} is not the number of an answer; write 0x85 or request.id + 0x80")
 
 
 def type_text(text: str) -> TypeText:

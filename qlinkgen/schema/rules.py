@@ -237,6 +237,11 @@ _ALL = (
         "Write response: {} for a response without data, response: none for no response.",
     ),
     Rule(
+        "bad-reply",
+        "A reply belongs to an answered command and has an id; one of its fields may decide what it means.",
+        "The master decides by it whether a call fails, repeats the request or waits on.",
+    ),
+    Rule(
         "bad-echo",
         "An echo is a field of a response; its request has a field of the same name and type.",
         "It identifies the request that a response belongs to.",

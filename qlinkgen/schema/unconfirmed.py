@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from qlinkgen.schema.file_model import Fact, Fields, SchemaFile
+from qlinkgen.schema.file_model import Fact, SchemaFile
+from qlinkgen.schema.layouts import layouts
 from qlinkgen.schema.notation import type_text
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
@@ -35,37 +36,35 @@ def _facts(file: SchemaFile) -> Iterator[tuple[Path, str, Fact]]:
     for group in ("enums", "flags", "types"):
         for name, spec in getattr(file, group).items():
             yield (group, name), f"type {name}", spec
+    yield from _frame_facts(file)
+    for group in ("replies", "commands", "messages"):
+        for name, spec in getattr(file, group).items():
+            yield (group, name), name, spec
+    for name, command in file.commands.items():
+        for key, reply in command.replies.items():
+            yield ("commands", name, "replies", key), f"{name}.{key}", reply
+    for each in layouts(file):
+        for name, field in each.fields.items():
+            yield (*each.path, name), f"{each.owner or each.path[1]}.{name}", field
+
+
+def _frame_facts(file: SchemaFile) -> Iterator[tuple[Path, str, Fact]]:
     yield ("frame",), "the frame", file.frame
     for group in ("parts", "packet"):
         for name, part in (getattr(file.frame, group) or {}).items():
             yield ("frame", group, name), f"{name} of the frame", part
     if file.frame.marked and file.frame.marked.checksum:
         yield ("frame", "marked", "checksum"), "the checksum of the frame", file.frame.marked.checksum
-    for group in ("commands", "messages"):
-        for name, spec in getattr(file, group).items():
-            yield (group, name), name, spec
-    for fields, path, owner in _fields(file):
-        for name, field in fields.items():
-            yield (*path, name), f"{owner}.{name}", field
-
-
-def _fields(file: SchemaFile) -> Iterator[tuple[Fields, Path, str]]:
-    for name, command in file.commands.items():
-        for direction, fields in (("request", command.request), ("response", command.response)):
-            if isinstance(fields, dict):
-                yield fields, ("commands", name, direction), f"{name}.{direction}"
-    for name, message in file.messages.items():
-        yield message.fields, ("messages", name, "fields"), name
 
 
 def _users(file: SchemaFile) -> dict[str, list[str]]:
     """Fields by the name of their type."""
     users: dict[str, list[str]] = {}
-    for fields, _, owner in _fields(file):
-        for name, field in fields.items():
+    for each in layouts(file):
+        for name, field in each.fields.items():
             try:
                 base = type_text(field.type).base
             except ValueError:
                 continue
-            users.setdefault(base, []).append(f"{owner}.{name}")
+            users.setdefault(base, []).append(f"{each.owner or each.path[1]}.{name}")
     return users

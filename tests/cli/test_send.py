@@ -153,14 +153,14 @@ def test_a_wrong_answer(qlinkgen: Run) -> None:
 def test_a_refusal_of_the_schema_is_shown(qlinkgen: Run) -> None:
     file = SCHEMAS / "modbus_rtu.yaml"
     codec = load(load_schema(file))
-    refusal = codec.MESSAGES["read_input_registers_exception"](address=7, code=2)
+    refusal = codec.MESSAGES["read_input_registers.exception"](address=7, code=2)
 
     with reciting(refusal.to_frame()) as path:
         request = ("read_input_registers", "--node", "7", "start=1")
         result = qlinkgen("send", path, file, *request, "--attempts", "1", "--slack", "0.3")
     assert result.code == 1
     assert (
-        '"read_input_registers_exception", "address": 7, "fields": {"code": "illegal_data_address"}'
+        '"read_input_registers.exception", "address": 7, "fields": {"code": "illegal_data_address"}'
         in result.err
     )
 

@@ -74,7 +74,7 @@ class FieldMaker:
 
     def forget_unused(self, document: Doc) -> None:
         """Remove unused types, so that lint does not warn."""
-        text = repr({key: document.get(key) for key in ("commands", "messages")})
+        text = repr({key: document.get(key) for key in ("replies", "commands", "messages")})
         for group in ("types", "enums", "flags"):
             for name in reversed(list(document.get(group, {}))):
                 if f"'{name}'" not in text and f"'{name}[" not in text:

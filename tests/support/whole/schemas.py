@@ -141,6 +141,8 @@ class _Maker:
         if shape.only:
             names = [*found["commands"], *found["messages"]]
             shape.frame["marked"]["checksum"]["only"] = rng.sample(names, rng.randint(1, len(names)))
+        if found["commands"] and shape.kind != "packet" and rng.random() < 0.4:
+            self._answers(shape, maker, found)
         return {key: value for key, value in found.items() if value or key == "commands"}
 
     def _command(self, shape: Shape, maker: FieldMaker, bus: Doc, *, attributes: bool) -> Doc:
@@ -170,6 +172,56 @@ class _Maker:
         if rng.random() < 0.3:
             command["response_within"] = "20 ms"
         return self._described(command)
+
+    def _answers(self, shape: Shape, maker: FieldMaker, found: Doc) -> None:
+        """Give answers numbers of their own, and other replies to the commands."""
+        rng, used = self.rng, {("request", number) for number in self._ids}
+        used |= {("response", number) for number in self._ids}
+        answered = {name: spec for name, spec in found["commands"].items() if spec["response"] != "none"}
+        for spec in answered.values():
+            number = self._answer_id(shape, [spec["id"]], used, relative=rng.random() < 0.5)
+            if number is not None and rng.random() < 0.4:
+                spec["response"] = {"id": number, "fields": spec["response"]}
+        taken = {*found["commands"], *found["messages"], "request", "response"}
+        if answered and rng.random() < 0.7:
+            relative = rng.random() < 0.6
+            number = self._answer_id(
+                shape, [each["id"] for each in answered.values()], used, relative=relative
+            )
+            if number is not None:
+                found["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
+        if answered and rng.random() < 0.5:
+            spec = rng.choice(list(answered.values()))
+            number = self._answer_id(shape, [spec["id"]], used, relative=rng.random() < 0.5)
+            if number is not None:
+                spec["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
+
+    def _answer_id(
+        self, shape: Shape, asked: list[int], used: set[tuple[str, int]], *, relative: bool
+    ) -> int | str | None:
+        """A number for the answers to requests that no other message has."""
+        top = (1 << shape.id_bits) - 1
+        for _ in range(20):
+            number = self.rng.randint(-top if relative else 0, top)
+            numbers = {number + each for each in asked} if relative else {number}
+            taken = {("response", each) for each in numbers}
+            if not taken & used and all(0 <= each <= top and each != shape.end_id for each in numbers):
+                used |= taken
+                return f"request.id {'-' if number < 0 else '+'} {abs(number):#x}" if relative else number
+        return None
+
+    def _reply(self, shape: Shape, maker: FieldMaker, number: int | str) -> Doc:
+        rng = self.rng
+        fields = maker.fields(Room.of(shape))
+        reply: Doc = {"id": number, "fields": fields}
+        plain = [name for name, spec in fields.items() if spec in ("u8", "u16")]
+        kinds = ("refused", "again", "pending", "done")
+        if plain and rng.random() < 0.5:
+            cases = {rng.choice((0, 1, "2..9", 100)): rng.choice(kinds) for _ in range(2)}
+            reply["means"] = {"switch": rng.choice(plain), "cases": cases, "default": rng.choice(kinds)}
+        elif rng.random() < 0.5:
+            reply["means"] = rng.choice(kinds)
+        return self._described(reply)
 
     def _response(self, shape: Shape, maker: FieldMaker, request: Doc) -> Doc:
         echoes: Doc = {}

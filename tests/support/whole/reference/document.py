@@ -397,7 +397,10 @@ def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, .
     """All messages of a file, in order."""
     found: list[Message] = []
     for name, spec in document.get("commands", {}).items():
-        found += _of_command(name, {**document.get("defaults", {}), **spec}, document, fields, addressed)
+        defaults = document.get("defaults", {})
+        merged = {**defaults, **spec, "response": _answer(spec.get("response"), defaults.get("response"))}
+        found += _of_command(name, merged, document, fields, addressed)
+        found += _replies(name, merged, document, fields, {each.name for each in found}, addressed=addressed)
     nodes = _nodes(document) if addressed else None
     for name, spec in document.get("messages", {}).items():
         found.append(
@@ -423,10 +426,13 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
             _addresses(spec.get("addressing", "node"), direction, document) if addressed else ((), 0)
         )
         empty = direction == "request" and spec.get("empty_request") == "defaults"
-        slots = fields.build(spec[direction])
+        number, written = spec["id"], spec[direction]
+        if direction == "response":
+            number, written = _number(written.get("id", "request.id"), number), written["fields"]
+        slots = fields.build(written)
         yield Message(
             f"{name}.{direction}",
-            spec["id"],
+            number,
             direction,
             slots,
             ranges,
@@ -434,6 +440,51 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
             empty,
             _checked(document, name),
         )
+
+
+def _answer(own: Any, common: Any) -> Any:
+    """A response in its long form, or "none"."""
+    merged = {**_long(common or {}), **_long(own or {})} if own != "none" else {}
+    return "none" if own == "none" or (own is None and common == "none") else merged
+
+
+def _long(given: Any) -> Doc:
+    if given == "none":
+        return {}
+    is_long = given.keys() <= {"id", "fields"} and (
+        isinstance(given.get("fields"), dict)
+        or ("fields" not in given and re.match(r"\d|request", str(given.get("id", ""))))
+    )
+    return dict(given) if is_long else {"fields": given}
+
+
+def _number(given: Any, asked: int) -> int:
+    """The number of an answer."""
+    if not str(given).startswith("request"):
+        return int(given)
+    offset = str(given).replace(" ", "").removeprefix("request.id")
+    return asked + int(offset or "0", 0)
+
+
+def _replies(
+    name: str, spec: Doc, document: Doc, fields: Fields, known: set[str], *, addressed: bool
+) -> Iterator[Message]:
+    """Answers other than the response; one with a number for all commands is one message."""
+    own = spec.get("replies", {})
+    common = {key: each for key, each in document.get("replies", {}).items() if key not in own}
+    if spec["response"] == "none":
+        return
+    for key, reply in (*common.items(), *own.items()):
+        shared = key in common and isinstance(reply.get("id"), int)
+        full = key if shared else f"{name}.{key}"
+        if full in known:
+            continue
+        nodes = (_nodes(document),) if addressed else ()
+        number = _number(reply.get("id", "request.id"), spec["id"])
+        slots = fields.build(reply["fields"])
+        checked = _checked(document, key if shared else name)
+        default = nodes[0][0] if nodes else 0
+        yield Message(full, number, "response", slots, nodes, default, checked=checked)
 
 
 def _checked(document: Doc, name: str) -> bool:

@@ -1,0 +1,66 @@
+"""The layouts of a file: every list of fields that it writes, with its path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from qlinkgen.schema.file_model import AnswerSpec, Fields, NoResponse, SchemaFile
+from qlinkgen.schema.source import Path
+
+#: What a layout is, as it matters for a key that only answers have.
+Kind = Literal["request", "answer", "message"]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Fields of a message, as written.
+
+    Attributes:
+        owner: name of the message, "" for the defaults of commands and replies of the whole file.
+        fields: its fields.
+        path: their place.
+        kind: what the message is.
+    """
+
+    owner: str
+    fields: Fields
+    path: Path
+    kind: Kind
+
+
+def layouts(file: SchemaFile) -> Iterator[Layout]:
+    """All layouts of a file, in its order."""
+    for name, reply in file.replies.items():
+        yield Layout("", reply.fields, ("replies", name, "fields"), "answer")
+    if file.defaults.request is not None:
+        yield Layout("", file.defaults.request, ("defaults", "request"), "request")
+    yield from _answer("", file.defaults.response, ("defaults", "response"))
+    for name, command in file.commands.items():
+        path = ("commands", name)
+        if command.request is not None:
+            yield Layout(f"{name}.request", command.request, (*path, "request"), "request")
+        yield from _answer(f"{name}.response", command.response, (*path, "response"))
+        for key, reply in command.replies.items():
+            yield Layout(f"{name}.{key}", reply.fields, (*path, "replies", key, "fields"), "answer")
+    for name, message in file.messages.items():
+        yield Layout(name, message.fields, ("messages", name, "fields"), "message")
+
+
+def _answer(owner: str, given: Fields | AnswerSpec | NoResponse | None, path: Path) -> Iterator[Layout]:
+    fields = fields_of(given)
+    if fields is not None:
+        yield Layout(owner, fields, fields_path(given, path), "answer")
+
+
+def fields_of(given: Fields | AnswerSpec | NoResponse | None) -> Fields | None:
+    """The fields of a response, None if it states none."""
+    if isinstance(given, AnswerSpec):
+        return given.fields
+    return given if isinstance(given, dict) else None
+
+
+def fields_path(given: Fields | AnswerSpec | NoResponse | None, path: Path) -> Path:
+    """The path of the fields of a response at a path."""
+    return (*path, "fields") if isinstance(given, AnswerSpec) else path

@@ -1,0 +1,190 @@
+"""Second pass, replies: answers other than the response, and what each means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from qlinkgen.model.frame import Frame, PacketFrame
+from qlinkgen.model.message import Message
+from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
+from qlinkgen.model.types import Enum, Scalar
+from qlinkgen.schema.file_model import MeansSpec, ReplySpec, SchemaFile
+from qlinkgen.schema.messages import MessageBuilder, Written
+from qlinkgen.schema.notation import AnswerId, Duration, shown, whole_range
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+_RULE = "bad-reply"
+#: Names of the other two messages of a command.
+_TAKEN = ("request", "response")
+
+
+class OfCommand(NamedTuple):
+    """A reply as written for a command.
+
+    Attributes:
+        name: its name.
+        spec: its mapping.
+        path: its place.
+        shared: it has a number of its own for all commands, so that it is one message.
+    """
+
+    name: str
+    spec: ReplySpec
+    path: Path
+    shared: bool
+
+    @property
+    def number(self) -> AnswerId:
+        """Its number."""
+        return self.spec.id if self.spec.id is not None else AnswerId(0, relative=True)
+
+
+def written_replies(file: SchemaFile, command: str) -> Iterator[OfCommand]:
+    """The replies of a command: its own, and those of the file that it does not replace."""
+    own = file.commands[command].replies
+    for name, spec in file.replies.items():
+        if name not in own:
+            shared = spec.id is not None and not spec.id.relative
+            yield OfCommand(name, spec, ("replies", name), shared)
+    for name, spec in own.items():
+        yield OfCommand(name, spec, ("commands", command, "replies", name), shared=False)
+
+
+def reply_messages(file: SchemaFile) -> Iterator[tuple[str, Path]]:
+    """Names and places of the messages of all replies; a shared one has the name of the reply."""
+    seen: set[str] = set()
+    for command in file.commands:
+        for each in written_replies(file, command):
+            name = each.name if each.shared else f"{command}.{each.name}"
+            if name not in seen:
+                seen.add(name)
+                yield name, each.path
+
+
+class ReplyBuilder:
+    """Checks what replies mean, and builds them."""
+
+    def __init__(
+        self, file: SchemaFile, report: Reporter, messages: MessageBuilder, frame: Frame | None
+    ) -> None:
+        """``frame`` is None if it could not be built; checks that depend on it are skipped."""
+        self._file = file
+        self._report = report
+        self._messages = messages
+        self._frame = frame
+        self._shared: dict[str, Message] = {}
+
+    def check_names(self) -> None:
+        """Report replies called like one of the other messages of a command."""
+        groups = [("replies",), *(("commands", name, "replies") for name in self._file.commands)]
+        specs = [self._file.replies, *(each.replies for each in self._file.commands.values())]
+        for path, replies in zip(groups, specs, strict=True):
+            for name in replies:
+                if name in _TAKEN:
+                    what = f"a reply cannot be called {name}"
+                    hint = "give it another name; the response has a key of its own"
+                    self._report.error(_RULE, (*path, name), what, hint, of_key=True)
+
+    def of(self, command: str, addressing: Addressing, *, answered: bool) -> Iterator[Reply]:
+        """The replies of a command."""
+        spec = self._file.commands[command]
+        path: Path = ("commands", command)
+        if not answered:
+            if spec.replies:
+                what = f"{command} is not answered, so it has no replies"
+                place, needs = (*path, "replies"), ((*path, "response"), (*path, "replies"))
+                self._report.error(_RULE, place, what, "remove them", of_key=True, needs=needs)
+            return
+        for written in written_replies(self._file, command):
+            if isinstance(self._frame, PacketFrame):
+                what = f"{written.name} cannot be told from the response: answers in packets have no id"
+                hint, needs = "remove it, or describe a frame with parts", (written.path, ("frame",))
+                self._report.error(_RULE, written.path, what, hint, of_key=True, needs=needs)
+            elif written.name not in _TAKEN:
+                yield self._reply(written, self._message(command, written, addressing))
+
+    def _message(self, command: str, written: OfCommand, addressing: Addressing) -> Message:
+        if written.shared and written.name in self._shared:
+            return self._shared[written.name]
+        number = written.number.of(self._file.commands[command].id)
+        fields = (*written.path, "fields")
+        layout = Written(written.name, number, (*written.path, "id"), written.spec.fields, fields)
+        owner = "" if written.shared else command
+        message = self._messages.reply(owner, written.spec, layout, addressing=addressing)
+        if written.shared:
+            self._shared[written.name] = message
+        return message
+
+    def _reply(self, written: OfCommand, message: Message) -> Reply:
+        """The reply that a message is."""
+        spec = written.spec
+        path = (*written.path, "means")
+        reply = Reply(
+            name=written.name,
+            message=message,
+            means=spec.means.default,
+            switch=spec.means.switch or "",
+            cases=tuple(self._cases(spec.means, message, path)),
+            within=_allowance(spec.within) if spec.within else None,
+            after=_allowance(spec.after) if spec.after else Allowance(),
+        )
+        for key, means in (("within", "pending"), ("after", "again")):
+            if getattr(spec, key) is not None and means not in reply.meanings:
+                place = (*written.path, key)
+                what = f"{key} has no effect: {written.name} never means {means}"
+                self._report.error(_RULE, place, what, f"remove it, or let it mean {means}", of_key=True)
+        return reply
+
+    def _cases(self, spec: MeansSpec, message: Message, path: Path) -> Iterator[Case]:
+        if spec.switch is None:
+            if spec.cases:
+                what = "the cases have nothing to decide them"
+                self._report.error(_RULE, (*path, "cases"), what, "add switch: FIELD", of_key=True)
+            return
+        number = self._switch(spec.switch, message, path)
+        if number is None:
+            return
+        for key, means in spec.cases.items():
+            raw = self._raw(key, number, (*path, "cases", str(key)))
+            if raw is not None:
+                yield Case(*raw, means)
+
+    def _switch(self, name: str, message: Message, path: Path) -> Scalar | None:
+        known = {value.name: value.type for value in message.values}
+        place, needs = (*path, "switch"), ((*path, "switch"), (*path[:-1], "fields"))
+        kind = known.get(name)
+        if kind is None:
+            hint = did_you_mean(name, known, f"its fields are {listed(known)}")
+            what = f"the reply has no field {shown(name)}"
+            self._report.error(_RULE, place, what, hint, needs=needs)
+        elif not isinstance(kind, Scalar) or kind.scaling is not None:
+            what = f"{name} cannot decide what the reply means"
+            self._report.error(_RULE, place, what, "use a whole number or an enum", needs=needs)
+            return None
+        return kind if isinstance(kind, Scalar) else None
+
+    def _raw(self, key: str | int, number: Scalar, path: Path) -> tuple[int, int] | None:
+        """The raw values of a case."""
+        named = number.meaning.members if isinstance(number.meaning, Enum) else ()
+        members = {member.name: member.value for member in named}
+        if key in members:
+            return members[str(key)], members[str(key)]
+        try:
+            first, last = whole_range(key)
+        except ValueError:
+            what = f"{shown(key)} is not a value of the field"
+            hint = did_you_mean(str(key), members, "write a number, a range or a name")
+            self._report.error(_RULE, path, what, hint, of_key=True)
+            return None
+        if not number.minimum <= first <= last <= number.maximum:
+            what = f"{shown(key)} is outside the range of the field"
+            hint = f"use {number.minimum}..{number.maximum}"
+            self._report.error(_RULE, path, what, hint, of_key=True)
+            return None
+        return first, last
+
+
+def _allowance(time: Duration) -> Allowance:
+    return Allowance(time.byte_times, time.seconds)
