@@ -8,7 +8,7 @@ from typing import NamedTuple
 from qlinkgen.model.frame import Frame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
-from qlinkgen.model.types import Enum, Scalar
+from qlinkgen.model.types import Enum, Float, Scalar
 from qlinkgen.schema.file_model import MeansSpec, ReplySpec, SchemaFile
 from qlinkgen.schema.messages import MessageBuilder, Written
 from qlinkgen.schema.notation import AnswerId, Duration, shown, whole_range
@@ -159,7 +159,7 @@ class ReplyBuilder:
             hint = did_you_mean(name, known, f"its fields are {listed(known)}")
             what = f"the reply has no field {shown(name)}"
             self._report.error(_RULE, place, what, hint, needs=needs)
-        elif not isinstance(kind, Scalar) or kind.scaling is not None:
+        elif not isinstance(kind, Scalar) or kind.scaling is not None or isinstance(kind.meaning, Float):
             what = f"{name} cannot decide what the reply means"
             self._report.error(_RULE, place, what, "use a whole number or an enum", needs=needs)
             return None
