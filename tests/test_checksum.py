@@ -307,3 +307,15 @@ def test_words_for_several_sums_are_no_algorithm() -> None:
             find(name)
         assert caught.value.suggestions == tuple(each.name for each in checksum.candidates(name))
         assert len(caught.value.suggestions) >= 2
+
+
+def test_another_start() -> None:
+    assert checksum.begun(find("crc-16/modbus"), 0) is find("crc-16/arc")
+    assert checksum.begun(find("crc-16/modbus"), 0xFFFF) is find("crc-16/modbus")
+    own = checksum.begun(find("crc-16/modbus"), 0x1234)
+    assert isinstance(own, Algorithm)
+    assert (own.name, own.check) == ("crc-16/modbus/init-1234", bitwise(own, CHECK_DATA))
+    for name, init, value in (("sum8-zero", 5, 0x1E), ("xor8", 0xFF, 0xCE), ("fletcher-8", 0x0100, 0x16DD)):
+        assert checksum.begun(find(name), init).check == value
+    with pytest.raises(ValueError, match="init does not fit into 8 bits"):
+        checksum.begun(find("sum8"), 256)

@@ -27,6 +27,7 @@ __all__ = [
     "Sum",
     "UnknownAlgorithm",
     "Xor",
+    "begun",
     "candidates",
     "catalogue",
     "find",
@@ -200,6 +201,30 @@ def stated(width: int, poly: int, init: int, *, refin: bool, refout: bool, xorou
     name = f"crc-{width}/poly-{poly:x}"
     unchecked = Algorithm(name, width, poly, init, refin, refout, xorout, check=0)
     return replace(unchecked, check=unchecked.compute(b"123456789"))
+
+
+def begun(algorithm: Checksum, init: int) -> Checksum:
+    """Return the algorithm with another initial register.
+
+    Raises:
+        ValueError: the register does not fit.
+    """
+    if not 0 <= init <= algorithm.mask:
+        raise ValueError(f"init does not fit into {algorithm.width} bits")
+    if init == algorithm.init:
+        return algorithm
+    name = f"{algorithm.name}/init-{init:x}"
+    if not isinstance(algorithm, Algorithm):
+        return replace(algorithm, name=name, init=init, aliases=())
+    stated_so = stated(
+        algorithm.width,
+        algorithm.poly,
+        init,
+        refin=algorithm.refin,
+        refout=algorithm.refout,
+        xorout=algorithm.xorout,
+    )
+    return stated_so if stated_so in catalogue(algorithm.width) else replace(stated_so, name=name)
 
 
 def find(name: str) -> Checksum:

@@ -25,6 +25,8 @@ class Checksum:
     #: Names of the frame parts covered, in wire order.
     over: tuple[str, ...]
     confirmed: bool = True
+    #: The value where the covered parts are empty, None if the algorithm gives it.
+    otherwise: int | None = None
 
     @property
     def mask(self) -> int:

@@ -17,12 +17,13 @@ Form = Literal["plain", "inverted", "zero"]
 
 
 class _Register:
-    """A register of ``width`` bits that takes the covered bytes in wire order."""
+    """A register of ``width`` bits that begins with ``init`` and takes the covered bytes in wire order."""
 
     __slots__ = ()
 
     name: str
     width: int
+    init: int
     aliases: tuple[str, ...]
 
     @property
@@ -38,7 +39,7 @@ class _Register:
     @property
     def start(self) -> int:
         """The initial register."""
-        return 0
+        return self.init
 
     @property
     def check(self) -> int:
@@ -66,6 +67,7 @@ class Sum(_Register):
         name: name in schema files.
         width: bits of the sum.
         form: the value for a sum.
+        init: start of the sum.
         aliases: other names in use.
     """
 
@@ -74,6 +76,7 @@ class Sum(_Register):
     name: str
     width: int
     form: Form = "plain"
+    init: int = 0
     aliases: tuple[str, ...] = ()
 
     def step(self, register: int, byte: int) -> int:
@@ -92,6 +95,7 @@ class Xor(_Register):
 
     Attributes:
         name: name in schema files.
+        init: start of the value.
         aliases: other names in use.
     """
 
@@ -99,6 +103,7 @@ class Xor(_Register):
 
     name: str
     width: int = 8
+    init: int = 0
     aliases: tuple[str, ...] = ()
 
     def step(self, register: int, byte: int) -> int:
@@ -114,7 +119,7 @@ class Fletcher(_Register):
         name: name in schema files.
         width: bits of both sums.
         modulus: what both sums are taken modulo; at least 255.
-        first: start of the lower sum.
+        init: start of both sums.
         aliases: other names in use.
     """
 
@@ -123,18 +128,13 @@ class Fletcher(_Register):
     name: str
     width: int
     modulus: int
-    first: int = 0
+    init: int = 0
     aliases: tuple[str, ...] = ()
 
     @property
     def half(self) -> int:
         """Bits of each sum."""
         return self.width // 2
-
-    @property
-    def start(self) -> int:
-        """The initial register."""
-        return self.first
 
     def step(self, register: int, byte: int) -> int:
         """Return both sums with one more byte."""
@@ -145,8 +145,8 @@ class Fletcher(_Register):
 #: Every check value that `find` knows and that is not a CRC.
 SUMS: tuple[Sum | Xor | Fletcher, ...] = (
     Sum("sum8", 8),
-    Sum("sum8-inverted", 8, "inverted", ("sum8-ones-complement",)),
-    Sum("sum8-zero", 8, "zero", ("sum8-twos-complement", "lrc-modbus-ascii")),
+    Sum("sum8-inverted", 8, "inverted", aliases=("sum8-ones-complement",)),
+    Sum("sum8-zero", 8, "zero", aliases=("sum8-twos-complement", "lrc-modbus-ascii")),
     Sum("sum16", 16),
     Sum("sum16-inverted", 16, "inverted"),
     Sum("sum16-zero", 16, "zero"),
@@ -154,5 +154,5 @@ SUMS: tuple[Sum | Xor | Fletcher, ...] = (
     Xor("xor8", aliases=("xor",)),
     Fletcher("fletcher-8", 16, 256),
     Fletcher("fletcher-16", 16, 255),
-    Fletcher("adler-32", 32, 65521, first=1, aliases=("adler",)),
+    Fletcher("adler-32", 32, 65521, init=1, aliases=("adler",)),
 )

@@ -52,12 +52,19 @@ class Check:
         return self.value.regular
 
     @property
+    def otherwise(self) -> int | None:
+        """The value over no bytes, None if the algorithm gives it."""
+        return self.value.otherwise
+
+    @property
     def complete(self) -> bool:
         """Whether every bit of the value is sent."""
         return self.mask == self.algorithm.mask
 
     def of(self, *runs: bytes, start: int = 0) -> int:
         """The value over runs of bytes; a sum begins with ``start`` and splits each run into words."""
+        if self.otherwise is not None and not any(runs):
+            return self.otherwise
         if not isinstance(self.algorithm, Sum):
             return self.algorithm.compute(b"".join(runs))
         words = [run[at : at + self.word] for run in runs for at in range(0, len(run), self.word)]

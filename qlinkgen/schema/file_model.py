@@ -213,6 +213,10 @@ class PartSpec(Fact):
     algorithm: AnyAlgorithm | None = Field(
         default=None, description="Name of a CRC in the catalogue or of a sum, or the parameters of a CRC"
     )
+    init: Id | None = Field(default=None, description="Start of the checksum, if it is not the algorithm's")
+    otherwise: Id | None = Field(
+        default=None, description="Value of the checksum where the covered parts are empty"
+    )
     over: list[str] | None = Field(default=None, description="Parts that the checksum covers")
     sent: list[WholeRange] | None = Field(
         default=None, description="Bit ranges of the checksum that are sent, one per byte"

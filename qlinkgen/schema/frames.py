@@ -89,6 +89,7 @@ class FrameBuilder:
         stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
         frame = DelimitedFrame(parts, stuffing, spec.doc, spec.section)
         self._check_order(frame, path)
+        self._check_empty(frame, path)
         if self._is_circular(frame, path):
             return None
         self._check_length(frame, path)
@@ -103,6 +104,18 @@ class FrameBuilder:
             if part.role in ("length", "message", "address") and index > payload:
                 what, hint = f"{part.name} follows the payload", "move it before the payload"
                 self._parts.fault("bad-frame", (*path, part.name), what, hint)
+
+    def _check_empty(self, frame: DelimitedFrame, path: Path) -> None:
+        """Check that what a value for empty parts covers may be empty."""
+        for part in frame.parts:
+            if part.checksum and part.checksum.otherwise is not None:
+                over = [each for each in part.checksum.over if each != frame.payload.name]
+                if over or frame.payload.min_size:
+                    what = (
+                        f"{part.name} covers {over[0] if over else frame.payload.name}, which is never empty"
+                    )
+                    hint = "remove otherwise, or cover the payload alone"
+                    self._parts.fault("not-applicable", (*path, part.name, "otherwise"), what, hint)
 
     def _is_circular(self, frame: DelimitedFrame, path: Path) -> bool:
         """Report check values that cover each other."""
@@ -168,7 +181,10 @@ class FrameBuilder:
             self._report.error("bad-frame", (*place, "role"), what, "use role: checksum")
             return None
         self._parts.reject(
-            spec.checksum, ("value", "text", "counts", "size", "words", "rejected"), "checksum", place
+            spec.checksum,
+            ("value", "text", "counts", "size", "words", "rejected", "otherwise"),
+            "checksum",
+            place,
         )
         checksum = self._parts.checksum(spec.checksum, ("payload",), place)
         if checksum and any(chunk.mask & spec.marker for chunk in checksum.chunks):
@@ -240,7 +256,10 @@ class FrameBuilder:
 
     def _packet_checksum(self, spec: PartSpec, specs: Mapping[str, PartSpec], place: Path) -> Checksum | None:
         self._parts.reject(
-            spec, ("value", "text", "counts", "size", "sent", "only", "over"), "packet's checksum", place
+            spec,
+            ("value", "text", "counts", "size", "sent", "only", "over", "init", "otherwise"),
+            "packet's checksum",
+            place,
         )
         over = [name for name, part in specs.items() if part.told != "checksum"]
         checksum = self._parts.checksum(spec.model_copy(update={"over": over}), specs, place)

@@ -21,7 +21,7 @@ _ROLE_KEYS = {
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
     "payload": ("size",),
-    "checksum": ("type", "byteorder", "algorithm", "over", "sent"),
+    "checksum": ("type", "byteorder", "algorithm", "init", "over", "otherwise", "sent"),
 }
 _KEYS = (
     "type",
@@ -31,7 +31,9 @@ _KEYS = (
     "counts",
     "size",
     "algorithm",
+    "init",
     "over",
+    "otherwise",
     "sent",
     "only",
     "words",
@@ -188,7 +190,7 @@ class PartBuilder:
 
     def checksum(self, spec: PartSpec, names: Iterable[str], path: Path) -> Checksum | None:
         """The checksum of a frame; None if its algorithm is unknown."""
-        algorithm = self._algorithm(spec, path)
+        algorithm = self._begun(self._algorithm(spec, path), spec.init if self._crc is None else None, path)
         covered = [name for name in names if name != path[-1]]
         if not spec.over:
             self._lacks("over", "add over: [PART, ...]", path)
@@ -201,7 +203,33 @@ class PartBuilder:
             what = f"{algorithm.name} has {algorithm.width} bits, {path[-1]} {scalar.bits}"
             hint = "use a type as wide as the algorithm"
             self._report.error("checksum-does-not-fit", path, what, hint, of_key=True)
-        return Checksum(algorithm, self._sent(spec, scalar, path), tuple(spec.over or ()), spec.confirmed)
+        return Checksum(
+            algorithm,
+            self._sent(spec, scalar, path),
+            tuple(spec.over or ()),
+            spec.confirmed,
+            self._otherwise(spec, algorithm, path),
+        )
+
+    def _otherwise(self, spec: PartSpec, algorithm: catalogue.Checksum, path: Path) -> int | None:
+        if spec.otherwise is not None and spec.otherwise > algorithm.mask:
+            what = f"{spec.otherwise} does not fit {algorithm.width} bits"
+            self._report.error("value-does-not-fit", (*path, "otherwise"), what, f"use 0..{algorithm.mask}")
+        return spec.otherwise
+
+    def _begun(
+        self, algorithm: catalogue.Checksum | None, init: int | None, path: Path
+    ) -> catalogue.Checksum | None:
+        """The algorithm with the initial register of the part."""
+        if algorithm is None or init is None:
+            return algorithm
+        try:
+            return catalogue.begun(algorithm, init)
+        except ValueError:
+            what = f"{init:#x} does not fit {algorithm.width} bits"
+            hint = f"use 0..{algorithm.mask:#x}"
+            self._report.error("value-does-not-fit", (*path, "init"), what, hint)
+            return algorithm
 
     def _sent(self, spec: PartSpec, scalar: Scalar, path: Path) -> tuple[Chunk, ...]:
         if not spec.sent:

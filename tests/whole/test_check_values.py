@@ -54,6 +54,14 @@ SHAPES = {
     sum: {type: u8, algorithm: sum8-zero, over: [length, data]}
     stop: 03
 """,
+    "one over the payload, which may be empty, with a start of its own": """\
+    start: AA
+    length: {type: u8, counts: [data]}
+    code: {role: message, type: u8}
+    head: {type: u8, algorithm: sum8, init: 0x55, over: [length, code]}
+    data: {role: payload, size: 0..40}
+    crc: {type: u16, algorithm: crc-16/modbus, init: 0x1234, over: [data], otherwise: 0xBEEF}
+""",
     "two of one algorithm in a stuffed frame": """\
     start: A5 A5
     length: {type: u8, counts: [data]}
@@ -86,6 +94,12 @@ def test_a_frame_by_hand() -> None:
     # 03 ^ 05 = 06; AA + 06 + 01 + 02 + 03 = 00B6.
     frame = bytes.fromhex("aa 03 05 06 010203 00b6")
     assert Codec(plan(_TWO)).encode("log", {"note": b"\1\2\3"}) == frame
+
+
+def test_a_value_where_there_is_nothing_to_cover() -> None:
+    found = plan(SHAPES["one over the payload, which may be empty, with a start of its own"])
+    # 55 + 00 + 05 = 5A.
+    assert Codec(found).encode("log", {"note": b""}) == bytes.fromhex("aa 00 05 5a beef")
 
 
 def test_a_wrong_header_is_refused_before_its_payload() -> None:

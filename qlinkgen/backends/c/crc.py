@@ -108,7 +108,7 @@ def finished(algorithm: Sum) -> str:
 
 
 def _render_sum(key: str, algorithm: Sum | Xor | Fletcher, step: list[str], result: str) -> SumView:
-    width, start = algorithm.width, f"{algorithm.start}U"
+    width, start = algorithm.width, unsigned(algorithm.start, algorithm.width)
     return SumView(
         key=key,
         name=algorithm.name,

@@ -115,7 +115,9 @@ class PartWriter:
     def alone(self) -> CheckPart | None:
         """The only check value, if it follows the payload: wrapping and scanning compute it in passing."""
         checks = self.envelope.checks
-        return checks[0] if len(checks) == 1 and checks[0] in self.envelope.back else None
+        if len(checks) != 1 or checks[0] not in self.envelope.back or checks[0].check.otherwise is not None:
+            return None
+        return checks[0]
 
     # To the wire
 
@@ -290,10 +292,18 @@ class PartWriter:
     def _value(self, part: CheckPart) -> ValueView:
         algorithm = self.algorithms[part.check.algorithm]
         loops = self._loops(part, algorithm.key, "body", "0", "payload_end")
-        updates = self._lead_updates(part, algorithm.key) + loops
+        updates = self._empty(part) + self._lead_updates(part, algorithm.key) + loops
         if not any("payload_end" in line for line in updates):
             updates.insert(0, "(void)payload_end;")
         return ValueView(self._function(part), part.name, algorithm, updates)
+
+    def _empty(self, part: CheckPart) -> list[str]:
+        """The statement that returns the value where the payload, which alone is covered, is empty."""
+        if part.check.otherwise is None:
+            return []
+        return refusal(
+            f"payload_end == {self.head}U", unsigned(part.check.otherwise, part.check.algorithm.width)
+        )
 
     def _function(self, part: CheckPart) -> str:
         return f"{self.prefix}_value_{self.envelope.checks.index(part) + 1}_"

@@ -72,10 +72,11 @@ class Sum(NamedTuple):
 
     width: int
     form: str = "plain"
+    init: int = 0
 
     def compute(self, data: Iterable[int]) -> int:
         """The check value of bytes or words."""
-        total = sum(data)
+        total = self.init + sum(data)
         if self.form != "plain":
             total = ~total if self.form == "inverted" else -total
         return total & (1 << self.width) - 1
@@ -84,9 +85,11 @@ class Sum(NamedTuple):
 class Xor(NamedTuple):
     """The exclusive or of bytes."""
 
+    init: int = 0
+
     def compute(self, data: Iterable[int]) -> int:
         """The check value of bytes."""
-        total = 0
+        total = self.init
         for byte in data:
             total ^= byte
         return total
@@ -97,11 +100,11 @@ class Fletcher(NamedTuple):
 
     half: int
     modulus: int
-    first: int = 0
+    init: int = 0
 
     def compute(self, data: Iterable[int]) -> int:
         """The check value of bytes."""
-        low, high = self.first, 0
+        high, low = divmod(self.init, 1 << self.half)
         for byte in data:
             low = (low + byte) % self.modulus
             high = (high + low) % self.modulus
@@ -178,7 +181,7 @@ class Check(NamedTuple):
     """A check value over other parts; bits outside of ``mask`` are neither sent nor compared.
 
     With ``word`` it is a sum that includes the request: its id, then the words of this size of both packets.
-    ``rejected`` is the value that rejects a command.
+    ``rejected`` is the value that rejects a command, ``otherwise`` the value over no bytes.
     """
 
     name: str
@@ -188,6 +191,7 @@ class Check(NamedTuple):
     over: Sequence[str]
     word: int = 0
     rejected: int | None = None
+    otherwise: int | None = None
 
     def packed(self, value: int) -> bytes:
         """The wire bytes of a check value."""
@@ -196,6 +200,8 @@ class Check(NamedTuple):
     def value(self, cells: Mapping[str, bytes], request: bytes) -> bytes:
         """The wire bytes of the check value of a frame in cells."""
         runs = [cells[name] for name in self.over]
+        if self.otherwise is not None and not any(runs):
+            return self.packed(self.otherwise)
         if not self.word:
             return self.packed(self.algorithm.compute(b"".join(runs)))
         if not request:

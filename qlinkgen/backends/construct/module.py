@@ -102,15 +102,15 @@ def _algorithms(envelope: Envelope) -> Mapping[catalogue.Checksum, str]:
 
 
 def _algorithm(algorithm: catalogue.Checksum) -> Call:
+    init = (("init", algorithm.init),) if algorithm.init else ()
     match algorithm:
         case catalogue.Sum():
             form = () if algorithm.form == "plain" else (algorithm.form,)
-            return Call("Sum", (algorithm.width, *form))
+            return Call("Sum", (algorithm.width, *form), init)
         case catalogue.Xor():
-            return Call("Xor")
+            return Call("Xor", (), init)
         case catalogue.Fletcher():
-            first = (("first", algorithm.first),) if algorithm.first else ()
-            return Call("Fletcher", (algorithm.half, algorithm.modulus), first)
+            return Call("Fletcher", (algorithm.half, algorithm.modulus), init)
         case catalogue.Algorithm():
             return _crc(algorithm)
         case _:
@@ -170,11 +170,12 @@ def _check(part: CheckPart, envelope: Envelope) -> Call:
     over = Sequence((envelope.payload.name,) if check.chained else check.over)
     word = (("word", check.word),) if check.chained else ()
     rejected = (("rejected", check.rejected),) if check.rejected is not None else ()
+    otherwise = (("otherwise", check.otherwise),) if check.otherwise is not None else ()
     mask = hexadecimal(check.mask, (check.algorithm.width + 3) // 4)
     return Call(
         "Check",
         (part.name, Ref(_algorithms(envelope)[check.algorithm]), integer(kind), mask, over),
-        (*word, *rejected),
+        (*word, *rejected, *otherwise),
     )
 
 

@@ -935,19 +935,19 @@ def _key(name: str) -> str:
     return "".join(filter(str.isalnum, name.lower()))
 
 
-def sum_of(name: str, width: int, form: str = "plain") -> Checksum:
+def sum_of(name: str, width: int, form: str = "plain", *, init: int = 0) -> Checksum:
     """The sum of the bytes; "inverted", or the number that makes the sum "zero"."""
     mask = (1 << width) - 1
     if form == "inverted":
-        return Checksum(name, lambda data, start: ~(start + sum(data)) & mask)
+        return Checksum(name, lambda data, start: ~(start + sum(data)) & mask, init)
     if form == "zero":
-        return Checksum(name, lambda data, start: -(start + sum(data)) & mask)
-    return Checksum(name, lambda data, start: (start + sum(data)) & mask)
+        return Checksum(name, lambda data, start: -(start + sum(data)) & mask, init)
+    return Checksum(name, lambda data, start: (start + sum(data)) & mask, init)
 
 
-def xor_of(name: str) -> Checksum:
+def xor_of(name: str, *, init: int = 0) -> Checksum:
     """The exclusive or of the bytes."""
-    return Checksum(name, _xor)
+    return Checksum(name, _xor, init)
 
 
 def _xor(data: bytes, register: int) -> int:
@@ -962,7 +962,7 @@ def _xor(data: bytes, register: int) -> int:
     return number & 0xFF ^ register
 
 
-def fletcher(name: str, half: int, modulus: int) -> Checksum:
+def fletcher(name: str, half: int, modulus: int, *, init: int = 0) -> Checksum:
     """The sum of the bytes, and above it the sum of all intermediate sums."""
     from itertools import accumulate
 
@@ -973,11 +973,11 @@ def fletcher(name: str, half: int, modulus: int) -> Checksum:
         high = (start >> half) + len(data) * low + sum(accumulate(data))
         return high % modulus << half | (low + sum(data)) % modulus
 
-    return Checksum(name, compute)
+    return Checksum(name, compute, init)
 
 
-def adler(name: str) -> Checksum:
+def adler(name: str, *, init: int = 1) -> Checksum:
     """The checksum of zlib."""
     from zlib import adler32
 
-    return Checksum(name, adler32, 1)
+    return Checksum(name, adler32, init)

@@ -166,6 +166,7 @@ class PlacedCheck:
     start: str
     end: str
     covered: str
+    otherwise: int | None
     mark: str
     main: bool
     early: bool
@@ -319,16 +320,17 @@ def _check_view(check: Check, mark: str = "") -> CheckView:
 def _algorithm(algorithm: Checksum) -> tuple[str, list[str]]:
     """The function of the support module that makes an algorithm, and its arguments."""
     name = f'"{algorithm.name}"'
+    init = [] if not algorithm.init else [f"init={algorithm.init}"]
     match algorithm:
         case Sum():
             form = [] if algorithm.form == "plain" else [f'"{algorithm.form}"']
-            return "sum_of", [name, str(algorithm.width), *form]
+            return "sum_of", [name, str(algorithm.width), *form, *init]
         case Xor():
-            return "xor_of", [name]
-        case Fletcher(name="adler-32"):
-            return "adler", [name]
+            return "xor_of", [name, *init]
+        case Fletcher(width=32, modulus=65521):
+            return "adler", [name, *([] if algorithm.init == 1 else [f"init={algorithm.init}"])]
         case Fletcher():
-            return "fletcher", [name, str(algorithm.half), str(algorithm.modulus)]
+            return "fletcher", [name, str(algorithm.half), str(algorithm.modulus), *init]
         case Algorithm(width=16) if algorithm in catalogue(16):
             return "find_crc", [name]
         case Algorithm():
@@ -561,6 +563,7 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str) -> PlacedCheck:
         start=_edge(envelope, part),
         end=_edge(envelope, part, after=True),
         covered=covered,
+        otherwise=part.check.otherwise,
         mark=mark,
         main=part is envelope.check,
         early=part in envelope.header_checks,

@@ -190,14 +190,20 @@ class _Parts:
         if whole:
             covered = covered[1:]
         elif self._chance(0.35):
-            covered = [name for name in covered if rng.random() < 0.7] or [names["payload"]]
+            covered = [name for name in covered if rng.random() < 0.7] if self._chance(0.7) else []
+            covered = covered or [names["payload"]]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
-        spec |= _order(rng)
+        spec |= _order(rng) | self._start(width)
+        if covered == [names["payload"]] and self._chance(0.5):
+            spec["otherwise"] = rng.randrange(1 << width)
         if width == 16 and not whole and self._chance(0.15):
             spec["sent"] = rng.choice(
                 (["0..6", "8..14"], ["8..15"], ["0..3", "4..7", "8..11", "12..15"], ["7..14", "0..6"])
             )
         names["checksum"] = self._add("crc", spec)
+
+    def _start(self, width: int) -> Doc:
+        return {"init": self.rng.randrange(1 << width)} if self._chance(0.15) else {}
 
     def _also_checked(self, names: Doc) -> None:
         """One more check value at any place, often in the header and over it alone."""
@@ -207,7 +213,7 @@ class _Parts:
         covered = front if front and self._chance(0.5) else others
         covered = [name for name in covered if rng.random() < 0.7] or covered[:1]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
-        name = self._add("head", spec | _order(rng))
+        name = self._add("head", spec | _order(rng) | self._start(width))
         least = 1 if "lead" in names else 0
         place = rng.randint(least, len(front) if self._chance(0.7) else len(others))
         others.insert(place, name)

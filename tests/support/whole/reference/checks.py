@@ -42,32 +42,37 @@ def width(algorithm: Algorithm) -> int:
     return _SUMS.get(algorithm) or int(catalogue()[algorithm]["width"])
 
 
-def compute(algorithm: Algorithm, data: Sequence[int]) -> int:
-    """The check value of bytes; sums take numbers of any size."""
+def compute(algorithm: Algorithm, data: Sequence[int], init: int | None = None) -> int:
+    """The check value of bytes; sums take numbers of any size. `init` replaces the initial register."""
     if not isinstance(algorithm, str):
         stated = {"init": 0, "refin": False, "xorout": 0} | dict(algorithm)
+        stated |= {} if init is None else {"init": init}
         return _crc(bytes(data), **{"refout": stated["refin"]} | stated)
     if algorithm.startswith("sum"):
-        total = sum(data)
+        total = (init or 0) + sum(data)
         signed = ~total if algorithm.endswith("inverted") else -total if algorithm.endswith("zero") else total
         return signed & (1 << width(algorithm)) - 1
     if algorithm == "xor8":
-        return sum((sum(byte >> bit & 1 for byte in data) & 1) << bit for bit in range(8))
+        every = [*data, init or 0]
+        return sum((sum(byte >> bit & 1 for byte in every) & 1) << bit for bit in range(8))
     if algorithm in _MODULUS:
-        return _two_sums(list(data), int(algorithm == "adler-32"), _MODULUS[algorithm], width(algorithm) // 2)
-    return _named(algorithm, bytes(data))
+        first = int(algorithm == "adler-32") if init is None else init
+        return _two_sums(list(data), first, _MODULUS[algorithm], width(algorithm) // 2)
+    return _named(algorithm, bytes(data), init)
 
 
 def _two_sums(data: list[int], first: int, modulus: int, half: int) -> int:
+    above, first = divmod(first, 1 << half)
     low = first + sum(data)
-    high = first * len(data) + sum((len(data) - index) * byte for index, byte in enumerate(data))
+    high = above + first * len(data) + sum((len(data) - index) * byte for index, byte in enumerate(data))
     return (high % modulus << half) + low % modulus
 
 
 @functools.lru_cache(maxsize=4096)
-def _named(name: str, data: bytes) -> int:
+def _named(name: str, data: bytes, init: int | None) -> int:
     row = catalogue()[name]
     numbers = {key: int(row[key], 16) for key in ("poly", "init", "xorout")}
+    numbers |= {} if init is None else {"init": init}
     refin, refout = (row[key] == "true" for key in ("refin", "refout"))
     return _crc(data, width=int(row["width"]), **numbers, refin=refin, refout=refout)
 

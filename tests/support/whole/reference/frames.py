@@ -181,7 +181,9 @@ class Frame:
     def check_value(check: Part, cut: Mapping[str, bytes]) -> int:
         """The check value over the covered parts."""
         covered = b"".join(cut[name] for name in check.spec["over"])
-        return checks.compute(check.spec["algorithm"], covered)
+        if not covered and "otherwise" in check.spec:
+            return int(check.spec["otherwise"])
+        return checks.compute(check.spec["algorithm"], covered, check.spec.get("init"))
 
     def check_fails(self, cut: Mapping[str, bytes], *, early: bool = False) -> bool:
         """Whether a check value is wrong; `early`: one that needs only the parts found."""

@@ -40,7 +40,10 @@ class Marked:
         if self._check is None or not message.checked:
             return b""
         covered = payload if "payload" in self._check.spec["over"] else b""
-        return put(self._check.pieces, checks.compute(self._check.spec["algorithm"], covered))
+        return put(
+            self._check.pieces,
+            checks.compute(self._check.spec["algorithm"], covered, self._check.spec.get("init")),
+        )
 
     def check_ends(self, wire: bytes) -> None:
         """Check that the data is a header, bytes without the marker, and an end. Raises Wrong."""
