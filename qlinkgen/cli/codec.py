@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import ModuleType
 from typing import Protocol as Shape
 
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import did_you_mean
 from qlinkgen.link import codec as link
+from qlinkgen.model.fields import Layout, Record, Records, Value
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import address_attribute, attribute
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import BadValue, Json, check_items, from_json, to_json
+from qlinkgen.model.values import BadValue, Json, Native, check_items, from_json, to_json
 
 
 class MessageObject(link.Message, Shape):
@@ -51,7 +53,7 @@ def build(
     try:
         built: MessageObject = codec.MESSAGES[message.name](
             **{address_attribute(name): number for name, number in address.items()},
-            **{attribute(name): native for name, native in natives.items()},
+            **{attribute(name): _object(codec, values[name], native) for name, native in natives.items()},
         )
     except codec.EncodeError as error:
         raise Failure(str(error)) from None
@@ -60,7 +62,32 @@ def build(
 
 def fields(message: Message, found: link.Message) -> dict[str, Json]:
     """Return the values of a message object, for JSON."""
-    return {value.name: to_json(value, getattr(found, attribute(value.name))) for value in message.values}
+    return {value.name: to_json(value, _plain(value, found)) for value in message.values}
+
+
+def _object(codec: ModuleType, value: Value, native: Native) -> object:
+    """The value for the constructor of a message: an object of its class for each record."""
+    kind = value.type
+    if isinstance(kind, Records) and isinstance(native, list):
+        one = replace(value, type=Record(kind.layout))
+        return [_object(codec, one, each) for each in native]
+    if not isinstance(kind, Record) or not isinstance(native, Mapping):
+        return native
+    values = {attribute(each.name): _object(codec, each, native[each.name]) for each in kind.layout.values}
+    return codec.RECORDS[kind.layout.name](**values)
+
+
+def _plain(value: Value, owner: object) -> Native:
+    """The value of an attribute; a mapping for each record."""
+    found: Native | Sequence[object] = getattr(owner, attribute(value.name))
+    kind = value.type
+    if isinstance(kind, Records) and isinstance(found, Sequence):
+        return [_mapping(kind.layout, each) for each in found]
+    return _mapping(kind.layout, found) if isinstance(kind, Record) else found  # type: ignore[return-value]
+
+
+def _mapping(layout: Layout, record: object) -> Mapping[str, Native]:
+    return {each.name: _plain(each, record) for each in layout.values}
 
 
 def _no_field(message: Message, name: str, known: list[str]) -> str:

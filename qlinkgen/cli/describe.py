@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
+
+from qlinkgen.model.fields import Record, Records
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.transaction import Allowance, Command
 from qlinkgen.model.values import default_of, to_json
@@ -20,12 +23,17 @@ def default_text(value: Value) -> str:
     """Return the default as written on the command line, ``required`` if there is none."""
     if value.required:
         return "required"
+    if isinstance(value.type, Record | Records):
+        return "its own" if isinstance(value.type, Record) else "none"
     shown = to_json(value, default_of(value))
     if isinstance(shown, list):
         return "none" if not shown else ",".join(map(str, shown))
     if isinstance(shown, bool):
         return str(shown).lower()
-    return (shown or "empty") if isinstance(shown, str) else number_text(shown)
+    if isinstance(shown, str):
+        return shown or "empty"
+    assert isinstance(shown, int | float | Decimal)
+    return number_text(shown)
 
 
 def addresses_text(message: Message) -> str:

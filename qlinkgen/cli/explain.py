@@ -144,7 +144,7 @@ def _of_span(found: Dissection, span: Span) -> Iterator[Line]:
     misplaced = {fault.at for fault in found.faults if fault.rule is Rule.STUFFING}
     match span.of:
         case Member():
-            yield span.places[-1], "", f"  .{part}", value, span.fault != ""
+            yield span.places[-1], "", f"  .{span.of.name}", value, span.fault != ""
         case _:
             for place, byte in zip(span.places, span.raw, strict=True):
                 yield place, f"{byte:02x}", part, value, span.fault != "" or place in misplaced

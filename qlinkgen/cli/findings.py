@@ -230,12 +230,15 @@ def _value(fault: Fault) -> Words:
     scalar = number_of(fault.of)
     seen = fault.seen or 0
     if scalar is None:
-        return f"{fault.of.name} has an invalid byte 0x{seen:02X}", "bytes were corrupted on the wire"
+        return (
+            f"{fault.inside}{fault.of.name} has an invalid byte 0x{seen:02X}",
+            "bytes were corrupted on the wire",
+        )
     if isinstance(fault.of, ConstantStep):
         always = number_text(scalar.default)
         cause = "another message or revision of the protocol"
-        return f"{fault.of.name} is {seen}, but is always {always}", cause
-    rule = f"{fault.of.name} is {value_text(scalar, seen)}, allowed are {limits_text(scalar)}"
+        return f"{fault.inside}{fault.of.name} is {seen}, but is always {always}", cause
+    rule = f"{fault.inside}{fault.of.name} is {value_text(scalar, seen)}, allowed are {limits_text(scalar)}"
     return rule, "the sender does not observe the range"
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from qlinkgen.cli import bitmap, describe
 from qlinkgen.cli.tables import Table, heading, paragraph
-from qlinkgen.model.message import Value
+from qlinkgen.model.fields import Layout, Value, layouts_of
+from qlinkgen.model.message import Message
 from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.describe import (
     bytes_text,
@@ -16,7 +19,7 @@ from qlinkgen.plan.describe import (
     span_text,
     type_text,
 )
-from qlinkgen.plan.payload import BitsStep, Member, Step
+from qlinkgen.plan.payload import BitsStep, Member, PayloadPlan, Step
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 UNCONFIRMED = "unconfirmed"
@@ -40,17 +43,27 @@ def show_message(plan: Plan, planned: MessagePlan) -> None:
     message = planned.message
     heading(f"{message.name}, id {id_text(plan.frame, message.id)}")
     paragraph([message.doc, *_facts(plan, planned)])
-    _layout(planned)
-    for step in planned.payload.steps:
-        if isinstance(step, BitsStep):
-            heading(f"Bits of {step.name}")
-            paragraph(bitmap.diagram(step.integer.bits, bitmap.runs_of_bits(step, message.docs)))
-    for meaning in dict.fromkeys(_meanings(planned)):
+    _layout("", message, planned.payload)
+    _bits(planned.payload, message.docs)
+    payloads, layouts = [planned.payload], {each.name: each for each in layouts_of(message.fields)}
+    for record in planned.payload.records:
+        layout = layouts[record.name]
+        _layout(f"{record.name}: {layout.doc}".rstrip(": "), layout, record.payload)
+        _bits(record.payload, layout.docs)
+        payloads.append(record.payload)
+    for meaning in dict.fromkeys(each for payload in payloads for each in _meanings(payload)):
         show_enum(meaning) if isinstance(meaning, Enum) else show_flags(meaning)
 
 
-def _meanings(planned: MessagePlan) -> list[Enum | Flags]:
-    scalars = [number_of(each) for each in planned.payload.settable]
+def _bits(payload: PayloadPlan, docs: Mapping[str, str]) -> None:
+    for step in payload.steps:
+        if isinstance(step, BitsStep):
+            heading(f"Bits of {step.name}")
+            paragraph(bitmap.diagram(step.integer.bits, bitmap.runs_of_bits(step, docs)))
+
+
+def _meanings(payload: PayloadPlan) -> list[Enum | Flags]:
+    scalars = [number_of(each) for each in payload.settable]
     return [each.meaning for each in scalars if each and isinstance(each.meaning, Enum | Flags)]
 
 
@@ -79,10 +92,10 @@ def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
     return lines
 
 
-def _layout(planned: MessagePlan) -> None:
-    table = Table(COLUMNS, "", frozenset({"offset", "bytes"}))
-    values, docs = {value.name: value for value in planned.message.values}, planned.message.docs
-    for field, step in zip(planned.message.fields, planned.payload.steps, strict=True):
+def _layout(title: str, stated: Message | Layout, payload: PayloadPlan) -> None:
+    table = Table(COLUMNS, title, frozenset({"offset", "bytes"}))
+    values, docs = {value.name: value for value in stated.values}, stated.docs
+    for field, step in zip(stated.fields, payload.steps, strict=True):
         offset = step.place.offset
         notes = ["echo"] if field.echo else []
         notes += [] if field.confirmed else [UNCONFIRMED]

@@ -21,7 +21,7 @@ from qlinkgen.plan.describe import (
     type_text,
 )
 from qlinkgen.plan.framing import CheckPart, Envelope, FramePlan, Part, PayloadPart
-from qlinkgen.plan.payload import BitsStep, BytesStep, ItemsStep, Step, least_size
+from qlinkgen.plan.payload import BitsStep, BytesStep, ItemsStep, PayloadPlan, RecordsStep, Step, least_size
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -104,8 +104,14 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
     if sizes:
         heading("Sizes, in this order")
         paragraph([*sizes, f"{len(sizes) + 1}. the payload has {size_text(payload.size)} bytes"])
+    _steps("Steps", payload)
+    for record in payload.records:
+        _steps(f"Steps of a record {record.name}", record.payload)
+
+
+def _steps(title: str, payload: PayloadPlan) -> None:
     columns = ["offset", "from end", "bytes", "step", "kind", "type", "must be"]
-    table = Table(columns, "Steps", frozenset({"offset", "from end", "bytes"}))
+    table = Table(columns, title, frozenset({"offset", "from end", "bytes"}))
     for step in payload.steps:
         back = "" if step.place.back is None else step.place.back
         table.add(
@@ -121,6 +127,6 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
 
 def _bytes(step: Step) -> str:
     """Return the size of a step in bytes."""
-    if isinstance(step, BytesStep | ItemsStep) and not step.fixed:
+    if isinstance(step, BytesStep | ItemsStep | RecordsStep) and not step.fixed:
         return step.name if step.item_size == 1 else f"{step.item_size}*{step.name}"
     return str(least_size(step))

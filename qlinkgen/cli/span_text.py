@@ -22,6 +22,8 @@ from qlinkgen.plan.payload import (
     CountStep,
     ItemsStep,
     Member,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     Step,
     ValueStep,
@@ -43,11 +45,12 @@ def value_of(found: Dissection, span: Span) -> tuple[str, str]:
     of = span.of
     if isinstance(of, Around):
         return _AROUND[of]
+    name = span.inside + of.name
     if len(span.raw) < span.size:
-        return of.name, f"{len(span.raw)} of {span.size} bytes received"
+        return name, f"{len(span.raw)} of {span.size} bytes received"
     if isinstance(of, Part):
-        return of.name, _of_part(found, of, span)
-    return of.name, _of_field(of, span)
+        return name, _of_part(found, of, span)
+    return name, _of_field(of, span)
 
 
 def _of_part(found: Dissection, part: Part, span: Span) -> str:
@@ -85,6 +88,8 @@ def _of_field(field: Step | Member, span: Span) -> str:
             starts = range(0, len(span.raw), field.item_size)
             items = (field.item.unpack(span.raw[at : at + field.item_size]) for at in starts)
             return ", ".join(map(str, items))
+        case RecordStep() | RecordsStep():
+            return f"{len(span.raw)} bytes"
         case _:
             assert_never(field)
 

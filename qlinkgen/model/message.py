@@ -2,84 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, assert_never
+from typing import Literal
 
+from qlinkgen.model.fields import Field, Value, docs_of, values_of
 from qlinkgen.model.texts import Text
-from qlinkgen.model.types import Array, BitField, Bits, Blob, FieldType, Scalar
+
+__all__ = ["Direction", "Field", "Message", "Value"]
 
 #: "request": master to slave; "response": slave to master; "message": from any node, without a response.
 Direction = Literal["request", "response", "message"]
-
-
-@dataclass(frozen=True, slots=True)
-class Field:
-    """A field of the payload. ``Bits`` hold several named values, all other types one."""
-
-    name: str
-    type: FieldType
-    doc: Text = ""
-    section: Text = ""
-    confirmed: bool = True
-    #: It repeats the field of the same name of the request.
-    echo: bool = False
-
-    @property
-    def min_size(self) -> int:
-        """Minimum size on the wire."""
-        match self.type:
-            case Blob() | Array():
-                return self.type.length.minimum * self.type.item_size
-            case Scalar() | Bits():
-                return self.type.size
-            case _:
-                assert_never(self.type)
-
-    @property
-    def max_size(self) -> int:
-        """Maximum size on the wire."""
-        match self.type:
-            case Blob() | Array():
-                return self.type.length.maximum * self.type.item_size
-            case Scalar() | Bits():
-                return self.type.size
-            case _:
-                assert_never(self.type)
-
-    @property
-    def quantity(self) -> str:
-        """Suffix for the name of its number of items, "" for an integer."""
-        return self.type.quantity if isinstance(self.type, Blob | Array) else ""
-
-    @property
-    def fixed(self) -> bool:
-        """Whether the size is constant."""
-        return not isinstance(self.type, Blob | Array) or self.type.length.fixed
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """A value that the user sets and reads: an attribute of a message object, a member of a C struct."""
-
-    name: str
-    type: Scalar | Blob | Array
-    doc: Text
-    #: The field that holds it, and its bits if the field is divided into bits.
-    field: Field
-    bits: BitField | None = None
-
-    @property
-    def required(self) -> bool:
-        """Whether the caller must provide the value; the default is used only in vectors."""
-        return self.type.required
-
-    @property
-    def unit(self) -> str:
-        """The unit of its numbers, "" for bytes and text."""
-        kind = self.type.item if isinstance(self.type, Array) else self.type
-        return kind.unit if isinstance(kind, Scalar) else ""
 
 
 @dataclass(frozen=True)
@@ -127,22 +60,7 @@ class Message:
     @cached_property
     def values(self) -> tuple[Value, ...]:
         """Values in wire order; constants, reserved bytes and counts are not values."""
-        return tuple(self._values())
-
-    def _values(self) -> Iterator[Value]:
-        for field in self.fields:
-            kind = field.type
-            match kind:
-                case Bits():
-                    for member in kind.members:
-                        yield Value(member.name, member.type, member.doc, field, member)
-                case Scalar():
-                    if kind.settable:
-                        yield Value(field.name, kind, field.doc, field)
-                case Blob() | Array():
-                    yield Value(field.name, kind, field.doc, field)
-                case _:
-                    assert_never(kind)
+        return tuple(values_of(self.fields))
 
     @property
     def echoes(self) -> tuple[str, ...]:
@@ -152,8 +70,4 @@ class Message:
     @property
     def docs(self) -> dict[str, str]:
         """Descriptions of fields and of the values inside them, by name."""
-        found = {field.name: field.doc for field in self.fields}
-        for field in self.fields:
-            if isinstance(field.type, Bits):
-                found |= {member.name: member.doc for member in field.type.members}
-        return found
+        return docs_of(self.fields)

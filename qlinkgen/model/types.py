@@ -29,7 +29,6 @@ __all__ = [
     "Constant",
     "Count",
     "Enum",
-    "FieldType",
     "Flags",
     "Float",
     "Integer",
@@ -332,6 +331,3 @@ class Array:
     def item_size(self) -> int:
         """Bytes of one item."""
         return self.item.size
-
-
-FieldType = Scalar | Bits | Blob | Array

@@ -1,9 +1,10 @@
 """The values of a message as native Python objects, as raw integers, and in JSON.
 
 Native values are those of generated Python and construct: int, bool, float or Decimal in the field's unit, an
-int for enums and flags, bytes, str, a list of the values of its items. In JSON, bytes are hex strings, enums
-their name (a number if unknown), flags an integer, scaled values numbers in the unit with all their digits,
-infinities and NaN the texts "inf", "-inf" and "nan".
+int for enums and flags, bytes, str, a list of the values of its items; a record is a mapping of its values.
+In JSON, bytes are hex strings, enums their name (a number if unknown), flags an integer, scaled values
+numbers in the unit with all their digits, infinities and NaN the texts "inf", "-inf" and "nan", records
+objects.
 """
 
 from __future__ import annotations
@@ -12,17 +13,20 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from typing import TypeAlias, assert_never
 
-from qlinkgen.model.message import Value
+from qlinkgen.model.fields import Layout, Record, Records, Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Float, Scalar
 
 #: A JSON value; numbers with a decimal point are read as Decimal.
 Json: TypeAlias = "str | int | float | Decimal | Sequence[Json] | Mapping[str, Json] | None"
 Item = int | bool | float | Decimal
-Native = Item | bytes | str | list[Item]
+Native: TypeAlias = (
+    "Item | bytes | str | list[Item] | list[int] | Mapping[str, Native] | Sequence[Mapping[str, Native]]"
+)
 
 
 #: No number of a protocol is nearly as long; Python refuses to convert one of more than 4300 digits.
@@ -46,8 +50,17 @@ def default_of(value: Value) -> Native:
             return [native_from_raw(kind.item, raw) for raw in kind.default]
         case Blob():
             return kind.default.decode("ascii") if kind.text else kind.default
+        case Record():
+            return defaults_of(kind.layout)
+        case Records():
+            return [defaults_of(kind.layout) for _ in range(kind.length.minimum)]
         case _:
             assert_never(kind)
+
+
+def defaults_of(layout: Layout) -> Mapping[str, Native]:
+    """The native defaults of a record."""
+    return {value.name: default_of(value) for value in layout.values}
 
 
 def native_from_raw(scalar: Scalar, raw: int) -> Item:
@@ -64,7 +77,7 @@ def raw_from_native(value: Value, native: Native) -> int:
 
 def raw_number(name: str, scalar: Scalar, native: Native) -> int:
     """Like `raw_from_native`, for a value or an item of a list."""
-    if isinstance(native, bytes | str | list):
+    if isinstance(native, bytes | str | Sequence | Mapping):
         raise BadValue(f"{name}: {_shown(native)} is not a number")
     if isinstance(scalar.meaning, Float):
         return _raw_float(name, scalar, scalar.meaning, native)
@@ -98,16 +111,23 @@ def _out_of_range(name: str, scalar: Scalar, native: Item) -> BadValue:
     return BadValue(f"{name}: {native} is out of range; {low}..{high}{unit} can be sent")
 
 
-def to_json(value: Value, native: Native) -> str | Item | list[str | Item]:
+def to_json(value: Value, native: Native) -> Json:
     """The JSON value of a native value; a Decimal is kept, so that the writer can print all its digits."""
     kind = value.type
+    if isinstance(kind, Record):
+        assert isinstance(native, Mapping)
+        return {each.name: to_json(each, native[each.name]) for each in kind.layout.values}
+    if isinstance(kind, Records):
+        assert isinstance(native, Sequence)
+        one = replace(value, type=Record(kind.layout))
+        return [to_json(one, each) for each in native]
     if isinstance(kind, Blob):
         assert isinstance(native, bytes | str)
         return native.hex() if isinstance(native, bytes) else native
     if isinstance(kind, Array):
         assert isinstance(native, list)
         return [_item_to_json(kind.item, item) for item in native]
-    assert not isinstance(native, bytes | str | list)
+    assert not isinstance(native, bytes | str | Sequence | Mapping)
     return _item_to_json(kind, native)
 
 
@@ -129,6 +149,13 @@ def from_json(value: Value, given: Json) -> Native:
     0b). Raises BadValue; ranges are checked by the encoder and by :func:`check_items`.
     """
     kind = value.type
+    if isinstance(kind, Record):
+        return _record(value.name, kind.layout, _parsed(given, "{"))
+    if isinstance(kind, Records):
+        items = _parsed(given, "[")
+        if not isinstance(items, Sequence) or isinstance(items, str):
+            raise BadValue(f"{value.name}: {_shown(given)} is not a list of records")
+        return [_record(f"{value.name}[{index}]", kind.layout, item) for index, item in enumerate(items)]
     if isinstance(kind, Blob):
         return _blob(value.name, kind, given)
     if isinstance(kind, Array):
@@ -155,12 +182,20 @@ def _item_from_json(name: str, scalar: Scalar, given: Json) -> Item:
 def check_items(value: Value, native: Native) -> None:
     """Check the number of items of a list, and the range of each. Raises BadValue."""
     kind = value.type
-    if not isinstance(kind, Array) or not isinstance(native, list):
+    if isinstance(kind, Record) and isinstance(native, Mapping):
+        for each in kind.layout.values:
+            check_items(_inside(value.name, each), native[each.name])
+    if not isinstance(kind, Array | Records) or not isinstance(native, list):
         return
     number, low, high = len(native), kind.length.minimum, kind.length.maximum
     if not low <= number <= high:
         limit = f"at most {high}" if number > high else f"at least {low}"
         raise BadValue(f"{value.name}: {number} item{'' if number == 1 else 's'}; {limit}")
+    if isinstance(kind, Records):
+        for index, item in enumerate(native):
+            assert isinstance(item, Mapping)
+            check_items(replace(value, name=f"{value.name}[{index}]", type=Record(kind.layout)), item)
+        return
     first, last = kind.item.span
     for index, item in enumerate(native):
         if not first <= item <= last and not (isinstance(item, float) and _takes_nan(kind.item)):
@@ -169,6 +204,37 @@ def check_items(value: Value, native: Native) -> None:
 
 def _takes_nan(scalar: Scalar) -> bool:
     return isinstance(scalar.meaning, Float) and scalar.meaning.bounds is None
+
+
+def _inside(name: str, value: Value) -> Value:
+    """A value of a record, named for errors."""
+    return replace(value, name=f"{name}.{value.name}")
+
+
+def _parsed(given: Json, opening: str) -> Json:
+    """Text of a command line that is JSON."""
+    if not isinstance(given, str) or not given.lstrip().startswith(opening):
+        return given
+    try:
+        parsed: Json = json.loads(given, parse_float=Decimal)
+    except ValueError:
+        return given
+    return parsed
+
+
+def _record(name: str, layout: Layout, given: Json) -> Mapping[str, Native]:
+    values = {value.name: value for value in layout.values}
+    if not isinstance(given, Mapping):
+        known = ", ".join(f'"{each}": VALUE' for each in values)
+        raise BadValue(f"{name}: {_shown(given)} is not a record; write {{{known}}}")
+    if unknown := [each for each in given if each not in values]:
+        raise BadValue(f"{name}: a record {layout.name} has no '{unknown[0]}'; it has {', '.join(values)}")
+    if missing := [each for each, value in values.items() if value.required and each not in given]:
+        raise BadValue(f"{name}: {', '.join(missing)} has no default; add it")
+    return {
+        each: from_json(_inside(name, value), given[each]) if each in given else default_of(value)
+        for each, value in values.items()
+    }
 
 
 def whole_number(text: str) -> int | None:

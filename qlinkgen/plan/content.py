@@ -1,12 +1,13 @@
 """Interprets the steps of a payload: encodes values to bytes and decodes them.
 
-Values are raw: the integer on the wire, bytes for bytes and text, a list of integers for an array.
+Values are raw: the integer on the wire, bytes for bytes and text, a list of integers for an array, a mapping
+of raw values for a record.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import assert_never
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias, assert_never
 
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Scalar
@@ -17,11 +18,15 @@ from qlinkgen.plan.payload import (
     Compare,
     ConstantStep,
     CountStep,
+    Holder,
     Infer,
     ItemsStep,
     Learn,
     Member,
     PayloadPlan,
+    RecordPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     RunStep,
     Step,
@@ -29,7 +34,7 @@ from qlinkgen.plan.payload import (
     limits,
 )
 
-Raw = int | bytes | list[int]
+Raw: TypeAlias = "int | bytes | list[int] | Mapping[str, Raw] | Sequence[Mapping[str, Raw]]"
 
 
 class Unsendable(ValueError):
@@ -39,6 +44,7 @@ class Unsendable(ValueError):
         """Compose the error text."""
         super().__init__(f"{field}: {value!r} cannot be sent")
         self.field = field
+        self.value = value
 
 
 class BadContent(ValueError):
@@ -83,7 +89,7 @@ def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     return b"".join(_packed(step, whole, counts) for step in plan.steps)
 
 
-def default_of(each: ValueStep | Member | RunStep) -> Raw:
+def default_of(each: Holder) -> Raw:
     """The default of a field."""
     match each:
         case ValueStep() | Member():
@@ -92,8 +98,17 @@ def default_of(each: ValueStep | Member | RunStep) -> Raw:
             return each.default
         case ItemsStep():
             return list(each.default)
+        case RecordStep():
+            return defaults(each.record.payload)
+        case RecordsStep():
+            return [defaults(each.record.payload) for _ in range(each.length.minimum)]
         case _:
             assert_never(each)
+
+
+def defaults(plan: PayloadPlan) -> dict[str, Raw]:
+    """The defaults of all fields."""
+    return {each.name: default_of(each) for each in plan.settable}
 
 
 def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) -> bytes:
@@ -118,8 +133,24 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
             items = values[step.name]
             assert isinstance(items, list)
             return b"".join(step.item.pack(_checked(step.name, step.number, item)) for item in items)
+        case RecordStep():
+            return _record(step.name, step.record, values[step.name])
+        case RecordsStep():
+            _count(step, values[step.name])
+            records = values[step.name]
+            assert isinstance(records, list)
+            return b"".join(_record(f"{step.name}[{i}]", step.record, each) for i, each in enumerate(records))
         case _:
             assert_never(step)
+
+
+def _record(name: str, record: RecordPlan, value: object) -> bytes:
+    if not isinstance(value, Mapping):
+        raise Unsendable(name, value)
+    try:
+        return pack(record.payload, value)
+    except Unsendable as unsendable:
+        raise Unsendable(f"{name}.{unsendable.field}", unsendable.value) from None
 
 
 def _member_bits(member: Member, values: Mapping[str, Raw]) -> int:
@@ -155,7 +186,7 @@ def broken(rules: tuple[Condition, ...], value: int) -> bool:
 def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
     """The values of a payload; checks sizes first, then each step in wire order. Raises BadContent."""
     if not payload and plan.empty_is_default:
-        return {each.name: default_of(each) for each in plan.settable}
+        return defaults(plan)
     counts = count_items(plan, payload)
     values: dict[str, Raw] = {}
     for step in plan.steps:
@@ -237,11 +268,32 @@ def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> di
         case ItemsStep():
             starts = range(0, step.item_size * counts.get(step.name, step.length.maximum), step.item_size)
             return {step.name: [_valid(step.name, step.item, step.conditions, data[i:], at) for i in starts]}
+        case RecordStep() | RecordsStep():
+            return {step.name: _unpacked_records(step, data, counts, at)}
         case ReservedStep():
             pass
         case _:
             assert_never(step)
     return {}
+
+
+def _unpacked_records(step: RecordStep | RecordsStep, data: bytes, counts: Mapping[str, int], at: int) -> Raw:
+    if isinstance(step, RecordStep):
+        return _unpacked_record(step.name, step.record, data, at)
+    size = step.item_size
+    starts = range(0, size * counts.get(step.name, step.length.maximum), size)
+    return [
+        _unpacked_record(f"{step.name}[{index}]", step.record, data[start:], at + start)
+        for index, start in enumerate(starts)
+    ]
+
+
+def _unpacked_record(name: str, record: RecordPlan, data: bytes, at: int) -> dict[str, Raw]:
+    """The values of the record at the beginning of ``data``."""
+    try:
+        return unpack(record.payload, data[: record.size])
+    except BadContent as bad:
+        raise BadContent(bad.kind, f"{name}.{bad.field}", at + bad.offset) from None
 
 
 def _valid(name: str, integer: Integer, rules: tuple[Condition, ...], data: bytes, at: int) -> int:

@@ -50,6 +50,8 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Learn,
     Member,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     Sizing,
     Step,
@@ -142,7 +144,7 @@ def number_of(step: Step | Member) -> Scalar | None:
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | ItemsStep() | Member():
             return step.number
-        case CountStep() | BitsStep() | BytesStep():
+        case CountStep() | BitsStep() | BytesStep() | RecordStep() | RecordsStep():
             return None
         case _:
             assert_never(step)
@@ -159,6 +161,10 @@ def type_text(step: Step | Member) -> str:
             return f"{'text' if step.text else 'bytes'}[{_length_text(step.length)}]"
         case ItemsStep():
             return f"{_scalar_text(step.number)}[{_length_text(step.length)}]"
+        case RecordStep():
+            return step.record.name
+        case RecordsStep():
+            return f"{step.record.name}[{_length_text(step.length)}]"
         case _:
             assert_never(step)
 
@@ -209,7 +215,7 @@ def holds_text(step: Step | Member) -> str:
             return f"{count_unit(step)} of {step.run}"
         case BitsStep():
             return span_text(step.integer.minimum, step.integer.maximum)
-        case BytesStep():
+        case BytesStep() | RecordStep() | RecordsStep():
             return ""
         case _:
             assert_never(step)
@@ -232,6 +238,10 @@ def kind_text(step: Step | Member) -> str:
             return "text" if step.text else "bytes"
         case ItemsStep():
             return "items"
+        case RecordStep():
+            return "record"
+        case RecordsStep():
+            return "records"
         case _:
             assert_never(step)
 
@@ -249,7 +259,7 @@ def must_text(step: Step | Member) -> str:
             return f"anything; sent as {step.value}"
         case CountStep():
             return f"{count_unit(step)} of {step.run}, {condition_text(step.bounds)}"
-        case BitsStep():
+        case BitsStep() | RecordStep() | RecordsStep():
             return ""
         case BytesStep():
             return "7-bit characters" if step.text else ""

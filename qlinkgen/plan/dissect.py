@@ -469,7 +469,7 @@ class _Walk:
             kind = "frame" if isinstance(self.frame.end, ByMark) and not inside else "length"
             self._fault(kind, Rule.SIZE, at, part, len(data))
         for each in fields.wrong:
-            self._fault("range", Rule.VALUE, places[each.at], each.of, each.seen)
+            self.faults.append(Fault("range", Rule.VALUE, places[each.at], each.of, each.seen, each.inside))
         self.spans += (replace(span, places=tuple(places[i] for i in span.places)) for span in fields.spans)
 
     def _plain(self, cell: Cell, *, whole: bool) -> tuple[bytes, tuple[int, ...]]:

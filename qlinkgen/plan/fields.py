@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.model.integer import Integer
@@ -18,6 +18,9 @@ from qlinkgen.plan.payload import (
     Learn,
     Member,
     PayloadPlan,
+    RecordPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     Step,
     ValueStep,
@@ -28,11 +31,12 @@ from qlinkgen.plan.spans import Around, Span
 
 @dataclass(frozen=True, slots=True)
 class Wrong:
-    """An illegal value of a field, and its offset in the payload."""
+    """An illegal value of a field, its offset in the payload, and the record that it is inside of."""
 
     of: Step | Member
     seen: int
     at: int
+    inside: str = ""
 
 
 class Fields:
@@ -44,8 +48,11 @@ class Fields:
         wrong: illegal values; empty if sizes are bad.
     """
 
-    def __init__(self, plan: PayloadPlan, payload: bytes, *, sound: bool) -> None:
-        """Values are checked only if the payload is ``sound``: neither cut short nor wrongly stuffed."""
+    def __init__(self, plan: PayloadPlan, payload: bytes, *, sound: bool, judging: bool = True) -> None:
+        """Values are checked only if the payload is ``sound``: neither cut short nor wrongly stuffed.
+
+        Without ``judging``, they are not checked at all.
+        """
         self._plan, self._payload, self._sound = plan, payload, sound
         self._learned: dict[str, int] = {}
         self.bad = False
@@ -56,7 +63,7 @@ class Fields:
             counts = count_items(plan, payload)
         except BadContent:
             self.bad = sound
-        self._judging = sound and not self.bad
+        self._judging = judging and sound and not self.bad
         self._divide(counts)
 
     def _divide(self, counts: Mapping[str, int]) -> None:
@@ -74,7 +81,7 @@ class Fields:
     def _size(self, step: Step, counts: Mapping[str, int], left: int) -> int:
         """Size of a step: by its count if that is right, otherwise by the bytes left."""
         match step:
-            case BytesStep() | ItemsStep() if not step.fixed:
+            case BytesStep() | ItemsStep() | RecordsStep() if not step.fixed:
                 number = counts.get(step.name, self._learned.get(step.name))
                 return step.item_size * (max(0, left) // step.item_size if number is None else number)
             case _:
@@ -82,6 +89,9 @@ class Fields:
 
     def _step(self, step: Step, places: tuple[int, ...], size: int) -> None:
         raw = bytes(self._payload[at] for at in places)
+        if isinstance(step, RecordStep | RecordsStep):
+            self._records(step, places)
+            return
         if len(raw) < size:
             if raw:
                 short = "length" if self._sound else "truncated"
@@ -103,6 +113,21 @@ class Fields:
                 self._items(step, raw, places)
             case _:
                 assert_never(step)
+
+    def _records(self, step: RecordStep | RecordsStep, places: tuple[int, ...]) -> None:
+        """Divide each record, the last one as far as received."""
+        size = step.record.size
+        for index, at in enumerate(range(0, len(places), size)):
+            name = f"{step.name}[{index}]." if isinstance(step, RecordsStep) else f"{step.name}."
+            self._record(step.record, name, places[at : at + size])
+
+    def _record(self, record: RecordPlan, name: str, places: tuple[int, ...]) -> None:
+        raw = bytes(self._payload[at] for at in places)
+        inner = Fields(record.payload, raw, sound=self._sound, judging=self._judging)
+        for span in inner.spans:
+            own = tuple(places[at] for at in span.places)
+            self.spans.append(replace(span, places=own, inside=name + span.inside))
+        self.wrong += (replace(each, at=places[each.at], inside=name + each.inside) for each in inner.wrong)
 
     def _learn(self, step: CountStep, number: int) -> None:
         if any(isinstance(each, Learn) and each.count is step for each in self._plan.sizing):

@@ -7,12 +7,13 @@ sizes are consistent, so a decoder reports `length` before `range`, in any order
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.model.fields import Field, Layout, Record, Records
 from qlinkgen.model.integer import Integer
-from qlinkgen.model.message import Field, Message
+from qlinkgen.model.message import Message
 from qlinkgen.model.types import (
     Array,
     BitField,
@@ -190,8 +191,68 @@ class ItemsStep:
         return conditions(self.number)
 
 
-RunStep = BytesStep | ItemsStep
-Step = ValueStep | ConstantStep | ReservedStep | CountStep | BitsStep | BytesStep | ItemsStep
+@dataclass(frozen=True)
+class RecordPlan:
+    """A record of fixed size: its steps, whose places count from its first byte.
+
+    Attributes:
+        name: its name, which the class or struct of the record is named after.
+        payload: its layout.
+    """
+
+    name: str
+    payload: PayloadPlan
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return self.payload.most
+
+
+@dataclass(frozen=True)
+class RecordStep:
+    """One record: a value with the values of its steps."""
+
+    name: str
+    place: Place
+    record: RecordPlan
+
+    @property
+    def required(self) -> bool:
+        """Whether the caller must provide it."""
+        return self.record.payload.required
+
+
+@dataclass(frozen=True)
+class RecordsStep:
+    """A run of records."""
+
+    name: str
+    place: Place
+    record: RecordPlan
+    length: Length
+    required: bool
+
+    #: Suffix for the name of the number of records.
+    quantity = "count"
+
+    @property
+    def item_size(self) -> int:
+        """Bytes of one record."""
+        return self.record.size
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the number of records is constant."""
+        return self.length.fixed
+
+
+#: A value that is a number, or a run of bytes or of numbers.
+SimpleStep = ValueStep | ConstantStep | ReservedStep | CountStep | BitsStep | BytesStep | ItemsStep
+RunStep = BytesStep | ItemsStep | RecordsStep
+Step = SimpleStep | RecordStep | RecordsStep
+#: A step or member with a value of the message.
+Holder = ValueStep | Member | RunStep | RecordStep
 
 
 # Numbers of items -------------------------------------------------------------------------------------------
@@ -252,7 +313,9 @@ class PayloadPlan:
     def runs(self) -> tuple[RunStep, ...]:
         """Runs of variable size, in wire order."""
         return tuple(
-            step for step in self.steps if isinstance(step, BytesStep | ItemsStep) and not step.fixed
+            step
+            for step in self.steps
+            if isinstance(step, BytesStep | ItemsStep | RecordsStep) and not step.fixed
         )
 
     def least_of(self, known: Collection[str]) -> Size:
@@ -269,16 +332,33 @@ class PayloadPlan:
     def run(self, name: str) -> RunStep:
         """The run with a name, of fixed or variable size."""
         return next(
-            step for step in self.steps if isinstance(step, BytesStep | ItemsStep) and step.name == name
+            step
+            for step in self.steps
+            if isinstance(step, BytesStep | ItemsStep | RecordsStep) and step.name == name
         )
 
     @property
-    def settable(self) -> tuple[ValueStep | Member | BytesStep | ItemsStep, ...]:
+    def required(self) -> bool:
+        """Whether a value has no default."""
+        return any(is_required(each) for each in self.settable)
+
+    @property
+    def records(self) -> tuple[RecordPlan, ...]:
+        """The records in it, each before those that contain it."""
+        found: dict[str, RecordPlan] = {}
+        for step in self.steps:
+            if isinstance(step, RecordStep | RecordsStep):
+                inner = (*step.record.payload.records, step.record)
+                found |= {each.name: each for each in inner}
+        return tuple(found.values())
+
+    @property
+    def settable(self) -> tuple[Holder, ...]:
         """Steps and members with a value of the message, in wire order."""
-        found: list[ValueStep | Member | BytesStep | ItemsStep] = []
+        found: list[Holder] = []
         for step in self.steps:
             match step:
-                case ValueStep() | BytesStep() | ItemsStep():
+                case ValueStep() | BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
                     found.append(step)
                 case BitsStep():
                     found += step.members
@@ -294,10 +374,23 @@ def least_size(step: Step) -> int:
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
             return step.integer.size
-        case BytesStep() | ItemsStep():
+        case BytesStep() | ItemsStep() | RecordsStep():
             return step.length.minimum * step.item_size
+        case RecordStep():
+            return step.record.size
         case _:
             assert_never(step)
+
+
+def is_required(each: Holder) -> bool:
+    """Whether the caller must provide the value: it has no default, or only an illegal one."""
+    match each:
+        case ValueStep() | Member():
+            return each.number.required
+        case BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
+            return each.required
+        case _:
+            assert_never(each)
 
 
 def conditions(number: Scalar) -> tuple[Condition, ...]:
@@ -326,20 +419,31 @@ def limits(number: Scalar) -> tuple[Condition, ...]:
 
 def payload_plan(message: Message) -> PayloadPlan:
     """Plan the payload of a message."""
-    return _Planner(message).plan()
+    return _Planner(message.fields).plan(empty_is_default=message.empty_is_default)
+
+
+def record_plan(layout: Layout) -> RecordPlan:
+    """Plan a record."""
+    return RecordPlan(layout.name, _Planner(layout.fields).plan())
+
+
+def all_records(payloads: Iterable[PayloadPlan]) -> tuple[RecordPlan, ...]:
+    """The records in several payloads, each before those that contain it."""
+    found = {each.name: each for payload in payloads for each in payload.records}
+    return tuple(found.values())
 
 
 class _Planner:
-    """Walks the fields of one message."""
+    """Walks the fields of one message or record."""
 
-    def __init__(self, message: Message) -> None:
-        self._message = message
-        self._fields = {field.name: field for field in message.fields}
+    def __init__(self, fields: tuple[Field, ...]) -> None:
+        self._all = fields
+        self._fields = {field.name: field for field in fields}
 
-    def plan(self) -> PayloadPlan:
+    def plan(self, *, empty_is_default: bool = False) -> PayloadPlan:
         front, steps = Size(), []
-        for index, field in enumerate(self._message.fields):
-            rest = self._message.fields[index:]
+        for index, field in enumerate(self._all):
+            rest = self._all[index:]
             back = sum(each.max_size for each in rest) if all(each.fixed for each in rest) else None
             steps.append(self._step(field, Place(front, back)))
             front = front + field.max_size if field.fixed else front.plus(field.name, _item_size(field))
@@ -347,9 +451,9 @@ class _Planner:
             steps=tuple(steps),
             sizing=tuple(self._sizing(steps, front)),
             size=front,
-            least=self._message.min_size,
-            most=self._message.max_size,
-            empty_is_default=self._message.empty_is_default,
+            least=sum(field.min_size for field in self._all),
+            most=sum(field.max_size for field in self._all),
+            empty_is_default=empty_is_default,
         )
 
     def _step(self, field: Field, place: Place) -> Step:
@@ -365,6 +469,10 @@ class _Planner:
                 return ItemsStep(
                     field.name, place, kind.item.integer, kind.item, kind.length, kind.default, kind.required
                 )
+            case Record():
+                return RecordStep(field.name, place, record_plan(kind.layout))
+            case Records():
+                return RecordsStep(field.name, place, record_plan(kind.layout), kind.length, kind.required)
             case _:
                 assert_never(kind)
 
@@ -378,7 +486,7 @@ class _Planner:
                 return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
             case Count(run, unit):
                 counted = self._fields[run].type
-                assert isinstance(counted, Blob | Array)
+                assert isinstance(counted, Blob | Array | Records)
                 scale = counted.item_size if unit == "bytes" else 1
                 bounds = Within(counted.length.minimum * scale, counted.length.maximum * scale)
                 return CountStep(name, place, scalar.integer, run, scale, bounds)
@@ -393,18 +501,18 @@ class _Planner:
                     length = self._length(step.run)
                     learns = not length.fixed and length.counted_by == step.name
                     yield Learn(step) if learns else Compare(step)
-                case BytesStep() | ItemsStep():
+                case BytesStep() | ItemsStep() | RecordsStep():
                     if not step.fixed and not step.length.counted_by:
                         others = Size(size.fixed, tuple(term for term in size.terms if term.run != step.name))
                         yield Infer(step, others)
-                case ValueStep() | ConstantStep() | ReservedStep() | BitsStep():
+                case ValueStep() | ConstantStep() | ReservedStep() | BitsStep() | RecordStep():
                     pass
                 case _:
                     assert_never(step)
 
     def _length(self, run: str) -> Length:
         kind = self._fields[run].type
-        assert isinstance(kind, Blob | Array)
+        assert isinstance(kind, Blob | Array | Records)
         return kind.length
 
 
@@ -413,5 +521,5 @@ def _member(member: BitField) -> Member:
 
 
 def _item_size(field: Field) -> int:
-    assert isinstance(field.type, Blob | Array)
+    assert isinstance(field.type, Blob | Array | Records)
     return field.type.item_size

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from qlinkgen.model.fields import Layout, layouts_of
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Enum, Flags, Scalar
@@ -60,7 +61,9 @@ def received_directions(protocol: Protocol, role: Role) -> tuple[Direction, ...]
 
 def named(messages: tuple[Message, ...]) -> frozenset[str]:
     """Names of the enums and flags that the messages use."""
-    types = (value.type for message in messages for value in message.values)
+    fields = [field for message in messages for field in message.fields]
+    owners: list[Message | Layout] = [*messages, *layouts_of(fields)]
+    types = (value.type for owner in owners for value in owner.values)
     scalars = (each.item if isinstance(each, Array) else each for each in types)
     meanings = (scalar.meaning for scalar in scalars if isinstance(scalar, Scalar))
     return frozenset(each.name for each in meanings if isinstance(each, Enum | Flags))

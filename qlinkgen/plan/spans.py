@@ -78,6 +78,7 @@ class Span:
         size: the expected number of bytes.
         number: the integer that they encode, None if they are incomplete or not an integer.
         fault: kind of the fault in them, "" if there is none.
+        inside: the record that they are in, followed by a dot: "satellites[3]."; "" outside of records.
     """
 
     of: Owner
@@ -86,6 +87,7 @@ class Span:
     size: int
     number: int | None = None
     fault: str = ""
+    inside: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +100,7 @@ class Fault:
         at: wire offset of the first wrong byte; the size of the data if bytes are missing.
         of: the wrong part, step or member, None for the frame.
         seen: the wrong number, see `Rule`.
+        inside: as in `Span`.
     """
 
     kind: str
@@ -105,6 +108,7 @@ class Fault:
     at: int
     of: Part | Step | Member | None = None
     seen: int | None = None
+    inside: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import get_args
 
+from qlinkgen.model.fields import Layout, layouts_of
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
@@ -85,6 +86,11 @@ class Plan:
     enums: tuple[Enum, ...]
     flags: tuple[Flags, ...]
     received_directions: tuple[Direction, ...]
+
+    @cached_property
+    def layouts(self) -> tuple[Layout, ...]:
+        """The records of the selected messages, each before those that contain it."""
+        return layouts_of(field for each in self.messages for field in each.message.fields)
 
     @cached_property
     def by_name(self) -> Mapping[str, MessagePlan]:

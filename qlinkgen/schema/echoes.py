@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import assert_never
 
-from qlinkgen.model.message import Field
+from qlinkgen.model.fields import Field, FieldType, Record, Records
 from qlinkgen.model.transaction import Command
-from qlinkgen.model.types import Array, Bits, Blob, FieldType, Float, Length, Scalar
+from qlinkgen.model.types import Array, Bits, Blob, Float, Length, Scalar
 from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.layouts import layouts
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _RULE = "bad-echo"
-_KINDS = {"request": "a request", "message": "a message without a request"}
+_KINDS = {"request": "a request", "message": "a message without a request", "record": "a record"}
 
 
 def check_echoes(
@@ -61,6 +61,8 @@ def _settable(field: Field) -> bool:
 
 
 def _has_float(kind: FieldType) -> bool:
+    if isinstance(kind, Record | Records):
+        return any(_has_float(field.type) for field in kind.layout.fields)
     number = kind.item if isinstance(kind, Array) else kind
     return isinstance(number, Scalar) and isinstance(number.meaning, Float)
 
@@ -76,6 +78,11 @@ def _holds(kind: FieldType, other: FieldType) -> bool:
                 and _holds(kind.item, other.item)
                 and _longer(kind.length, other.length)
             )
+        case Record():
+            return isinstance(other, Record) and kind.layout == other.layout
+        case Records():
+            same = isinstance(other, Records) and kind.layout == other.layout
+            return same and isinstance(other, Records) and _longer(kind.length, other.length)
         case Bits():
             if not isinstance(other, Bits) or len(kind.members) != len(other.members):
                 return False

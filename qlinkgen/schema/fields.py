@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from qlinkgen.model.message import Field
+from qlinkgen.model.fields import Field, FieldType, Records
 from qlinkgen.model.types import Array, Blob, Count, Scalar
-from qlinkgen.schema.file_model import Fields, FieldSpec, SchemaFile
+from qlinkgen.schema.file_model import Fields, FieldSpec, RecordSpec, SchemaFile
+from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown, type_text
+from qlinkgen.schema.records import RecordBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.types import TypeBuilder
@@ -23,18 +25,33 @@ class FieldBuilder:
         self._report = report
         self._types = types
         self._payload_max = payload_max
+        self._records = RecordBuilder(file, report, self.build)
+
+    def check_records(self) -> None:
+        """Report errors in records at their definition, whether used or not."""
+        self._records.check()
 
     def build(self, specs: Fields, path: Path) -> tuple[Field, ...]:
         """The fields of one message, without those that cannot be built."""
         fields = []
         for name, spec in specs.items():
-            kind = self._types.build(spec, (*path, name))
+            kind = self._kind(spec, (*path, name))
             if kind is not None:
                 doc, confirmed = self._inherited(spec)
                 fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
         fields = self._counted(fields, path)
         self._check_open_ends(fields, path)
         return tuple(self._bounded(fields, path))
+
+    def _kind(self, spec: FieldSpec, path: Path) -> FieldType | None:
+        record = self._records.named(spec)
+        if record is None:
+            return self._types.build(spec, path)
+        self._types.use(record.base)
+        if not record.count and record.count is not None:
+            self._types.unbounded.add(path)
+        location = Location(self._report, path, frozenset(spec.model_fields_set))
+        return self._records.build(spec, record, self._payload_max, location)
 
     def _inherited(self, spec: FieldSpec) -> tuple[str, bool]:
         """The first description of a field and its named types, and whether all of them are confirmed."""
@@ -45,7 +62,7 @@ class FieldBuilder:
             last = named or self._file.enums.get(name) or self._file.flags.get(name)
             if last is not None:
                 doc, confirmed = doc or last.doc, confirmed and last.confirmed
-            if named is None:
+            if named is None or isinstance(named, RecordSpec):
                 break
             spec = named
         return doc, confirmed
@@ -67,7 +84,7 @@ class FieldBuilder:
     ) -> bool:
         target = later.get(count.run)
         needs = (path[:-1], (*path[:-2], count.run))
-        if target is None or not isinstance(target.type, Blob | Array) or target.type.length.fixed:
+        if target is None or not isinstance(target.type, Blob | Array | Records) or target.type.length.fixed:
             known = [name for name, other in later.items() if not other.fixed]
             hint = did_you_mean(count.run, known, f"fields of variable size: {listed(known)}")
             what = f"{field.name} is not followed by a field {shown(count.run)} of variable size"
@@ -105,7 +122,7 @@ class FieldBuilder:
         """Check that counts precede a field that takes the rest of the payload."""
         order = [field.name for field in fields]
         for field in fields[order.index(name) + 1 :]:
-            if not isinstance(field.type, Blob | Array) or field.fixed:
+            if not isinstance(field.type, Blob | Array | Records) or field.fixed:
                 continue
             count = field.type.length.counted_by
             if count and order.index(count) > order.index(name):
@@ -128,7 +145,7 @@ class FieldBuilder:
 
     def _filled(self, field: Field, room: int, counters: Mapping[str, Scalar], path: Path) -> Field:
         kind, place = field.type, (*path, field.name)
-        assert isinstance(kind, Blob | Array)
+        assert isinstance(kind, Blob | Array | Records)
         most = max(0, room) // kind.item_size
         counter = counters.get(kind.length.counted_by)
         if counter and isinstance(counter.role, Count):
@@ -143,11 +160,15 @@ class FieldBuilder:
 
 def _with_counter(field: Field, counter: str | None) -> Field:
     kind = field.type
-    if counter is None or not isinstance(kind, Blob | Array):
+    if counter is None or not isinstance(kind, Blob | Array | Records):
         return field
     return replace(field, type=replace(kind, length=replace(kind.length, counted_by=counter)))
 
 
 def is_open(field: Field) -> bool:
     """Whether the field takes the rest of the payload."""
-    return isinstance(field.type, Blob | Array) and not field.fixed and not field.type.length.counted_by
+    return (
+        isinstance(field.type, Blob | Array | Records)
+        and not field.fixed
+        and not field.type.length.counted_by
+    )

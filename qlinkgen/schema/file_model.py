@@ -172,6 +172,23 @@ ShortField = Annotated[FieldSpec, ShortForm("type", "string")]
 Fields = dict[str, ShortField]
 
 
+class RecordSpec(Fact):
+    """A record: a type with fields of its own."""
+
+    fields: Fields = Field(min_length=1, description="Its fields, in wire order")
+
+
+def _type_form(value: object) -> str:
+    record = isinstance(value, RecordSpec) or (isinstance(value, dict) and "fields" in value)
+    return f"{BRANCH}record" if record else f"{BRANCH}field"
+
+
+TypeSpec = Annotated[
+    Annotated[RecordSpec, Tag(f"{BRANCH}record")] | Annotated[ShortField, Tag(f"{BRANCH}field")],
+    Discriminator(_type_form),
+]
+
+
 class CrcSpec(_Mapping):
     """A CRC by its parameters, which have the meaning of the catalogue."""
 
@@ -488,7 +505,7 @@ class SchemaFile(_Mapping):
     )
     enums: dict[str, EnumSpec] = Field(default_factory=dict, description="Named numbers")
     flags: dict[str, FlagsSpec] = Field(default_factory=dict, description="Named bits")
-    types: Fields = Field(default_factory=dict, description="Named types of fields")
+    types: dict[str, TypeSpec] = Field(default_factory=dict, description="Named types of fields, and records")
     frame: FrameSpec = Field(description="The frame around each message")
     bus: BusSpec = Field(description="The line and its nodes")
     attributes: dict[str, AttributeSpec] = Field(

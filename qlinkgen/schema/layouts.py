@@ -6,22 +6,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from qlinkgen.schema.file_model import AnswerSpec, Fields, NoResponse, SchemaFile
+from qlinkgen.schema.file_model import AnswerSpec, Fields, NoResponse, RecordSpec, SchemaFile
 from qlinkgen.schema.source import Path
 
 #: What a layout is, as it matters for a key that only answers have.
-Kind = Literal["request", "answer", "message"]
+Kind = Literal["request", "answer", "message", "record"]
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Fields of a message, as written.
+    """Fields of a message or a record, as written.
 
     Attributes:
-        owner: name of the message, "" for the defaults of commands and replies of the whole file.
+        owner: name of the message or record, "" for the defaults of commands and replies of the whole file.
         fields: its fields.
         path: their place.
-        kind: what the message is.
+        kind: what it is.
     """
 
     owner: str
@@ -32,6 +32,9 @@ class Layout:
 
 def layouts(file: SchemaFile) -> Iterator[Layout]:
     """All layouts of a file, in its order."""
+    for name, spec in file.types.items():
+        if isinstance(spec, RecordSpec):
+            yield Layout(name, spec.fields, ("types", name, "fields"), "record")
     for name, reply in file.replies.items():
         yield Layout("", reply.fields, ("replies", name, "fields"), "answer")
     if file.defaults.request is not None:

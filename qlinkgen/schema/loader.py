@@ -121,6 +121,7 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)
     fields = FieldBuilder(file, report, types, payload_max)
+    fields.check_records()
     messages = MessageBuilder(file, report, fields, frame, bus)
     commands = CommandBuilder(file, report, messages, frame, bus)
     commands.build()

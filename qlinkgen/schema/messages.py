@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple, assert_never
 
+from qlinkgen.model.fields import Field, Record, Records
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
-from qlinkgen.model.message import Direction, Field, Message
+from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
 from qlinkgen.schema.fields import FieldBuilder, is_open
@@ -202,8 +203,7 @@ class MessageBuilder:
 
     def _check_words(self, message: Message, word: int, path: Path) -> None:
         for field in message.fields:
-            variable = isinstance(field.type, Blob | Array) and not field.fixed
-            if variable and not is_open(field):
+            if not field.fixed and not is_open(field):
                 what = f"{field.name} has no fixed size"
                 hint = "packets have no length; give each field a fixed size"
                 self._error("bad-packet", (*path, field.name), what, hint)
@@ -213,25 +213,27 @@ class MessageBuilder:
 
     def _check_marker(self, field: Field, marker: int, path: Path) -> None:
         """Check that payload bytes cannot have the marker bit."""
+        if isinstance(field.type, Record | Records):
+            layout = field.type.layout
+            for inner in layout.fields:
+                self._check_marker(inner, marker, ("types", layout.name, "fields"))
+            return
         if isinstance(field.type, Blob):
             marked = not field.type.text or marker < 0x80
         else:
-            marked = any(chunk.mask & marker for chunk in _chunks(field))
+            marked = any(chunk.mask & marker for chunk in _chunks(field.type))
         if marked:
             what = f"a byte of {field.name} can have the marker bit {marker:#04x}"
             hint = "send it in groups: {bits: 7, first: least}, or as text"
             self._error("marker-in-payload", (*path, field.name), what, hint)
 
 
-def _chunks(field: Field) -> tuple[Chunk, ...]:
-    kind = field.type
+def _chunks(kind: Scalar | Bits | Array) -> tuple[Chunk, ...]:
     match kind:
         case Bits():
             return kind.container.chunks
         case Array():
             return kind.item.chunks
-        case Blob():
-            return ()
         case Scalar():
             return kind.chunks
         case _:

@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from qlinkgen.model import naming
+from qlinkgen.model.fields import Layout, Records, Value, layouts_of
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake, upper
 from qlinkgen.model.types import Array, Blob, Scalar
-from qlinkgen.schema.file_model import Fields, SchemaFile
+from qlinkgen.schema.file_model import Fields, RecordSpec, SchemaFile
 from qlinkgen.schema.kinds import NAME_PATTERN
 from qlinkgen.schema.layouts import layouts
 from qlinkgen.schema.notation import shown
@@ -27,6 +28,8 @@ _KINDS = {"enums": "enum", "flags": "flags"}
 _MESSAGE_MACROS = ("init", "id", "min_size", "max_size", "max_frame_size", "max_wire_size")
 #: Macros that the C header defines for each scaled type.
 _TYPE_MACROS = ("factor", "bias", "divisor")
+#: Macros that the C header defines for each record.
+_RECORD_MACROS = ("init", "size")
 _GLOBAL_MACROS = ("ok", "max_payload_size", "max_wire_size", "enable_float")
 
 
@@ -52,9 +55,12 @@ def check_names(
             check.spelling(name, (*path, name))
     for layout in layouts(file):
         check.fields(layout.fields, layout.path)
-    for message in messages:
-        for c in (False, True):
-            check.clashes(_attributes(message, places[message.name], address, c=c))
+    records = layouts_of(field for message in messages for field in message.fields)
+    for c in (False, True):
+        for message in messages:
+            check.clashes(_attributes(message.values, places[message.name], address, c=c))
+        for record in records:
+            check.clashes(_attributes(record.values, ("types", record.name, "fields"), None, c=c))
     check.clashes(_classes(file))
     check.clashes(_methods(file))
     check.clashes(_macros(file, messages, places))
@@ -122,18 +128,18 @@ def _reply_groups(file: SchemaFile) -> Iterator[tuple[Path, Iterable[str]]]:
 
 
 def _attributes(
-    message: Message, path: Path, address: str | None, *, c: bool
+    values: Iterable[Value], path: Path, address: str | None, *, c: bool
 ) -> Iterator[tuple[str, str, Path]]:
-    """Attributes of a message object, or members of its C struct."""
+    """Attributes of a message or record, or members of its C struct."""
     spelt = naming.member if c else naming.attribute
     if address is not None and not c:
         yield naming.address_attribute(address), f"the frame's '{address}'", path
-    for value in message.values:
+    for value in values:
         inside = ("bits", value.name) if value.bits else ()
         place = (*path, value.field.name, *inside)
         called = f"'{value.name}' in {value.field.name}" if inside else f"'{value.name}'"
         yield spelt(value.name), called, place
-        if c and isinstance(value.type, Array | Blob) and not value.field.fixed:
+        if c and isinstance(value.type, Array | Blob | Records) and not value.field.fixed:
             suffix = value.type.quantity
             yield f"{value.name}_{suffix}", f"the {suffix} of '{value.name}'", place
 
@@ -145,6 +151,8 @@ def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
         for name in getattr(file, group):
             found = naming.constant_class(name, _KINDS[group], messages)
             yield found, f"'{name}'", (group, name)
+    for name in records_of(file):
+        yield naming.constant_class(name, "record", messages), f"the record '{name}'", ("types", name)
     for name in file.commands:
         for direction in ("request", "response"):
             found = naming.message_class(f"{name}_{direction}")
@@ -153,6 +161,11 @@ def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:
         yield naming.message_class(snake(name)), f"the reply '{name}'", path
     for name in file.messages:
         yield naming.message_class(name), f"the message '{name}'", ("messages", name)
+
+
+def records_of(file: SchemaFile) -> Iterator[str]:
+    """Names of records."""
+    return (name for name, spec in file.types.items() if isinstance(spec, RecordSpec))
 
 
 def _messages(file: SchemaFile) -> Iterator[str]:
@@ -199,16 +212,11 @@ def _macro_owners(
     file: SchemaFile, messages: Sequence[Message]
 ) -> Iterator[tuple[str, str, Sequence[str], Path]]:
     """Stem, owner, suffixes and path of constants of the C header."""
-    values = {
-        f"{_class_base(file, snake(message.name))}_{value.name}"
-        for message in messages
-        for value in message.values
-    }
     for name in file.types:
-        stem = naming.stem(file.protocol.name, name, "type")
-        while stem in values:
-            stem += "_type"
-        yield stem, f"the type '{name}'", _TYPE_MACROS, ("types", name)
+        stem = _type_stem(file, messages, name)
+        record = isinstance(file.types[name], RecordSpec)
+        what, macros = ("record", _RECORD_MACROS) if record else ("type", _TYPE_MACROS)
+        yield stem, f"the {what} '{name}'", macros, ("types", name)
     for name in file.commands:
         for direction in ("request", "response"):
             yield f"{name}_{direction}", f"{name}.{direction}", _MESSAGE_MACROS, ("commands", name)
@@ -225,22 +233,38 @@ def _conversions(
 
     If fields narrow a type, the selected messages determine which of them have the conversions of the type.
     """
+    owners: list[tuple[str, Message | Layout, Path]] = [
+        (_class_base(file, snake(message.name)), message, places[message.name]) for message in messages
+    ]
+    for layout in layouts_of(field for message in messages for field in message.fields):
+        path: Path = ("types", layout.name, "fields")
+        owners.append((_type_stem(file, messages, layout.name), layout, path))
     variants: dict[str, set[object]] = {}
-    for message in messages:
-        for value in message.values:
+    for _, stated, _ in owners:
+        for value in stated.values:
             if isinstance(value.type, Scalar):
                 variants.setdefault(value.type.type_name, set()).add(_converted(value.type))
-    for message in messages:
-        path = places[message.name]
-        for value in message.values:
+    for base, stated, path in owners:
+        for value in stated.values:
             if not isinstance(value.type, Scalar) or value.type.scaling is None:
                 continue
             if value.type.type_name and len(variants[value.type.type_name]) == 1:
                 continue
             inside = ("bits", value.name) if value.bits else ()
-            stem = f"{_class_base(file, snake(message.name))}_{value.name}"
-            owner = f"'{value.name}' of {message.name}"
-            yield stem, owner, _TYPE_MACROS, (*path, value.field.name, *inside)
+            owner = f"'{value.name}' of {stated.name}"
+            yield f"{base}_{value.name}", owner, _TYPE_MACROS, (*path, value.field.name, *inside)
+
+
+def _type_stem(file: SchemaFile, messages: Sequence[Message], name: str) -> str:
+    """The stem of a named type; a suffix is appended if a message or one of its values has the same name."""
+    taken = set()
+    for message in messages:
+        own = _class_base(file, snake(message.name))
+        taken |= {own, *(f"{own}_{value.name}" for value in message.values)}
+    stem = naming.stem(file.protocol.name, name, "type")
+    while stem in taken:
+        stem += "_type"
+    return stem
 
 
 def _converted(number: Scalar) -> object:

@@ -133,6 +133,17 @@ _ALL = (
         "Use separate fields for values that differ.",
     ),
     Rule(
+        "bad-record",
+        "A record has a fixed size and at least one value.",
+        "Arrays of it are divided by that size. Give its fields a number of items, like [4]; a text of "
+        "variable size belongs to the message.",
+    ),
+    Rule(
+        "extent-depth",
+        "A record contains records without records in them.",
+        "Firmware decodes them without recursion, level by level.",
+    ),
+    Rule(
         "payload-too-long",
         "A message's payload fits the frame.",
         "A longer one could not be sent, and receive buffers would be too small.",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from qlinkgen.model.types import Array, FieldType, Scalar
+from qlinkgen.model.types import Array, Bits, Blob, Scalar
 from qlinkgen.schema.compounds import build_array, build_bits, build_blob
 from qlinkgen.schema.constants import INTEGER, build_enum, build_flags
-from qlinkgen.schema.file_model import FieldSpec, SchemaFile
+from qlinkgen.schema.file_model import FieldSpec, RecordSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
 from qlinkgen.schema.report import Reporter
@@ -17,6 +17,9 @@ from qlinkgen.schema.source import Path
 _GROUPS = ("enums", "flags", "types")
 #: Maximum length of a chain of named types.
 _MAX_CHAIN = 20
+
+#: The type of a field that is not a record.
+Simple = Scalar | Bits | Blob | Array
 
 
 class TypeBuilder:
@@ -53,11 +56,11 @@ class TypeBuilder:
 
     def _check_named(self, name: str) -> None:
         """Report an error in a named type once, at its definition."""
-        if name in self._checked or self._chain > _MAX_CHAIN:
+        spec, path = self._file.types[name], ("types", name)
+        if isinstance(spec, RecordSpec) or name in self._checked or self._chain > _MAX_CHAIN:
             return
         self._checked.add(name)
         self._chain += 1
-        spec, path = self._file.types[name], ("types", name)
         before = len(self._report.faults)
         for key in ("counts", "echo"):
             if getattr(spec, key):
@@ -66,6 +69,10 @@ class TypeBuilder:
         if self.build(spec, path, (name,)) is None or len(self._report.faults) > before:
             self._report.taint(path)
         self._chain -= 1
+
+    def use(self, name: str) -> None:
+        """Note that a record is used."""
+        self._scalars.used.add(name)
 
     def report_unused(self) -> None:
         """Warn of unused types."""
@@ -77,7 +84,7 @@ class TypeBuilder:
                     what = f"'{name}' is not used"
                     self._report.error("unused-type", (group, name), what, hint, of_key=True, needs=needs)
 
-    def build(self, spec: FieldSpec, path: Path, seen: tuple[str, ...] = ()) -> FieldType | None:
+    def build(self, spec: FieldSpec, path: Path, seen: tuple[str, ...] = ()) -> Simple | None:
         """The type of a field; None after an error that prevents building it.
 
         ``seen`` are the named types being built, to detect recursion.
@@ -89,7 +96,7 @@ class TypeBuilder:
             self._report.taint(path)
         return self._named(spec, kind)
 
-    def _named(self, spec: FieldSpec, kind: FieldType | None) -> FieldType | None:
+    def _named(self, spec: FieldSpec, kind: Simple | None) -> Simple | None:
         """The type with its name in the file."""
         if not isinstance(kind, Scalar | Array):
             return kind
@@ -100,7 +107,7 @@ class TypeBuilder:
             return replace(kind, item=replace(kind.item, type_name=name))
         return replace(kind, type_name=name)
 
-    def _build(self, spec: FieldSpec, text: TypeText, location: Location) -> FieldType | None:
+    def _build(self, spec: FieldSpec, text: TypeText, location: Location) -> Simple | None:
         if text.base in ("bytes", "text"):
             self._note_unbounded(text, location)
             return self._blob(spec, text, location)
@@ -116,7 +123,7 @@ class TypeBuilder:
         container = self._scalars.build(_bare(spec, text.base), text.base, plain, location)
         return build_bits(spec, container, self._scalars, location) if container else None
 
-    def _blob(self, spec: FieldSpec, text: TypeText, location: Location) -> FieldType | None:
+    def _blob(self, spec: FieldSpec, text: TypeText, location: Location) -> Simple | None:
         if text.base == "bytes" and self._file.groups is not None:
             hint = f"use text or an array of u{self._file.groups.bits}"
             location.fault(
@@ -145,6 +152,10 @@ class TypeBuilder:
         if named is None or text.base in KEYWORDS:
             return spec, text
         self._scalars.used.add(text.base)
+        if isinstance(named, RecordSpec):
+            what = f"'{text.base}' is a record, which cannot have another name"
+            location.fault("not-applicable", "type", what, "use the record itself as the type of fields")
+            return None
         self._check_named(text.base)
         if self._report.touched(("types", text.base)):
             self._report.taint(location.path)

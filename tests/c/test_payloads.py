@@ -207,6 +207,7 @@ def test_a_size_that_matches_no_count_is_refused(name: str, plan: Plan, driver: 
         bounds = message.payload.sendable(run)
         for size in {bounds.low - 1, bounds.high + 1} & set(range(run.length.maximum + 1)):
             chosen = values(message, chance)
+            assert isinstance(run, BytesStep | ItemsStep)
             chosen[run.name] = bytes(size) if isinstance(run, BytesStep) else [run.number.minimum] * size
             with pytest.raises(Unsendable):
                 pack(message.payload, chosen)

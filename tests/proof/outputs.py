@@ -16,6 +16,7 @@ from construct import ConstructError, Container, EnumInteger, EnumIntegerString
 
 from qlinkgen.backends import construct
 from qlinkgen.backends.base import Options
+from qlinkgen.backends.construct._fields import Flags
 from qlinkgen.model.frame import MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
@@ -66,13 +67,15 @@ class Output(typing.Protocol):
 
 def plain_numbers(fields: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of construct, with labels and flags as numbers, like other outputs."""
-    return {name: _plain(value) for name, value in fields.items()}
+    return {name: _plain(value) for name, value in fields.items() if name != "_io"}
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, list):
         return [_plain(each) for each in value]
-    return int(value) if isinstance(value, EnumIntegerString | EnumInteger | Container) else value
+    if isinstance(value, EnumIntegerString | EnumInteger | Flags):
+        return int(value)
+    return plain_numbers(value) if isinstance(value, Container) else value
 
 
 class ConstructOutput:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from qlinkgen.model.frame import DelimitedFrame
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.types import Array, Count, Scalar
+from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.model.values import native_from_raw
 from tests.proof import cases
 from tests.proof.outputs import OUTPUTS, Decoded, Output, Refused
@@ -60,6 +60,7 @@ def items(value: Value) -> st.SearchStrategy[Any]:
     kind = value.type
     if isinstance(kind, Scalar):
         return st.booleans() if kind.meaning == "bool" else numbers(kind)
+    assert isinstance(kind, Array | Blob)
     longest = kind.length.maximum + 1
     if isinstance(kind, Array):
         return st.lists(numbers(kind.item), min_size=kind.length.minimum, max_size=longest)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from qlinkgen.backends.c.interface import count_member, interface
 from qlinkgen.model import naming
+from qlinkgen.model.fields import Record, Records
 from qlinkgen.model.message import Direction, Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Scalar
@@ -63,7 +64,7 @@ class _Source:
             f"static void show_{self.names.stem(message)}(const {self.names.function(message)}_t *m)", "{"
         )
         for value in message.values:
-            self._add(*(f"    {line}" for line in _printed(value)))
+            self._add(*(f"    {line}" for line in _printed(value, "m->")))
         self._add("}")
 
     def _encode(self, message: Message) -> None:
@@ -82,7 +83,7 @@ class _Source:
         )
         self._add("    (void)node;")
         for value in message.values:
-            self._add(*(f"    {line}" for line in _parsed(value)))
+            self._add(*(f"    {line}" for line in _parsed(value, "m.")))
         call = "&m, " if has_struct else ""
         if message.fields:
             self._add(
@@ -316,22 +317,38 @@ class _Source:
             self._add("    (void)size;", '    printf("usage");', "}")
 
 
-def _parsed(value: Value) -> list[str]:
+def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
+    """Statements that set a member of a struct from words; `owner` ends in a dot."""
     kind, name = value.type, naming.member(value.name)
+    if isinstance(kind, Record):
+        return [line for each in kind.layout.values for line in _parsed(each, f"{owner}{name}.", depth)]
+    if isinstance(kind, Records):
+        index, most = f"at{depth}", kind.length.maximum
+        place = f"{owner}{name}[{index} < {most}u ? {index} : 0u]."
+        inner = [line for each in kind.layout.values for line in _parsed(each, place, depth + 1)]
+        count_type = "uint8_t" if most < 256 else "uint16_t"
+        counted = (
+            [] if kind.length.fixed else [f"{owner}{count_member(value.field)} = ({count_type})count{depth};"]
+        )
+        return [
+            "{", f"size_t count{depth} = (size_t)strtoul(word(), NULL, 0);", *counted,
+            f"for (size_t {index} = 0u; {index} < count{depth}; ++{index}) {{", *inner, "}", "}",
+        ]  # fmt: skip
     if isinstance(kind, Scalar):
         number = "strtoll" if kind.signed else "strtoull"
         width = next(w for w in (8, 16, 32, 64) if w >= kind.bits)
         cast = "0ull != " if kind.meaning == "bool" else f"({'' if kind.signed else 'u'}int{width}_t)"
-        return [f"m.{name} = {cast}{number}(word(), NULL, 0);"]
+        return [f"{owner}{name} = {cast}{number}(word(), NULL, 0);"]
     count_type = "" if kind.length.fixed else ("uint8_t" if kind.length.maximum < 256 else "uint16_t")
     if isinstance(kind, Blob):
         lines = [
             "{",
             "    const size_t count = from_hex(word(), bytes_b);",
-            f"    memcpy(m.{name}, bytes_b, count < sizeof m.{name} ? count : sizeof m.{name});",
+            f"    memcpy({owner}{name}, bytes_b,",
+            f"           count < sizeof {owner}{name} ? count : sizeof {owner}{name});",
         ]
         lines += (
-            [f"    m.{count_member(value.field)} = ({count_type})count;"]
+            [f"    {owner}{count_member(value.field)} = ({count_type})count;"]
             if count_type
             else ["    (void)count;"]
         )
@@ -347,32 +364,45 @@ def _parsed(value: Value) -> list[str]:
     ]
     lines += [
         f"        if (count < {kind.length.maximum}u) {{",
-        f"            m.{name}[count] = {item};",
+        f"            {owner}{name}[count] = {item};",
         "        } else {",
         f"            (void){number}(text, &text, 0);",
         "        }",
     ]
     lines += ["        ++count;", "        if (*text == ',') { ++text; }", "    }"]
     lines += (
-        [f"    m.{count_member(value.field)} = ({count_type})count;"] if count_type else ["    (void)count;"]
+        [f"    {owner}{count_member(value.field)} = ({count_type})count;"]
+        if count_type
+        else ["    (void)count;"]
     )
     return [*lines, "}"]
 
 
-def _printed(value: Value) -> list[str]:
+def _printed(value: Value, owner: str, depth: int = 0) -> list[str]:
     kind, name = value.type, naming.member(value.name)
+    if isinstance(kind, Record):
+        return [line for each in kind.layout.values for line in _printed(each, f"{owner}{name}.", depth)]
+    if isinstance(kind, Records):
+        index, fixed = f"at{depth}", f"{kind.length.maximum}u"
+        count = fixed if kind.length.fixed else f"{owner}{count_member(value.field)}"
+        place = f"{owner}{name}[{index}]."
+        inner = [line for each in kind.layout.values for line in _printed(each, place, depth + 1)]
+        return [
+            f'printf(" %u", (unsigned){count});',
+            f"for (size_t {index} = 0u; {index} < {count}; ++{index}) {{", *inner, "}",
+        ]  # fmt: skip
     if isinstance(kind, Scalar):
         form, cast = ("%lld", "long long") if kind.signed else ("%llu", "unsigned long long")
-        return [f'printf(" {form}", ({cast})m->{name});']
-    count = f"{kind.length.maximum}u" if kind.length.fixed else f"m->{count_member(value.field)}"
+        return [f'printf(" {form}", ({cast}){owner}{name});']
+    count = f"{kind.length.maximum}u" if kind.length.fixed else f"{owner}{count_member(value.field)}"
     if isinstance(kind, Blob):
-        return [f"put_hex(m->{name}, {count});"]
+        return [f"put_hex({owner}{name}, {count});"]
     assert isinstance(kind, Array)
     form, cast = ("%lld", "long long") if kind.item.signed else ("%llu", "unsigned long long")
     return [
         f'printf({count} == 0u ? " -" : " ");',
         f"for (size_t index = 0u; index < {count}; ++index) {{",
-        f'    printf("%s{form}", index == 0u ? "" : ",", ({cast})m->{name}[index]);',
+        f'    printf("%s{form}", index == 0u ? "" : ",", ({cast}){owner}{name}[index]);',
         "}",
     ]
 

@@ -13,7 +13,7 @@ from qlinkgen.backends.c.names import integer_type, scalar_literal, scalar_type
 from qlinkgen.model import naming
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.types import Array, Bits, Reserved, Scalar
+from qlinkgen.model.types import Array, Bits, Blob, Reserved, Scalar
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.framing import Hunt, Rescan
 from qlinkgen.plan.transparency import FrameStuffing
@@ -151,6 +151,7 @@ class Harness:
             if scalar_type(kind) == "bool":
                 return [f"{member} = (take(input) & 1u) != 0u;"]
             return [f"{member} = ({scalar_type(kind)})take_number(input, {self.c.width(kind)}u);"]
+        assert isinstance(kind, Array | Blob)
         lines = []
         if not kind.length.fixed:
             width = self.c.count_width(kind.length.maximum)

@@ -48,6 +48,7 @@ def _random(value: Value, rng: random.Random) -> Raw:
     kind = value.type
     if isinstance(kind, Scalar):
         return _number(kind, rng)
+    assert isinstance(kind, Array | Blob)
     low, high = kind.length.minimum, kind.length.maximum
     size = rng.choice((low, high, rng.randint(low, high), min(high, low + rng.randint(0, 4))))
     if isinstance(kind, Array):

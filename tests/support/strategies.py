@@ -39,6 +39,7 @@ def native_values(value: Value) -> st.SearchStrategy[Any]:
         return st.lists(item, min_size=length.minimum, max_size=length.maximum)
     if isinstance(kind, Blob):
         return texts(kind) if kind.text else octets(kind)
+    assert isinstance(kind, Scalar)
     return raw_values(kind).map(lambda raw: native_from_raw(kind, raw))
 
 

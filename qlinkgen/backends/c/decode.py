@@ -25,6 +25,9 @@ from qlinkgen.plan.payload import (
     Learn,
     Member,
     Place,
+    RecordPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     RunStep,
     Sizing,
@@ -48,6 +51,12 @@ class Decoder(Learner):
         self._check_size()
         for each in self.payload.sizing:
             self._size(each)
+        for step in self.payload.steps:
+            self._read(step)
+        return self.lines
+
+    def record(self) -> list[str]:
+        """Statements that decode a record, whose bytes are all there."""
         for step in self.payload.steps:
             self._read(step)
         return self.lines
@@ -111,6 +120,13 @@ class Decoder(Learner):
                 for member in step.members:
                     self._member(member, step.integer.bits)
                 self.lines = [*outer, "{", *(f"    {line}" for line in self.lines), "}"]
+            case BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
+                self._read_run(step, target)
+            case _:
+                assert_never(step)
+
+    def _read_run(self, step: RunStep | RecordStep, target: str) -> None:
+        match step:
             case BytesStep():
                 count, place = self._number_of(step), pointer("payload", index_of(step.place, local))
                 prefix = self.layouts.prefix
@@ -124,8 +140,21 @@ class Decoder(Learner):
                     f"{target}[index]", step.number, self._get(step.place, step.item, item_offset(step))
                 )
                 self.lines = outer + loop(count, self.lines)
+            case RecordStep():
+                self.lines += self._record(step.record, target, step.place)
+            case RecordsStep():
+                count = self._number_of(step)
+                self.lines += loop(
+                    count, self._record(step.record, f"{target}[index]", step.place, item_offset(step))
+                )
             case _:
                 assert_never(step)
+
+    def _record(self, record: RecordPlan, target: str, place: Place, further: str = "") -> list[str]:
+        self.reads = True
+        at, upper = pointer("payload", index_of(place, local, further)), self.layouts.prefix.upper()
+        call = f"{self.layouts.records[record.name]}_get_(&{target}, {at})"
+        return checks.refusal([f"{call} != {upper}_OK"], f"{upper}_ERROR_RANGE")
 
     def _get(self, place: Place, integer: Integer, further: str = "") -> str:
         """The bits of an integer; adds the check of its unused bits."""

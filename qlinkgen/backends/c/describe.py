@@ -6,8 +6,9 @@ from fractions import Fraction
 from typing import assert_never
 
 from qlinkgen.backends import c_text
+from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.integer import Integer
-from qlinkgen.model.message import Message, Value
+from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Enum, Flags, Float, Length, Scalar
 from qlinkgen.plan.payload import (
@@ -15,11 +16,13 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    Holder,
     ItemsStep,
     Member,
     PayloadPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
-    RunStep,
     Step,
     ValueStep,
 )
@@ -39,6 +42,13 @@ def message_head(command: Command | None, message: Message) -> list[str]:
     if message.empty_is_default:
         lines.append("An empty payload is decoded as the defaults.")
     return [piece for line in lines for piece in c_text.comment(line, WIDTH)]
+
+
+def record_head(layout: Layout) -> list[str]:
+    """The comment of a record, without its layout."""
+    section = f" (section {layout.section})" if layout.section else ""
+    doc = f": {layout.doc}" if layout.doc else ""
+    return c_text.comment(f"Record {layout.name}{section}{doc}", WIDTH)
 
 
 def field_rows(payload: PayloadPlan) -> list[str]:
@@ -62,6 +72,10 @@ def _wire_type(step: Step) -> str:
             return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]"
         case ItemsStep():
             return f"{_integer(step.item)}[{_length(step.length)}]{_order(step.item)}"
+        case RecordStep():
+            return step.record.name
+        case RecordsStep():
+            return f"{step.record.name}[{_length(step.length)}]"
         case ValueStep() | BitsStep():
             role = ""
         case ConstantStep():
@@ -89,7 +103,7 @@ def _order(integer: Integer) -> str:
     return {"big": " be", "little": " le", None: f" in {integer.size} groups"}[integer.byteorder]
 
 
-def member_note(value: Value, step: ValueStep | Member | RunStep) -> str:
+def member_note(value: Value, step: Holder) -> str:
     """The comment of a struct member: purpose, unit, range, meaning."""
     parts = [value.doc] if value.doc else []
     match step:
@@ -97,6 +111,8 @@ def member_note(value: Value, step: ValueStep | Member | RunStep) -> str:
             parts += _facts(step.number)
         case BytesStep():
             parts += ["7-bit characters"] if step.text else []
+        case RecordStep() | RecordsStep():
+            pass
         case _:
             assert_never(step)
     if not value.field.confirmed:

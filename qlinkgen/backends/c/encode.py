@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.c import checks
-from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.layout import Layouts, pointer
 from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import index_of, local, local_size, size_text
 from qlinkgen.model.integer import Integer
@@ -22,6 +22,9 @@ from qlinkgen.plan.payload import (
     Member,
     PayloadPlan,
     Place,
+    RecordPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     RunStep,
     Step,
@@ -57,6 +60,18 @@ class Encoder:
             self._write(step)
         return self.lines
 
+    def checks(self) -> list[str]:
+        """Statements that check the values of a record."""
+        for step in self.payload.steps:
+            self._check(step)
+        return self.lines
+
+    def writes(self) -> list[str]:
+        """Statements that write the bytes of a record."""
+        for step in self.payload.steps:
+            self._write(step)
+        return self.lines
+
     def _refuse(self, terms: list[str], status: str) -> None:
         self.lines += checks.refusal(terms, f"{self.layouts.prefix.upper()}_ERROR_{status}")
 
@@ -78,6 +93,11 @@ class Encoder:
                 terms = checks.refused_before_sending(step.number, f"message->{member_of(step.name)}[index]")
                 refusal = checks.refusal(terms, f"{self.layouts.prefix.upper()}_ERROR_RANGE")
                 self.lines += self._loop(step, refusal) if refusal else []
+            case RecordStep():
+                self.lines += self._checked(step.record, f"message->{member_of(step.name)}")
+            case RecordsStep():
+                refusal = self._checked(step.record, f"message->{member_of(step.name)}[index]")
+                self.lines += self._loop(step, refusal) if refusal else []
             case ConstantStep() | ReservedStep() | CountStep():
                 pass
             case _:
@@ -87,6 +107,14 @@ class Encoder:
         self._refuse(
             checks.refused_before_sending(value.number, f"message->{member_of(value.name)}"), "RANGE"
         )
+
+    def _checked(self, record: RecordPlan, value: str) -> list[str]:
+        """The statement that checks a record; empty if all its values are legal."""
+        if not Encoder(record.payload, self.layouts).checks():
+            return []
+        function = f"{self.layouts.records[record.name]}_check_"
+        upper = self.layouts.prefix.upper()
+        return checks.refusal([f"{function}(&{value}) != {upper}_OK"], f"{upper}_ERROR_RANGE")
 
     # Bytes
 
@@ -115,8 +143,20 @@ class Encoder:
                 item = checks.as_unsigned(step.number, f"message->{member_of(step.name)}[index]")
                 index = index_of(step.place, local_size, item_offset(step))
                 self.lines += self._loop(step, [self.layouts.put(step.item, "payload", index, item)])
+            case RecordStep():
+                place = pointer("payload", index_of(step.place, local_size))
+                name = member_of(step.name)
+                self.lines.append(f"{self._put_record(step.record)}(&message->{name}, {place});")
+            case RecordsStep():
+                place = pointer("payload", index_of(step.place, local_size, item_offset(step)))
+                name = member_of(step.name)
+                call = f"{self._put_record(step.record)}(&message->{name}[index], {place});"
+                self.lines += self._loop(step, [call])
             case _:
                 assert_never(step)
+
+    def _put_record(self, record: RecordPlan) -> str:
+        return f"{self.layouts.records[record.name]}_put_"
 
     def _put(self, place: Place, integer: Integer, value: str) -> None:
         self.lines.append(self.layouts.put(integer, "payload", index_of(place, local_size), value))
@@ -129,7 +169,7 @@ class Encoder:
         return f"{run.length.maximum}U" if run.fixed else local(run.name)
 
 
-def item_offset(run: ItemsStep) -> str:
+def item_offset(run: ItemsStep | RecordsStep) -> str:
     """Offset of an item in its run."""
     return "index" if run.item_size == 1 else f"({run.item_size}U * index)"
 

@@ -21,11 +21,12 @@ from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.sizes import SizeView, size_view
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
+from qlinkgen.model.fields import Layout
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake
 from qlinkgen.model.types import Float
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.payload import BytesStep
+from qlinkgen.plan.payload import BytesStep, all_records
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -67,7 +68,8 @@ class Header:
         self._protocol = plan.protocol
         self._templates = templates
         self._names = Names(plan.protocol)
-        self._layouts = Layouts(plan.protocol.name)
+        stems = {each.name: self._names.record(each.name) for each in plan.layouts}
+        self._layouts = Layouts(plan.protocol.name, stems)
         self._types = Types(plan, self._names)
         self._writer = MessageWriter(self._names, self._layouts, self._types)
         self._kept = tuple(each.message for each in plan.messages)
@@ -77,11 +79,13 @@ class Header:
 
     def text(self) -> str:
         """The whole header."""
+        plan = self._plan
         sections = [
             self._check_value(),
             self._place("frame_common", f=self._section.view),
             *self._directions(),
             *[self._frame_part(name) for name in self._section.templates],
+            *[self._record(layout) for layout in plan.layouts],
             *[self._message(message) for message in self._plan.messages],
             *self._checks(),
             *self._receiver(),
@@ -158,6 +162,9 @@ class Header:
     def _id_constant(self, message: Message) -> str:
         return f"#define {self._names.constant(message)}_ID 0x{message.id:02X}\n"
 
+    def _record(self, layout: Layout) -> str:
+        return self._place("record", r=self._writer.record(layout, self._plan.messages))
+
     def _message(self, message: MessagePlan) -> str:
         section, names = self._section, self._names
         return self._place(
@@ -230,7 +237,9 @@ class Header:
         return sorted(found | ({"f32"} if "f16" in found else set()))
 
     def _byte_runs(self) -> list[BytesStep]:
-        steps = (step for message in self._plan.messages for step in message.payload.steps)
+        payloads = [message.payload for message in self._plan.messages]
+        payloads += [record.payload for record in all_records(payloads)]
+        steps = (step for payload in payloads for step in payload.steps)
         return [step for step in steps if isinstance(step, BytesStep)]
 
 

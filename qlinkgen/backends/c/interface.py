@@ -72,13 +72,17 @@ class Interface:
         """Prefix of the macros of a message."""
         return self.names.constant(message)
 
+    def record(self, name: str) -> str:
+        """Prefix of the struct of a record."""
+        return self.names.record(name)
+
     def count_member(self, field: Field) -> str:
         """The struct member with the number of items of a field of variable size."""
         return count_member(field)
 
     def conversions(self, message: Message, value: str, number: Scalar) -> str:
         """Prefix of the conversion functions of a scaled value."""
-        kind = self.types.conversions(message, value, number)
+        kind = self.types.conversions(self.function(message), value, number)
         return kind.stem if kind else ""
 
     def slave_member(self, message: Message) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
@@ -26,6 +27,8 @@ class Layouts:
     """Collects the layouts in use, and prints the calls that read and write."""
 
     prefix: str
+    #: Prefix of the functions and the struct of each record.
+    records: Mapping[str, str] = field(default_factory=dict)
     _names: dict[tuple[int, Chunks], str] = field(default_factory=dict)
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)

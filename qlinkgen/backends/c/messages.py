@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.c.decode import Decoder
-from qlinkgen.backends.c.describe import field_rows, member_note, message_head
+from qlinkgen.backends.c.describe import field_rows, member_note, message_head, record_head
 from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.framing import struct_parameter
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.model import naming
-from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
+from qlinkgen.model.fields import Layout
+from qlinkgen.plan.payload import (
+    BytesStep,
+    Holder,
+    ItemsStep,
+    Member,
+    PayloadPlan,
+    RecordsStep,
+    RecordStep,
+    RunStep,
+    ValueStep,
+    all_records,
+    record_plan,
+)
 from qlinkgen.plan.tree import MessagePlan
-
-Settable = ValueStep | Member | RunStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +67,26 @@ class MessageView:
     comment_ends_at_head: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordView:
+    """A record, `r` in templates; an empty function checks nothing."""
+
+    function: str
+    constant: str
+    head: list[str]
+    rows: list[str]
+    size: int
+    size_text: str
+    members: list[StructMember]
+    initialiser: str
+    check: list[str]
+    put: list[str]
+    get: list[str]
+    scales: list[Kind]
+
+
 class MessageWriter:
-    """Converts messages to template views.
+    """Converts messages and records to template views.
 
     Messages with the same payload share the struct and the function bodies of the first of them.
     """
@@ -91,10 +121,10 @@ class MessageWriter:
             same_struct=self._same("struct", shape, plan) if members else "",
             members=members,
             notes=[f"{name}: {note}" for name, note in notes.items() if note],
-            initialiser=", ".join(map(_initialiser, payload.settable)),
+            initialiser=", ".join(map(self._initialiser, payload.settable)),
             encode=self._encode(plan, self._same("encode", shape, plan)) if plan.encoded else None,
             decode=self._decode(plan, self._same("decode", shape, plan)) if plan.decoded else None,
-            scales=[scale for each in payload.settable if (scale := self._scale(plan, each))],
+            scales=self._scales(self._names.function(message), payload),
             encode_parameters=struct_parameter(self._names, message, const=True),
             decode_parameters=struct_parameter(self._names, message, const=False),
             size_text=_size_text(payload.least, payload.most),
@@ -132,23 +162,73 @@ class MessageWriter:
                 case ValueStep() | Member():
                     default = scalar_literal(each.number, each.number.default)
                     lines.append(f"message->{naming.member(each.name)} = {default};")
+                case RecordStep():
+                    return self._copied(plan)
                 case BytesStep() | ItemsStep() if each.fixed or each.default:
-                    kind = self._names.function(plan.message)
-                    return [f"const {kind}_t defaults = {kind.upper()}_INIT;", "*message = defaults;"]
-                case BytesStep() | ItemsStep():
+                    return self._copied(plan)
+                case RecordsStep() if each.length.minimum:
+                    return self._copied(plan)
+                case BytesStep() | ItemsStep() | RecordsStep():
                     lines.append(f"message->{each.name}_{each.quantity} = 0U;")
                 case _:
                     assert_never(each)
         return lines
 
-    def _scale(self, plan: MessagePlan, each: Settable) -> Kind | None:
-        """The conversion of a field, None if its named type has it."""
-        if isinstance(each, BytesStep):
-            return None
-        kind = self._types.conversions(plan.message, each.name, each.number)
-        return None if kind is None or kind.named else kind
+    def _copied(self, plan: MessagePlan) -> list[str]:
+        kind = self._names.function(plan.message)
+        return [f"const {kind}_t defaults = {kind.upper()}_INIT;", "*message = defaults;"]
 
-    def _members(self, each: Settable, note: str) -> list[StructMember]:
+    def record(self, layout: Layout, plans: Sequence[MessagePlan]) -> RecordView:
+        """The view of a record of some messages."""
+        payload = record_plan(layout).payload
+        notes = {v.name: member_note(v, s) for v, s in zip(layout.values, payload.settable, strict=True)}
+        function = self._layouts.records[layout.name]
+        used = [each for each in plans if layout.name in {r.name for r in each.payload.records}]
+        encoded, decoded = any(each.encoded for each in used), any(each.decoded for each in used)
+        return RecordView(
+            function=function,
+            constant=function.upper(),
+            head=record_head(layout),
+            rows=field_rows(payload),
+            size=payload.most,
+            size_text=_size_text(payload.least, payload.most),
+            members=[m for each in payload.settable for m in self._members(each, notes[each.name])],
+            initialiser=", ".join(map(self._initialiser, payload.settable)),
+            check=Encoder(payload, self._layouts).checks() if encoded else [],
+            put=Encoder(payload, self._layouts).writes() if encoded else [],
+            get=Decoder(payload, self._layouts).record() if decoded else [],
+            scales=self._scales(function, payload),
+        )
+
+    def _scales(self, owner: str, payload: PayloadPlan) -> list[Kind]:
+        """The conversions of values whose named type does not have them."""
+        numbers = (each for each in payload.settable if isinstance(each, ValueStep | Member | ItemsStep))
+        kinds = (self._types.conversions(owner, each.name, each.number) for each in numbers)
+        return [kind for kind in kinds if kind is not None and not kind.named]
+
+    def _initialiser(self, each: Holder) -> str:
+        match each:
+            case ValueStep() | Member():
+                return scalar_literal(each.number, each.number.default)
+            case RecordStep():
+                return self._record_init(each)
+            case RecordsStep():
+                least = each.length.minimum
+                items = ", ".join([self._record_init(each)] * max(1, least))
+                return f"{{{items}}}" if each.fixed else f"{least}U, {{{items}}}"
+            case BytesStep():
+                octets = [unsigned(byte, 8, hexadecimal=True) for byte in each.default]
+            case ItemsStep():
+                octets = [scalar_literal(each.number, item) for item in each.default]
+            case _:
+                assert_never(each)
+        content = f"{{{', '.join(octets)}}}" if any(each.default) else "{0}"
+        return content if each.fixed else f"{len(octets)}U, {content}"
+
+    def _record_init(self, each: RecordStep | RecordsStep) -> str:
+        return f"{self._layouts.records[each.record.name].upper()}_INIT"
+
+    def _members(self, each: Holder, note: str) -> list[StructMember]:
         match each:
             case ValueStep() | Member():
                 return [StructMember(f"{self._types.of(each.number)} {naming.member(each.name)};", note)]
@@ -156,6 +236,11 @@ class MessageWriter:
                 return _run_members(each, "uint8_t", "bytes", note)
             case ItemsStep():
                 return _run_members(each, self._types.of(each.number), "items", note)
+            case RecordStep():
+                kind = f"{self._layouts.records[each.record.name]}_t"
+                return [StructMember(f"{kind} {naming.member(each.name)};", note)]
+            case RecordsStep():
+                return _run_members(each, f"{self._layouts.records[each.record.name]}_t", "records", note)
             case _:
                 assert_never(each)
 
@@ -167,20 +252,6 @@ def _run_members(run: RunStep, item: str, what: str, note: str) -> list[StructMe
         *([] if run.fixed else [number]),
         StructMember(f"{item} {naming.member(run.name)}[{most}];", note),
     ]
-
-
-def _initialiser(each: Settable) -> str:
-    match each:
-        case ValueStep() | Member():
-            return scalar_literal(each.number, each.number.default)
-        case BytesStep():
-            items = [unsigned(byte, 8, hexadecimal=True) for byte in each.default]
-        case ItemsStep():
-            items = [scalar_literal(each.number, item) for item in each.default]
-        case _:
-            assert_never(each)
-    content = f"{{{', '.join(items)}}}" if any(each.default) else "{0}"
-    return content if each.fixed else f"{len(items)}U, {content}"
 
 
 def _size_text(least: int, most: int) -> str:
@@ -199,11 +270,13 @@ class Rounding:
 
 def nearest_helpers(types: Types, messages: tuple[MessagePlan, ...]) -> list[Rounding]:
     """The C types that physical values are rounded to."""
+    payloads = [message.payload for message in messages]
+    payloads += [record.payload for record in all_records(payloads)]
     kinds = (
-        types.conversions(message.message, each.name, each.number)
-        for message in messages
-        for each in message.payload.settable
-        if not isinstance(each, BytesStep)
+        types.conversions("", each.name, each.number)
+        for payload in payloads
+        for each in payload.settable
+        if isinstance(each, ValueStep | Member | ItemsStep)
     )
     return [
         Rounding(plain.removesuffix("_t"), plain, *(("0U", "1U") if plain.startswith("u") else ("0", "1")))

@@ -100,6 +100,10 @@ class Names:
             name += "_type"
         return name
 
+    def record(self, name: str) -> str:
+        """Prefix of the functions and the struct of a record."""
+        return f"{self.prefix}_{self.type_stem(name)}"
+
     def command_of(self, message: Message) -> Command | None:
         """The transaction of a message."""
         return self._commands.get(message.name)

@@ -11,9 +11,16 @@ from typing import assert_never
 from qlinkgen.backends import c_text
 from qlinkgen.backends.c.constants import constant_type
 from qlinkgen.backends.c.names import Names, bracketed, scalar_literal, scalar_type
-from qlinkgen.model.message import Message
 from qlinkgen.model.types import Enum, Flags, Scalar
-from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, ValueStep
+from qlinkgen.plan.payload import (
+    BytesStep,
+    ItemsStep,
+    Member,
+    RecordsStep,
+    RecordStep,
+    ValueStep,
+    all_records,
+)
 from qlinkgen.plan.tree import Plan
 
 
@@ -108,14 +115,17 @@ class Types:
         kind = self.named.get(number.type_name)
         return kind.type if kind and kind.plain == plain else plain
 
-    def conversions(self, message: Message, value: str, number: Scalar) -> Kind | None:
-        """The conversion of a scaled value: that of its type, or its own if it differs."""
+    def conversions(self, owner: str, value: str, number: Scalar) -> Kind | None:
+        """The conversion of a scaled value: that of its type, or its own if it differs.
+
+        ``owner`` is the prefix of names of the message or record.
+        """
         if number.scaling is None:
             return None
         kind = self.named.get(number.type_name)
         if kind and kind.number == _kept(number):
             return kind
-        return Kind(f"{self._names.function(message)}_{value}", _title(value, number), number, named=False)
+        return Kind(f"{owner}_{value}", _title(value, number), number, named=False)
 
     def _kind(self, name: str, number: Scalar) -> Kind:
         title = _title(name, number) if number.scaling else f"in {number.unit}" if number.unit else ""
@@ -124,15 +134,16 @@ class Types:
 
     def numbers(self) -> Iterator[Scalar]:
         """The numbers of all values."""
-        for message in self._plan.messages:
-            for each in message.payload.settable:
-                match each:
-                    case ValueStep() | Member() | ItemsStep():
-                        yield each.number
-                    case BytesStep():
-                        pass
-                    case _:
-                        assert_never(each)
+        payloads = [message.payload for message in self._plan.messages]
+        payloads += [record.payload for record in all_records(payloads)]
+        for each in (each for payload in payloads for each in payload.settable):
+            match each:
+                case ValueStep() | Member() | ItemsStep():
+                    yield each.number
+                case BytesStep() | RecordStep() | RecordsStep():
+                    pass
+                case _:
+                    assert_never(each)
 
 
 def _kept(number: Scalar) -> Scalar:

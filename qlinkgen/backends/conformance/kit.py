@@ -43,6 +43,7 @@ class KitView:
 
     Attributes:
         place_type: holds the offsets of struct members; 16 bits if possible, for small targets.
+        has_records: the struct of a message has records.
         empty_wires: a response is empty: without payload, frame and check value.
     """
 
@@ -63,6 +64,7 @@ class KitView:
     broadcast: bool
     size_bytes: int
     place_type: str
+    has_records: bool
     id_type: str
     number_type: str
     member_type: str
@@ -112,7 +114,8 @@ class Kit:
         tests = bool(check) + sum(each.tests + each.handler_tests + each.callback_tests for each in entries)
         most_wire = max(len(row.wire) for row in self._every)
         members = max(len(each.members) for each in entries)
-        values = max(most_values(header, each) for each in self._plan.messages)
+        records = any(each.payload.records for each in self._plan.messages)
+        values = max(most_values(header, each.payload) for each in self._plan.messages)
         printed = max(tests, most_wire, (1 << header.address_bits) - 1)
         return KitView(
             about=[piece for line in banner(self._plan.protocol) for piece in wrapped(line)],
@@ -132,7 +135,8 @@ class Kit:
             broadcast=bool(header.address) and self._plan.protocol.bus.broadcast is not None,
             size_bytes=self._entries.size_bytes,
             # A number in a struct is followed by up to seven bytes of padding.
-            place_type=_unsigned(values + 8 * members),
+            place_type=_unsigned(8 * values if records else values + 8 * members),
+            has_records=records,
             id_type=_unsigned((1 << header.id_bits) - 1),
             number_type=_unsigned(tests),
             member_type="uint8_t" if members <= 0xFF else "uint16_t",

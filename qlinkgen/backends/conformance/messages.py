@@ -13,9 +13,17 @@ from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.backends.conformance.streams import INTACT, Stream
 from qlinkgen.backends.conformance.unsent import Unsent, unsent
 from qlinkgen.model import naming
-from qlinkgen.model.message import Value
 from qlinkgen.plan import MessagePlan, Plan
-from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
+from qlinkgen.plan.payload import (
+    BytesStep,
+    Holder,
+    ItemsStep,
+    Member,
+    PayloadPlan,
+    RecordsStep,
+    RecordStep,
+    ValueStep,
+)
 
 #: Words for the errors of a header, in the order of their numbers.
 ERRORS = (
@@ -196,25 +204,37 @@ class Entries:
         return list(unsent(self._header, message, right))
 
     def _members(self, message: MessagePlan) -> list[str]:
-        struct, values = f"{self._header.function(message.message)}_t", message.message.values
-        return [
-            line
-            for value, step in zip(values, message.payload.settable, strict=True)
-            for line in self._member(struct, value, step)
-        ]
+        return self._rows_of(f"{self._header.function(message.message)}_t", "", message.payload)
 
-    def _member(self, struct: str, value: Value, step: ValueStep | Member | RunStep) -> list[str]:
-        name = naming.member(value.name)
+    def _rows_of(self, struct: str, inside: str, payload: PayloadPlan) -> list[str]:
+        """The rows of the values of a message or a record."""
+        return [line for step in payload.settable for line in self._member(struct, inside, step)]
+
+    def _member(self, struct: str, inside: str, step: Holder) -> list[str]:
+        name = inside + naming.member(step.name)
         match step:
             case ValueStep() | Member():
                 return [f"NUMBER({struct}, {name}),"]
+            case RecordStep():
+                return self._rows_of(struct, f"{name}.", step.record.payload)
             case BytesStep() | ItemsStep() if step.fixed:
                 return [f"ITEMS({struct}, {name}),"]
             case BytesStep() | ItemsStep():
-                count = self._header.count_member(value.field)
-                return [f"NUMBER({struct}, {count}),", f"COUNTED({struct}, {name}),"]
+                return [
+                    f"NUMBER({struct}, {inside}{step.name}_{step.quantity}),",
+                    f"COUNTED({struct}, {name}),",
+                ]
+            case RecordsStep():
+                return self._records(struct, inside, step)
             case _:
                 assert_never(step)
+
+    def _records(self, struct: str, inside: str, step: RecordsStep) -> list[str]:
+        record = f"{self._header.record(step.record.name)}_t"
+        rows = self._rows_of(record, "", step.record.payload)
+        name, counted = inside + naming.member(step.name), "false" if step.fixed else "true"
+        first = [] if step.fixed else [f"NUMBER({struct}, {inside}{step.name}_{step.quantity}),"]
+        return [*first, f"RECORDS({struct}, {name}, {counted}, {len(rows)}u),", *rows]
 
     # Rows
 

@@ -8,11 +8,22 @@ from decimal import Decimal
 from typing import assert_never
 
 from qlinkgen.backends.conformance.sources import Header, JsonObject, Sources
-from qlinkgen.model.message import Message, Value
+from qlinkgen.model.fields import Record, Records, Value
+from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.values import Native, default_of, from_json, raw_number
-from qlinkgen.plan import MessagePlan, Plan
-from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
+from qlinkgen.plan import Plan
+from qlinkgen.plan.payload import (
+    BytesStep,
+    Holder,
+    ItemsStep,
+    Member,
+    PayloadPlan,
+    RecordsStep,
+    RecordStep,
+    RunStep,
+    ValueStep,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,13 +97,12 @@ def _mixed(right: Sequence[Right], wrong: Sequence[Wrong]) -> list[Row]:
 def _right(plan: Plan, header: Header, entry: JsonObject) -> Right:
     planned = plan.by_name[entry["message"]]
     message = planned.message
-    values = zip(message.values, planned.payload.settable, strict=True)
     by_hand = "kinds" not in entry
     return Right(
         message=message,
         kinds=() if by_hand else tuple(entry["kinds"]),
         address=entry.get(record_key(plan.frame.address), message.default_address),
-        values=b"".join(_value(header, value, step, entry) for value, step in values),
+        values=_values(header, message.values, planned.payload, entry["fields"], entry.get("raw", {})),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),
         request=bytes.fromhex(entry.get("request", "")),
@@ -119,33 +129,35 @@ def _source(entry: JsonObject) -> str:
 # Values
 
 
-def most_values(header: Header, message: MessagePlan) -> int:
-    """Maximum size of the values of a message."""
-    return sum(_most(header, step) for step in message.payload.settable)
+def most_values(header: Header, payload: PayloadPlan) -> int:
+    """Maximum size of the values of a payload."""
+    return sum(_most(header, step) for step in payload.settable)
 
 
-def value_sizes(header: Header, message: MessagePlan, right: Right) -> list[int]:
-    """Size of each value in a vector of a message."""
+def value_sizes(header: Header, payload: PayloadPlan, values: bytes) -> list[int]:
+    """Size of each value in a vector."""
     sizes: list[int] = []
-    for step in message.payload.settable:
+    for step in payload.settable:
         match step:
-            case ValueStep() | Member():
-                sizes.append(header.width(step.number))
-            case BytesStep() | ItemsStep():
+            case ValueStep() | Member() | RecordStep():
+                sizes.append(_most(header, step))
+            case BytesStep() | ItemsStep() | RecordsStep():
                 at, counted = sum(sizes), _counted(header, step)
                 most = step.length.maximum
-                count = int.from_bytes(right.values[at : at + counted], "big") if counted else most
+                count = int.from_bytes(values[at : at + counted], "big") if counted else most
                 sizes.append(counted + _item(header, step) * count)
             case _:
                 assert_never(step)
     return sizes
 
 
-def _most(header: Header, step: ValueStep | Member | RunStep) -> int:
+def _most(header: Header, step: Holder) -> int:
     match step:
         case ValueStep() | Member():
             return header.width(step.number)
-        case BytesStep() | ItemsStep():
+        case RecordStep():
+            return most_values(header, step.record.payload)
+        case BytesStep() | ItemsStep() | RecordsStep():
             return _counted(header, step) + _item(header, step) * step.length.maximum
         case _:
             assert_never(step)
@@ -163,24 +175,35 @@ def _item(header: Header, run: RunStep) -> int:
             return 1
         case ItemsStep():
             return header.width(run.number)
+        case RecordsStep():
+            return most_values(header, run.record.payload)
         case _:
             assert_never(run)
 
 
-def _value(header: Header, value: Value, step: ValueStep | Member | RunStep, entry: JsonObject) -> bytes:
+def _values(
+    header: Header, stated: Sequence[Value], payload: PayloadPlan, fields: JsonObject, raw: JsonObject
+) -> bytes:
+    """The values of a message or a record."""
+    pairs = zip(stated, payload.settable, strict=True)
+    return b"".join(_value(header, value, step, fields, raw.get(value.name)) for value, step in pairs)
+
+
+def _value(header: Header, value: Value, step: Holder, fields: JsonObject, raw: object) -> bytes:
     """One value: a number, or the items of a run with their count if it varies."""
-    native = _native(value, entry)
+    if isinstance(step, RecordStep | RecordsStep):
+        return _records(header, value, step, fields, raw)
+    native = _native(value, fields)
     match step:
         case ValueStep() | Member():
-            raw = entry.get("raw", {}).get(value.name)
-            raw = raw_number(value.name, step.number, native) if raw is None else raw
-            return number_bytes(raw, header.width(step.number))
+            number = raw if isinstance(raw, int) else raw_number(value.name, step.number, native)
+            return number_bytes(number, header.width(step.number))
         case BytesStep():
             assert isinstance(native, bytes | str)
             items = native.encode("ascii") if isinstance(native, str) else native
         case ItemsStep():
             assert isinstance(native, list)
-            raws = entry.get("raw", {}).get(value.name)
+            raws = raw if isinstance(raw, list) else None
             raws = [raw_number(value.name, step.number, item) for item in native] if raws is None else raws
             items = b"".join(number_bytes(item, _item(header, step)) for item in raws)
         case _:
@@ -189,11 +212,24 @@ def _value(header: Header, value: Value, step: ValueStep | Member | RunStep, ent
     return (number_bytes(len(native), counted) if counted else b"") + items
 
 
-def _native(value: Value, entry: JsonObject) -> Native:
+def _records(
+    header: Header, value: Value, step: RecordStep | RecordsStep, fields: JsonObject, raw: object
+) -> bytes:
+    assert isinstance(value.type, Record | Records)
+    found = fields.get(value.name, {} if isinstance(step, RecordStep) else [{}] * step.length.minimum)
+    records: Sequence[JsonObject] = [found] if isinstance(step, RecordStep) else found
+    raws = raw if isinstance(raw, list) else [raw or {}] * len(records)
+    stated, payload = value.type.layout.values, step.record.payload
+    values = [_values(header, stated, payload, *pair) for pair in zip(records, raws, strict=True)]
+    counted = _counted(header, step) if isinstance(step, RecordsStep) else 0
+    return (number_bytes(len(records), counted) if counted else b"") + b"".join(values)
+
+
+def _native(value: Value, fields: JsonObject) -> Native:
     """The value of an entry, or the default."""
-    if value.name not in entry["fields"]:
+    if value.name not in fields:
         return default_of(value)
-    given = entry["fields"][value.name]
+    given = fields[value.name]
     return from_json(value, Decimal(str(given)) if isinstance(given, float) else given)
 
 

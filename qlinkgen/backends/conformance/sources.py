@@ -84,6 +84,10 @@ class Header(typing.Protocol):
         """Prefix of the macros of a message."""
         ...
 
+    def record(self, name: str) -> str:
+        """Prefix of the struct of a record."""
+        ...
+
     def count_member(self, field: Field) -> str:
         """The struct member with the number of items of a field of variable size."""
         ...

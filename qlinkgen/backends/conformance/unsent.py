@@ -11,7 +11,7 @@ from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Float, Scalar
 from qlinkgen.plan import MessagePlan
-from qlinkgen.plan.payload import Member, ValueStep
+from qlinkgen.plan.payload import Member, PayloadPlan, RecordStep, ValueStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,15 +25,24 @@ class Unsent:
 
 def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsent]:
     """A valid vector once with each number, and the address, out of range by one."""
-    at = 0
-    for step, size in zip(message.payload.settable, value_sizes(header, message, right), strict=True):
-        if isinstance(step, ValueStep | Member):
-            for number in _outside(step.number, size):
-                values = right.values[:at] + number_bytes(number, size) + right.values[at + size :]
-                yield Unsent(f"{step.name} is {number}", right.address, values)
-        at += size
+    for what, values in _spoilt(header, message.payload, right.values):
+        yield Unsent(what, right.address, values)
     for address in _addresses(header, message.message):
         yield Unsent(f"sent to {address}", address, right.values)
+
+
+def _spoilt(header: Header, payload: PayloadPlan, values: bytes) -> Iterator[tuple[str, bytes]]:
+    """The values once with each number out of range."""
+    at = 0
+    for step, size in zip(payload.settable, value_sizes(header, payload, values), strict=True):
+        own, after = values[at : at + size], values[at + size :]
+        if isinstance(step, ValueStep | Member):
+            for number in _outside(step.number, size):
+                yield f"{step.name} is {number}", values[:at] + number_bytes(number, size) + after
+        if isinstance(step, RecordStep):
+            for what, inner in _spoilt(header, step.record.payload, own):
+                yield f"{step.name}.{what}", values[:at] + inner + after
+        at += size
 
 
 def _outside(scalar: Scalar, size: int) -> Iterator[int]:

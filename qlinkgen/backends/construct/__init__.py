@@ -34,7 +34,10 @@ _SUPPORT = {
     "Ranged Scaled TextField like",
     "_frames": "CRC Address Check Constant DelimitedFrame Fletcher Id Length Mark MarkedFrame Packet Payload "
     "Stuffing Sum Xor messages_of",
+    "_frecords": "Record",
 }
+#: Copied only if a tree uses it.
+_OPTIONAL = {"_frecords": "Record"}
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
 }
@@ -45,7 +48,9 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     everything = definitions(plan_of(protocol, options))
     text = "".join([_head(protocol), _imports(everything), *map(printed, everything)])
     folder = importlib.resources.files(__name__)
-    shared = {name: folder.joinpath(f"{name}.py").read_text("utf-8") for name in _SUPPORT}
+    names = {name for each in everything for name in used(each.node)}
+    copied_modules = [each for each in _SUPPORT if each not in _OPTIONAL or _OPTIONAL[each] in names]
+    shared = {name: folder.joinpath(f"{name}.py").read_text("utf-8") for name in copied_modules}
     shared["__init__"] = _PACKAGE_DOC
     beside = {f"{FOLDER}/{name}.py": copied(f"{name}.py", each) for name, each in shared.items()}
     return {f"{FOLDER}/{file_stem(protocol.name)}.py": text, **beside}
@@ -62,7 +67,7 @@ def _imports(everything: tuple[Definition, ...]) -> str:
     by_origin: dict[str, list[str]] = {}
     for name in sorted(names, key=_order):
         by_origin.setdefault(_ORIGINS.get(name, "construct"), []).append(name)
-    blocks = (["decimal"], ["construct"], ["._fields", "._frames"])
+    blocks = (["decimal"], ["construct"], ["._fields", "._frames", "._frecords"])
     lines = (
         "".join(_import(origin, by_origin[origin]) for origin in block if origin in by_origin)
         for block in blocks

@@ -45,7 +45,7 @@ class Live:
 
 def live(protocol: Protocol, options: Options | None = None) -> Live:
     """The structures of a protocol."""
-    modules = ("construct", f"{__package__}._fields", f"{__package__}._frames")
+    modules = ("construct", f"{__package__}._fields", f"{__package__}._frames", f"{__package__}._frecords")
     names: dict[str, Value] = {"Decimal": Decimal, "float": float}
     for module in modules:
         names |= vars(importlib.import_module(module))

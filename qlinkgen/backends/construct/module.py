@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import assert_never
 
-from qlinkgen.backends.construct.payload import Names, Types, comment, fields, integer
+from qlinkgen.backends.construct.payload import Names, Types, comment, fields, integer, record
 from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.integer import Integer
@@ -49,6 +49,9 @@ def _definitions(plan: Plan) -> Iterator[Definition]:
     messages = {each.name: names.of(each.name, "MESSAGE") for each in stated.messages}
     types = Types(plan, groups, names)
     yield from types.definitions()
+    for layout in plan.layouts:
+        said = comment(layout.doc, layout.section, confirmed=layout.confirmed)
+        yield Definition(types.records[layout.name], record(layout, types), said)
     command = ""
     for each in plan.messages:
         message = each.message

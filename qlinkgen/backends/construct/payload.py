@@ -11,7 +11,9 @@ from typing import assert_never
 
 from qlinkgen.backends.construct.tree import Call, Definition, Named, Node, Number, Ref, Sequence, hexadecimal
 from qlinkgen.model import naming
+from qlinkgen.model.fields import Layout
 from qlinkgen.model.integer import Integer
+from qlinkgen.model.message import Message
 from qlinkgen.model.types import Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
@@ -22,10 +24,15 @@ from qlinkgen.plan.payload import (
     CountStep,
     ItemsStep,
     Member,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
+    RunStep,
     Step,
     ValueStep,
+    all_records,
     conditions,
+    record_plan,
 )
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -78,6 +85,8 @@ class Types:
     def __init__(self, plan: Plan, groups: Mapping[str, str], names: Names) -> None:
         """``groups`` are the names of enums and flags, ``names`` creates those of other types."""
         self._plan = plan
+        #: The names of the definitions of records.
+        self.records = {each.name: names.of(each.name, "TYPE") for each in plan.layouts}
         found: dict[str, Counter[Node]] = {}
         for number, raw in self._numbers():
             if name := _name(number):
@@ -116,19 +125,22 @@ class Types:
         return Definition(self._names[group.name], node, comment(group.doc, group.section))
 
     def _numbers(self) -> Iterator[tuple[Scalar, Node]]:
-        for message in self._plan.messages:
-            for step in message.payload.steps:
-                match step:
-                    case ValueStep():
-                        yield step.number, _raw(step.number, step.integer)
-                    case ItemsStep():
-                        yield step.number, _raw(step.number, step.item)
-                    case BitsStep():
-                        yield from ((each.number, _bits(each)) for each in step.members)
-                    case ConstantStep() | ReservedStep() | CountStep() | BytesStep():
-                        pass
-                    case _:
-                        assert_never(step)
+        payloads = [message.payload for message in self._plan.messages]
+        payloads += [record.payload for record in all_records(payloads)]
+        for step in (step for payload in payloads for step in payload.steps):
+            match step:
+                case ValueStep():
+                    yield step.number, _raw(step.number, step.integer)
+                case ItemsStep():
+                    yield step.number, _raw(step.number, step.item)
+                case BitsStep():
+                    yield from ((each.number, _bits(each)) for each in step.members)
+                case ConstantStep() | ReservedStep() | CountStep() | BytesStep():
+                    pass
+                case RecordStep() | RecordsStep():
+                    pass
+                case _:
+                    assert_never(step)
 
     def of(self, number: Scalar, raw: Node) -> Node:
         """The adapter from an integer to the native value."""
@@ -157,16 +169,22 @@ def comment(doc: str, section: str, *, confirmed: bool = True) -> str:
 
 def fields(message: MessagePlan, types: Types) -> tuple[Node, ...]:
     """The fields of a message, in wire order."""
-    return tuple(_Field(message, types).of(step) for step in message.payload.steps)
+    return tuple(_Field(message.message, types).of(step) for step in message.payload.steps)
+
+
+def record(layout: Layout, types: Types) -> Call:
+    """The structure of a record."""
+    steps = record_plan(layout).payload.steps
+    return Call("Record", (layout.name, *(_Field(layout, types).of(step) for step in steps)))
 
 
 class _Field:
-    """Prints the fields of one message."""
+    """Prints the fields of one message or record."""
 
-    def __init__(self, message: MessagePlan, types: Types) -> None:
+    def __init__(self, stated: Message | Layout, types: Types) -> None:
         self._types = types
-        self._stated = {field.name: field for field in message.message.fields}
-        self._inner = {value.name: value.doc for value in message.message.values if value.bits}
+        self._stated = {field.name: field for field in stated.fields}
+        self._inner = {value.name: value.doc for value in stated.values if value.bits}
 
     def of(self, step: Step) -> Named:
         match step:
@@ -194,10 +212,16 @@ class _Field:
                 item = self._types.of(step.number, _raw(step.number, step.item))
                 items = Sequence(tuple(_shown(step.number, each) for each in step.default))
                 return self._run(step, "ArrayField", (item,), items)
+            case RecordStep():
+                node = Call("Default", (Ref(self._types.records[step.record.name]), Call("Container")))
+                return self._named(step, node)
+            case RecordsStep():
+                empty = Sequence((Call("Container"),) * step.length.minimum)
+                return self._run(step, "ArrayField", (Ref(self._types.records[step.record.name]),), empty)
             case _:
                 assert_never(step)
 
-    def _run(self, step: BytesStep | ItemsStep, kind: str, item: tuple[Node, ...], default: Node) -> Named:
+    def _run(self, step: RunStep, kind: str, item: tuple[Node, ...], default: Node) -> Named:
         run = Call(kind, (*item, step.length.minimum, step.length.maximum))
         return self._named(step, Call("Default", (run, default)))
 

@@ -24,7 +24,7 @@ from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Enum
 from qlinkgen.plan import MessagePlan, Plan, plan_of
-from qlinkgen.plan.payload import BytesStep
+from qlinkgen.plan.payload import BytesStep, RecordsStep, RecordStep
 
 __all__ = ["generate", "render"]
 
@@ -171,7 +171,9 @@ class BusModule:
         """Parameters for the values of a request."""
         settable = transaction.request.payload.settable
         for each in settable:
-            if not isinstance(each, BytesStep) and isinstance(each.number.meaning, Enum):
+            if isinstance(each, RecordStep | RecordsStep):
+                self._classes.add(self._place.classes[each.record.name])
+            elif not isinstance(each, BytesStep) and isinstance(each.number.meaning, Enum):
                 self._classes.add(self._place.classes[each.number.meaning.name])
         return [values.argument(each, self._place) for each in settable]
 

@@ -14,20 +14,26 @@ from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, list
 from qlinkgen.backends.python.measure import measure_lines
 from qlinkgen.backends.python.names import attribute, class_name, constant_name, natural
 from qlinkgen.backends.python.place import Place
-from qlinkgen.model.message import Value
+from qlinkgen.model.fields import Layout, Value
+from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.framing import ByLength, ByMark, ByMessage
+from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, Envelope
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
     ConstantStep,
     CountStep,
+    Holder,
     ItemsStep,
+    Member,
     PayloadPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     Step,
     ValueStep,
+    record_plan,
 )
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -84,14 +90,26 @@ class ClassBuilder:
         self._shapes = self._shared_shapes()
 
     def build(self) -> list[ClassModel]:
-        """Every class, shared ones first."""
+        """Every class: records and shared ones first."""
+        records = [self._record(layout) for layout in self._plan.layouts]
         shapes = [self._shape(name, message) for name, message in self._shapes.values()]
-        return [*shapes, *map(self._message, self._plan.messages)]
+        return [*records, *shapes, *map(self._message, self._plan.messages)]
 
     @property
     def scales(self) -> list[str]:
         """Definitions of the conversions of scaled values; complete once the classes are built."""
         return [f"{name} = {call}" for name, call in self._scales.items()]
+
+    # Records
+
+    def _record(self, layout: Layout) -> ClassModel:
+        """The class of a record: that of a message without a frame."""
+        builder = ClassBuilder(self._plan, self._place.bare)
+        builder._scales = self._scales
+        base, name = self._place.use("BaseRecord"), self._place.classes[layout.name]
+        message = _message_of(layout)
+        head = ClassModel(name, base, builder._doc(message), [f'NAME = "{layout.name}"'])
+        return builder._with_codec(message, head, f"RECORD_{constant_name(layout.name)}", "")
 
     # Common layouts
 
@@ -153,7 +171,7 @@ class ClassBuilder:
             init=self._init(message),
             encode=encoder.statements(name),
             decode=decoder.statements(),
-            measure=measure_lines(message.payload) if self._measured else [],
+            measure=measure_lines(message.payload) if self._measured and number else [],
             constants=[*encoder.constants, *decoder.constants],
             body_size=self._body_size(message),
             has_codec=True,
@@ -192,7 +210,7 @@ class ClassBuilder:
         """The constant that converts each scaled value, named after its type or else its field."""
         found = {}
         for each in message.payload.settable:
-            if not isinstance(each, BytesStep) and each.number.scaling is not None:
+            if isinstance(each, ValueStep | Member | ItemsStep) and each.number.scaling is not None:
                 found[each.name] = self._scale(each.name, each.number)
         return found
 
@@ -243,7 +261,7 @@ class ClassBuilder:
         return python_text.docstring(lines)
 
     def _attributes(
-        self, message: MessagePlan, stated: Iterable[Value], settable: Mapping[str, values.Settable]
+        self, message: MessagePlan, stated: Iterable[Value], settable: Mapping[str, Holder]
     ) -> list[str]:
         lines = []
         if self._place.address and message.allowed is not None:
@@ -253,6 +271,18 @@ class ClassBuilder:
             text = values.description(value, settable[value.name], self._place)
             lines += docstrings.item(f"{attribute(value.name)}: {text}", WIDTH - 4)
         return lines
+
+
+def _message_of(layout: Layout) -> MessagePlan:
+    """A record as a message without a frame."""
+    stated = Message(
+        name=layout.name, command=layout.name, direction="message", id=0, fields=layout.fields,
+        doc=layout.doc, section=layout.section, confirmed=layout.confirmed,
+    )  # fmt: skip
+    payload = record_plan(layout).payload
+    return MessagePlan(
+        stated, payload, Envelope(()), None, payload.most, payload.most, encoded=True, decoded=True
+    )
 
 
 def _shape_name(payload: PayloadPlan) -> str:
@@ -267,6 +297,10 @@ def _kind(step: Step) -> str:
             return "Text" if step.text else "Bytes"
         case ItemsStep():
             return f"{'I' if step.item.signed else 'U'}{step.item.bits}s"
+        case RecordStep():
+            return pascal(step.record.name)
+        case RecordsStep():
+            return f"{pascal(step.record.name)}s"
         case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
             return f"{'I' if step.integer.signed else 'U'}{step.integer.bits}"
         case _:

@@ -34,6 +34,8 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Learn,
     Member,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     RunStep,
     Sizing,
@@ -125,7 +127,7 @@ class Decoder:
     # Empty payload
 
     def _empty(self) -> list[str]:
-        place, chosen = self.place, values.required_defaults(self.message, self.place)
+        place, chosen = self.place, values.required_defaults(self.message.payload, self.place)
         test = f"len({place.data}) == {place.overhead}" if place.overhead else f"not {place.data}"
         lines: list[str] = []
         if place.envelope and (address := place.envelope.address):
@@ -327,6 +329,8 @@ class Decoder:
                 self._bytes(step, at)
             case ItemsStep():
                 self._items(step, at)
+            case RecordStep() | RecordsStep():
+                self._records(step, at)
             case _:
                 assert_never(step)
 
@@ -459,6 +463,29 @@ class Decoder:
         if not plain:
             item = converted(step.number, "item", self.scales.get(step.name, ""), self.place)
             self._values.append(f"{whole} = [{item} for item in {target}]")
+
+    def _records(self, step: RecordStep | RecordsStep, at: Size) -> None:
+        place, name = self.place, attribute(step.name)
+        given = [place.classes[step.record.name], place.data, self._from(at)]
+        if isinstance(step, RecordStep):
+            self._row(at).codes.append(f"{step.record.size}x")
+            reader = "read_record"
+        else:
+            reader = "read_records"
+            if step.fixed:
+                self._row(at).codes.append(f"{step.length.maximum * step.item_size}x")
+                given.append(str(step.length.maximum))
+            else:
+                self._open = False
+                given.append(f"{step.name}_count")
+        seen = ["error", "cls", f'"{name}"', _offset(step), place.payload]
+        self._values += [
+            *self._start(at),
+            "try:",
+            f"    message.{name} = {place.use(reader)}({', '.join(given)})",
+            f"except {place.use('DecodeError')} as error:",
+            f"    raise {place.use('inside')}({', '.join(seen)}) from None",
+        ]
 
     def _odd_items(self, step: ItemsStep, target: str, at: Size) -> None:
         """Unpack items that struct does not support, or not in this byte order."""

@@ -33,6 +33,8 @@ from qlinkgen.plan.payload import (
     CountStep,
     ItemsStep,
     Member,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     Step,
     ValueStep,
@@ -176,6 +178,11 @@ class Encoder:
                 self._bytes(step)
             case ItemsStep():
                 self._items(step)
+            case RecordStep():
+                name = self.place.classes[step.record.name]
+                self._add(f"{step.record.size}s", f"{name}.to_bytes(self.{attribute(step.name)})")
+            case RecordsStep():
+                self._records(step)
             case _:
                 assert_never(step)
 
@@ -304,6 +311,15 @@ class Encoder:
             data = integers.to_bytes(step.item, "item")
         self._late.append(f"{octets} = [{data} for item in {local}]")
         self._pieces.append(f'b"".join({octets})')
+
+    def _records(self, step: RecordsStep) -> None:
+        name, source = self.place.classes[step.record.name], f"self.{attribute(step.name)}"
+        octets = f'b"".join([{name}.to_bytes(each) for each in {source}])'
+        if step.fixed:
+            self._terms.append(f"len({source}) == {step.length.maximum}")
+            self._add(f"{step.length.maximum * step.item_size}s", octets)
+        else:
+            self._pieces.append(octets)
 
     # The expression
 

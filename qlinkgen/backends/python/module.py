@@ -28,7 +28,9 @@ _PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeErr
 #: Names of struct and of other modules; all others are imported from the support module.
 _STRUCT = ("Struct", "pack", "unpack", "unpack_from")
 _RULES = ("FloatRule", "ListRule")
-_ELSEWHERE = ("Decimal", "index", *_STRUCT, *_RULES)
+_RECORD = "BaseRecord"
+_RECORDS = (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records")
+_ELSEWHERE = ("Decimal", "index", *_STRUCT, *_RULES, *_RECORDS)
 
 
 def render(plan: Plan) -> str:
@@ -62,6 +64,7 @@ class Imports:
     index: bool
     rules: Sequence[str]
     support: Sequence[str]
+    records: Sequence[str]
     callable: bool
     typing: Sequence[str]
 
@@ -81,6 +84,7 @@ class ModuleView:
     messages: Sequence[MessageRow]
     bus: Sequence[str]
     commands: Sequence[Sequence[str]]
+    records: Sequence[MessageRow]
     scales: Sequence[str]
     classes: str
     public: Sequence[str]
@@ -115,6 +119,7 @@ class Module:
             messages=[MessageRow(each.name, class_name(each)) for each in plan.messages],
             bus=tables.bus(plan.protocol.bus),
             commands=tables.command_rows(plan),
+            records=[MessageRow(each.name, self.place.classes[each.name]) for each in plan.layouts],
             scales=self.builder.scales,
             classes=self._classes(models, view),
             public=self._public(view, decoded_directions),
@@ -134,18 +139,19 @@ class Module:
 
     def _classes(self, models: Sequence[ClassModel], view: FrameView) -> str:
         template = templates().get_template("templates/class.j2")
-        whole = self.place.envelope is not None
-        kind = "whole frame as sent" if whole else "payload"
-        texts = [
-            template.render(
+        framed = self.place.envelope is not None
+        texts = []
+        for each in models:
+            whole = framed and each.base != _RECORD
+            kind = "record" if each.base == _RECORD else "whole frame as sent" if whole else "payload"
+            text = template.render(
                 each=each,
-                wrap=self._wrap(each, view) if each.has_codec else [],
+                wrap=self._wrap(each, view) if each.has_codec and whole else [],
                 encoder="to_frame" if whole else "to_bytes",
-                encoder_doc=f"The {kind}. Raises EncodeError.",
-                data=self.place.data,
+                encoder_doc=f"The {'bytes of the ' * (kind == 'record')}{kind}. Raises EncodeError.",
+                data=self.place.data if whole else "payload",
             )
-            for each in models
-        ]
+            texts.append(text)
         return "".join(texts).strip("\n")
 
     @staticmethod
@@ -194,6 +200,7 @@ class Module:
             index="index" in used,
             rules=[name for name in _RULES if name in used],
             support=sorted(used - set(_ELSEWHERE), key=imported),
+            records=sorted(used & set(_RECORDS), key=imported),
             callable=isinstance(view, UniqueView),
             typing=sorted(typing),
         )
@@ -201,7 +208,8 @@ class Module:
     def _public(self, view: FrameView, decoded_directions: Sequence[frames.DecodedDirection]) -> list[str]:
         names = [class_name(message) for message in self.plan.messages]
         constants: list[Enum | Flags] = [*self.plan.enums, *self.plan.flags]
-        names += [self.place.classes[each.name] for each in constants]
+        names += [self.place.classes[each.name] for each in (*constants, *self.plan.layouts)]
+        names += ["RECORDS"] if self.plan.layouts else []
         names += ["BUS", "COMMANDS", "MESSAGES", "Message", "StreamDecoder", *_PUBLIC]
         names += [each.function for each in decoded_directions]
         match view:

@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 
 from qlinkgen.model import naming
+from qlinkgen.model.fields import Layout
 from qlinkgen.model.types import Enum, Flags
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -22,10 +23,10 @@ def class_name(message: MessagePlan) -> str:
     return naming.message_class(message.name)
 
 
-def constant_classes(plan: Plan) -> Mapping[str, str]:
-    """Class of each enum and flags; its kind is appended if a message has the same name."""
+def named_classes(plan: Plan) -> Mapping[str, str]:
+    """Class of each enum, flags and record; its kind is appended if a message has the same name."""
     messages = frozenset(class_name(message) for message in plan.messages)
-    groups: list[Enum | Flags] = [*plan.protocol.enums, *plan.protocol.flags]
+    groups: list[Enum | Flags | Layout] = [*plan.protocol.enums, *plan.protocol.flags, *plan.layouts]
     return {each.name: naming.constant_class(each.name, each.kind, messages) for each in groups}
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import assert_never
 
-from qlinkgen.backends.python.names import constant_classes
+from qlinkgen.backends.python.names import named_classes
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_attribute
 from qlinkgen.plan.framing import CheckPart, Envelope, Hunt, InStep, Marks, Part, Rescan
@@ -19,7 +19,7 @@ class Place:
 
     Attributes:
         byteorder: byte order of the structs.
-        classes: class of each enum and flags.
+        classes: class of each enum, flags and record.
         envelope: the frame if classes handle whole frames, None if they handle only payloads.
         address: attribute that holds the address, "" if there is none.
         unique: the last step of an encoder adds the preamble, and the receiver checks it.
@@ -39,6 +39,11 @@ class Place:
         """Add a name to the imports of the module and return it."""
         self.used.add(name)
         return name
+
+    @property
+    def bare(self) -> Place:
+        """The place of a record: without a frame."""
+        return replace(self, envelope=None, address="", unique=False)
 
     @property
     def prefix(self) -> str:
@@ -101,7 +106,7 @@ def place_of(plan: Plan) -> Place:
             assert_never(plan.frame.receiver)
     return Place(
         byteorder=plan.protocol.byteorder,
-        classes=constant_classes(plan),
+        classes=named_classes(plan),
         envelope=envelope,
         address=address_attribute(plan.frame.address) if plan.frame.address else "",
         unique=unique,

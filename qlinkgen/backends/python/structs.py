@@ -28,8 +28,10 @@ def format_of(codes: Iterable[str]) -> str:
 def tabled(payload: PayloadPlan, byteorder: ByteOrder) -> ItemsStep | None:
     """The run that gets a table of structs of the whole payload, None if there is none.
 
-    It must be short and the only run of the payload.
+    It must be short and the only run of the payload, which has no records.
     """
+    if payload.records:
+        return None
     arrays = [step for step in payload.steps if isinstance(step, ItemsStep)]
     if len(payload.runs) != 1 or len(arrays) != 1 or payload.runs[0] is not arrays[0]:
         return None

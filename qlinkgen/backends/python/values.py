@@ -19,30 +19,22 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    Holder,
     ItemsStep,
     Member,
+    PayloadPlan,
+    RecordPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
-    RunStep,
     Step,
     ValueStep,
+    is_required,
 )
 from qlinkgen.plan.tree import MessagePlan
 
-Settable = ValueStep | Member | RunStep
 
-
-def is_required(each: Settable) -> bool:
-    """Whether the caller must provide the value."""
-    match each:
-        case ValueStep() | Member():
-            return each.number.required
-        case BytesStep() | ItemsStep():
-            return each.required
-        case _:
-            assert_never(each)
-
-
-def annotation(each: Settable, place: Place) -> str:
+def annotation(each: Holder, place: Place) -> str:
     """Type of the attribute."""
     match each:
         case ItemsStep():
@@ -51,6 +43,10 @@ def annotation(each: Settable, place: Place) -> str:
             return "str" if each.text else "bytes"
         case ValueStep() | Member():
             return _number_type(each.number, place)
+        case RecordStep():
+            return place.classes[each.record.name]
+        case RecordsStep():
+            return f"list[{place.classes[each.record.name]}]"
         case _:
             assert_never(each)
 
@@ -67,30 +63,30 @@ def _number_type(number: Scalar, place: Place) -> str:
             assert_never(number.meaning)
 
 
-def argument(each: Settable, place: Place) -> str:
+def argument(each: Holder, place: Place) -> str:
     """Parameter of a function for the value, with its default if it has one."""
     kind, name = annotation(each, place), attribute(each.name)
     if is_required(each):
         return f"{name}: {kind}"
-    if isinstance(each, ItemsStep):
+    if isinstance(each, ItemsStep | RecordStep | RecordsStep):
         return f"{name}: {kind} | None = None"
     return f"{name}: {kind} = {default(each, place)}"
 
 
-def assignment(each: Settable, place: Place) -> str:
-    """The statement that stores an argument; each message gets a new list as a default."""
+def assignment(each: Holder, place: Place) -> str:
+    """The statement that stores an argument; each message gets a new list or record as a default."""
     name = attribute(each.name)
-    if isinstance(each, ItemsStep) and not each.required:
+    if isinstance(each, ItemsStep | RecordStep | RecordsStep) and not each.required:
         return f"self.{name} = {default(each, place)} if {name} is None else {name}"
     return f"self.{name} = {name}"
 
 
-def required_defaults(message: MessagePlan, place: Place) -> list[str]:
+def required_defaults(payload: PayloadPlan, place: Place) -> list[str]:
     """Arguments for values without a default in the class."""
-    return [f"{attribute(e.name)}={default(e, place)}" for e in message.payload.settable if is_required(e)]
+    return [f"{attribute(e.name)}={default(e, place)}" for e in payload.settable if is_required(e)]
 
 
-def default(each: Settable, place: Place) -> str:
+def default(each: Holder, place: Place) -> str:
     """Expression for the default."""
     match each:
         case ItemsStep():
@@ -103,8 +99,16 @@ def default(each: Settable, place: Place) -> str:
             return literal(each.default)
         case ValueStep() | Member():
             return _number(each.number, each.number.default, place)
+        case RecordStep():
+            return _default_record(each.record, place)
+        case RecordsStep():
+            return f"[{', '.join([_default_record(each.record, place)] * each.length.minimum)}]"
         case _:
             assert_never(each)
+
+
+def _default_record(record: RecordPlan, place: Place) -> str:
+    return f"{place.classes[record.name]}({', '.join(required_defaults(record.payload, place))})"
 
 
 def _number(number: Scalar, raw: int, place: Place) -> str:
@@ -182,8 +186,17 @@ def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
             return [_rule(place, "ArrayRule", name, *bounds, unit=item.unit)]
         case ValueStep():
             return [_number_rule(step.name, step.number, place, scales)]
+        case RecordStep() | RecordsStep():
+            return [_record_rule(step, place)]
         case _:
             assert_never(step)
+
+
+def _record_rule(step: RecordStep | RecordsStep, place: Place) -> Call:
+    name, kind = attribute(step.name), place.classes[step.record.name]
+    if isinstance(step, RecordStep):
+        return _rule(place, "RecordRule", name, kind)
+    return _rule(place, "RecordsRule", name, kind, step.length.minimum, step.length.maximum)
 
 
 def _member_rules(member: Member, place: Place, scales: Mapping[str, str]) -> list[Call]:
@@ -208,7 +221,7 @@ def _number_rule(field: str, number: Scalar, place: Place, scales: Mapping[str, 
 # Descriptions
 
 
-def description(value: Value, each: Settable, place: Place) -> str:
+def description(value: Value, each: Holder, place: Place) -> str:
     """Description, range and unit of a value, and whether its source is weak, as one paragraph."""
     text = value.doc.rstrip(".")
     facts = [_facts(each, place)]
@@ -220,7 +233,7 @@ def description(value: Value, each: Settable, place: Place) -> str:
     return f"{text}; {detail}." if text and detail else f"{text or detail}."
 
 
-def _facts(each: Settable, place: Place) -> str:
+def _facts(each: Holder, place: Place) -> str:
     match each:
         case BytesStep():
             kind = "characters" if each.text else "bytes"
@@ -230,6 +243,10 @@ def _facts(each: Settable, place: Place) -> str:
             return f"{items} items, each {facts}" if facts else f"{items} items"
         case ValueStep() | Member():
             return _number_facts(each.number, place)
+        case RecordStep():
+            return "a record"
+        case RecordsStep():
+            return f"{span(each.length.minimum, each.length.maximum)} records"
         case _:
             assert_never(each)
 

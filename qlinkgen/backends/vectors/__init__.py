@@ -6,7 +6,7 @@ of every fault.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import assert_never
 
 from qlinkgen.backends.base import Options, Outputs, banner
@@ -21,7 +21,16 @@ from qlinkgen.model.values import Native, native_from_raw, to_json
 from qlinkgen.plan import MessagePlan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import Raw, pack
-from qlinkgen.plan.payload import BytesStep, ItemsStep, Member, RunStep, ValueStep
+from qlinkgen.plan.payload import (
+    BytesStep,
+    Holder,
+    ItemsStep,
+    Member,
+    PayloadPlan,
+    RecordsStep,
+    RecordStep,
+    ValueStep,
+)
 
 __all__ = ["KINDS", "generate"]
 
@@ -101,7 +110,10 @@ def _shown(good: Good) -> Mapping[str, Json]:
     for value, step in zip(good.message.message.values, good.message.payload.settable, strict=True):
         number = good.values[value.name]
         shown = fields[value.name] = to_json(value, _native(step, number))
-        if _differs(shown, number):
+        if isinstance(step, RecordStep | RecordsStep):
+            if _has_other_raws(step.record.payload):
+                raw[value.name] = _numbers(step, number)
+        elif _differs(shown, number):
             raw[value.name] = number
     return {"fields": fields, "raw": raw} if raw else {"fields": fields}
 
@@ -114,7 +126,40 @@ def _differs(shown: Json, raw: Raw) -> bool:
     return isinstance(raw, int) and (type(shown) is not int or shown != raw)
 
 
-def _native(step: ValueStep | Member | RunStep, raw: Raw) -> Native:
+def _has_other_raws(plan: PayloadPlan) -> bool:
+    """Whether numbers of a record are not shown as raw integers."""
+    return any(
+        _has_other_raws(each.record.payload)
+        if isinstance(each, RecordStep | RecordsStep)
+        else isinstance(each, ValueStep | Member | ItemsStep)
+        and (each.number.scaling is not None or each.number.meaning is not None)
+        for each in plan.settable
+    )
+
+
+def _numbers(step: RecordStep | RecordsStep, raw: Raw) -> Json:
+    """The raw numbers of records."""
+    if isinstance(raw, Mapping):
+        return _numbers_of(step.record.payload, raw)
+    assert isinstance(raw, Sequence)
+    return [_numbers_of(step.record.payload, each) for each in raw if isinstance(each, Mapping)]
+
+
+def _numbers_of(plan: PayloadPlan, raw: Mapping[str, Raw]) -> Json:
+    found: dict[str, Json] = {}
+    for each in plan.settable:
+        value = raw[each.name]
+        if isinstance(each, RecordStep | RecordsStep):
+            found[each.name] = _numbers(each, value)
+        elif isinstance(each, ItemsStep):
+            assert isinstance(value, list)
+            found[each.name] = value
+        elif isinstance(value, int):
+            found[each.name] = value
+    return found
+
+
+def _native(step: Holder, raw: Raw) -> Native:
     """The native Python value of a raw value."""
     match step:
         case ValueStep() | Member():
@@ -129,8 +174,18 @@ def _native(step: ValueStep | Member | RunStep, raw: Raw) -> Native:
         case ItemsStep():
             assert isinstance(raw, list)
             return [native_from_raw(step.number, item) for item in raw]
+        case RecordStep():
+            return _native_record(step.record.payload, raw)
+        case RecordsStep():
+            assert isinstance(raw, list)
+            return [_native_record(step.record.payload, each) for each in raw]
         case _:
             assert_never(step)
+
+
+def _native_record(plan: PayloadPlan, raw: Raw) -> Mapping[str, Native]:
+    assert isinstance(raw, Mapping)
+    return {each.name: _native(each, raw[each.name]) for each in plan.settable}
 
 
 def _values(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:

@@ -15,8 +15,12 @@ from qlinkgen.plan.payload import (
     BytesStep,
     ConstantStep,
     CountStep,
+    Holder,
     ItemsStep,
+    Member,
     PayloadPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
     ValueStep,
     conditions,
@@ -79,6 +83,11 @@ class Rule:
                 case ItemsStep():
                     bits, count = self._bits(step.item), self._count(step.length)
                     found[step.name] = [self._chosen(step.number, bits) for _ in range(count)]
+                case RecordStep():
+                    found[step.name] = self.values(step.record.payload)
+                case RecordsStep():
+                    count = self._count(step.length)
+                    found[step.name] = [self.values(step.record.payload) for _ in range(count)]
                 case ConstantStep() | ReservedStep() | CountStep():
                     pass
                 case _:
@@ -148,9 +157,19 @@ def random(chance: Chance) -> Rule:
 
 def defaults(plan: PayloadPlan) -> dict[str, Raw]:
     """Default values; required items have the default of an item."""
-    found = {each.name: default_of(each) for each in plan.settable}
-    for each in plan.settable:
-        items = found[each.name]
-        if isinstance(each, ItemsStep) and isinstance(items, list):
-            found[each.name] = [each.number.default if broken(each.conditions, i) else i for i in items]
-    return found
+    return {each.name: _default(each) for each in plan.settable}
+
+
+def _default(each: Holder) -> Raw:
+    match each:
+        case ItemsStep():
+            rules = each.conditions
+            return [each.number.default if broken(rules, item) else item for item in each.default]
+        case RecordStep():
+            return defaults(each.record.payload)
+        case RecordsStep():
+            return [defaults(each.record.payload) for _ in range(each.length.minimum)]
+        case ValueStep() | Member() | BytesStep():
+            return default_of(each)
+        case _:
+            assert_never(each)

@@ -34,7 +34,11 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
+    RecordPlan,
+    RecordsStep,
+    RecordStep,
     ReservedStep,
+    SimpleStep,
     Step,
     ValueStep,
 )
@@ -280,6 +284,14 @@ def _damaged(rule: Insertion, sent: bytes, at: int) -> Iterator[tuple[str, bytes
 
 def _spoilt(step: Step, data: bytes) -> Iterator[tuple[str, int, bytes]]:
     """Name, number and bytes of illegal values of a step; ``data`` begins with the legal bytes."""
+    if isinstance(step, RecordStep):
+        return _spoilt_record(step.name, step.record, data)
+    if isinstance(step, RecordsStep):
+        return _spoilt_record(f"{step.name}[0]", step.record, data) if step.length.minimum else iter(())
+    return _spoilt_simple(step, data)
+
+
+def _spoilt_simple(step: SimpleStep, data: bytes) -> Iterator[tuple[str, int, bytes]]:
     match step:
         case ValueStep() | ConstantStep():
             yield from _beside(step.name, step.integer, step.conditions)
@@ -302,6 +314,13 @@ def _spoilt(step: Step, data: bytes) -> Iterator[tuple[str, int, bytes]]:
             pass
         case _:
             assert_never(step)
+
+
+def _spoilt_record(name: str, record: RecordPlan, data: bytes) -> Iterator[tuple[str, int, bytes]]:
+    for step in record.payload.steps:
+        at = step.place.front.fixed
+        for inner, number, spoilt in _spoilt(step, data[at:]):
+            yield f"{name}.{inner}", number, data[:at] + spoilt
 
 
 def _beside(name: str, integer: Integer, rules: Iterable[Condition]) -> Iterator[tuple[str, int, bytes]]:

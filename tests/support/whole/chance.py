@@ -7,7 +7,7 @@ import random
 from collections.abc import Callable, Sequence
 
 from tests.support.whole.reference import Raw, Reference
-from tests.support.whole.reference.document import Message, Number, Run
+from tests.support.whole.reference.document import Message, Number, Record, Records, Value
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.special import Packets
 
@@ -28,16 +28,25 @@ def request(reference: Reference, message: Message, rng: random.Random) -> bytes
 
 def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
     """Legal values, often bounds and the stuffed byte."""
-    return {name: _run(kind, rng, mark) if isinstance(kind, Run) else _number(kind, rng, mark)
-            for name, kind in message.values()}  # fmt: skip
+    return {name: _value(kind, rng, mark) for name, kind in message.values()}
 
 
-def _run(kind: Run, rng: random.Random, mark: int) -> Raw:
+def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
+    if isinstance(kind, Number):
+        return _number(kind, rng, mark)
+    if isinstance(kind, Record):
+        return _record(kind, rng, mark)
     count = rng.choice((kind.low, kind.most, rng.randint(kind.low, kind.most), min(kind.most, kind.low + 2)))
+    if isinstance(kind, Records):
+        return [_record(kind.record, rng, mark) for _ in range(count)]
     if kind.item:
         return [_number(kind.item, rng, mark) for _ in range(count)]
     limit = 0x7F if kind.text else 0xFF
     return bytes(rng.choice((rng.randint(0, limit), mark & limit, 0, limit)) for _ in range(count))
+
+
+def _record(kind: Record, rng: random.Random, mark: int) -> dict[str, Raw]:
+    return {name: _value(each, rng, mark) for name, each in kind.values()}
 
 
 def _number(kind: Number, rng: random.Random, mark: int) -> int:

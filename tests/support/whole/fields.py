@@ -37,6 +37,15 @@ class Room:
 
 
 @dataclass
+class Structure:
+    """A record: its definition, its size, and the number of records inside each other."""
+
+    spec: Doc
+    size: int
+    depth: int
+
+
+@dataclass
 class FieldMaker:
     """Creates the fields of the messages of a schema."""
 
@@ -49,6 +58,9 @@ class FieldMaker:
     enums: Doc = field(default_factory=dict)
     flags: Doc = field(default_factory=dict)
     named: Doc = field(default_factory=dict)
+    records: dict[str, Structure] = field(default_factory=dict)
+    #: Fraction of fields that are records.
+    structured: float = 0.12
 
     def types(self) -> Doc:
         """Enums, flags and named types."""
@@ -66,11 +78,45 @@ class FieldMaker:
         for _ in range(rng.randint(0, 3)):
             name = self.words.name(self.taken)
             self.named[name] = self._scalar()[0]
+        for _ in range(rng.choice((0, 1, 2, 3))):
+            self._new_record()
         return {
             key: value
-            for key, value in (("enums", self.enums), ("flags", self.flags), ("types", self.named))
+            for key, value in (
+                ("enums", self.enums),
+                ("flags", self.flags),
+                ("types", {**self.named, **{name: each.spec for name, each in self.records.items()}}),
+            )
             if value
         }
+
+    def _new_record(self) -> None:
+        """A record of fixed size, perhaps with records in it."""
+        inner, taken = [name for name, each in self.records.items() if each.depth == 1], set[str]()
+        made: Doc = {}
+        size, depth, has_value = 0, 1, False
+        for _ in range(self.rng.choice((1, 2, 3, 5))):
+            name, roll = self.words.name(taken), self.rng.random()
+            if inner and roll < 0.2:
+                kind = self.rng.choice(inner)
+                times, depth = self.rng.choice((0, 0, 1, 2, 3)), 2
+                spec: Any = f"{kind}[{times}]" if times else kind
+                more = self.records[kind].size * max(1, times)
+            elif roll < 0.35:
+                spec, more = self._fixed_run()
+            elif roll < 0.45:
+                spec, more = self._packed(taken)
+            else:
+                spec, more = self._scalar()
+            if size + more > 24:
+                continue
+            made[name] = spec
+            size += more
+            has_value = has_value or not (isinstance(spec, dict) and {"const", "reserved"} & spec.keys())
+        if has_value:
+            name = self.words.name(self.taken)
+            about = {"doc": self.words.text()} if self.rng.random() < 0.5 else {}
+            self.records[name] = Structure({**about, "fields": made}, size, depth)
 
     def forget_unused(self, document: Doc) -> None:
         """Remove unused types, so that lint does not warn."""
@@ -128,7 +174,9 @@ class FieldMaker:
         if roll < self.variable and not room.fixed:
             self._variable(name, made, taken, room)
             return
-        if roll < 0.42:
+        if self.records and self.rng.random() < self.structured:
+            spec, size = self._of_record()
+        elif roll < 0.42:
             spec, size = self._fixed_run()
         elif roll < 0.52:
             spec, size = self._packed(taken)
@@ -165,6 +213,8 @@ class FieldMaker:
     def _packet_size(self, spec: Any) -> int:
         written: Doc = {"type": spec} if isinstance(spec, str) else spec
         base, _, count = written["type"].partition("[")
+        if base in self.records:
+            return int(self.records[base].size * int(count.rstrip("]") or 1))
         named = self.named.get(base)
         if named is not None:
             return self._packet_size(
@@ -369,6 +419,14 @@ class FieldMaker:
         kind, order, size = self._item()
         return {"type": f"{kind}[{number}]", **order}, size * number
 
+    def _of_record(self) -> tuple[Any, int]:
+        """One record, or a constant number of them."""
+        name, times = self.rng.choice(list(self.records)), self.rng.choice((0, 0, 1, 2, 4))
+        spec: Any = f"{name}[{times}]" if times else name
+        if self.rng.random() < 0.3:
+            spec = {"type": spec, "doc": self.words.text()}
+        return spec, self.records[name].size * max(1, times)
+
     def _packed(self, taken: set[str]) -> tuple[Any, int]:
         """Bit fields of every kind inside an integer."""
         rng = self.rng
@@ -418,9 +476,9 @@ class FieldMaker:
                 number = most * (step if unit == "bytes" else 1)
                 self._count(name, unit, number, made, opened, taken=taken, room=room)
                 opened += 1
-        elif low == 0 and rng.random() < 0.3 and kind in ("bytes", "text"):
-            spec["type"] = kind
-            most = 0
+        elif low == 0 and rng.random() < 0.3 and kind in ("bytes", "text", *self.records):
+            spec["type"] = f"{kind}[]" if kind in self.records else kind
+            most = int(kind in self.records)
         made.append((name, spec))
         room.left -= most * step
         room.open_end = room.open_end and counted
@@ -428,12 +486,16 @@ class FieldMaker:
     def _is_open(self, spec: Any, made: list[tuple[str, Any]]) -> bool:
         names = {each["counts"] for _, each in made if isinstance(each, dict) and "counts" in each}
         kind = str(spec["type"] if isinstance(spec, dict) else spec)
+        kind = kind.replace("[]", "[..]")
         own = next(name for name, each in made if each is spec)
         return (kind in ("bytes", "text") or ".." in kind) and own not in names
 
     def _variable_kind(self) -> tuple[str, Doc, int]:
         rng = self.rng
         kinds = ["array", *(["text"] if self.shape.text else []), *([] if self.shape.groups else ["bytes"])]
+        if self.records and rng.random() < 2 * self.structured:
+            name = rng.choice(list(self.records))
+            return name, {}, self.records[name].size
         kind = rng.choice(kinds)
         if kind != "array":
             return kind, {}, 1

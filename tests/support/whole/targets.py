@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 import types
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal
 from fractions import Fraction
@@ -27,7 +27,7 @@ from qlinkgen.plan.receive import PacketReceiver as PlannedPackets
 from qlinkgen.plan.receive import receiver
 from tests.support.cdriver import Driver
 from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
-from tests.support.whole.reference.document import Message, Number, Run
+from tests.support.whole.reference.document import Message, Number, Record, Records, Run, Value
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.values import decode as decode_payload
 
@@ -81,8 +81,12 @@ class Target:
         return {name: raw_of(kind, found(name)) for name, kind in message.values()}
 
 
-def native(kind: Number | Run, raw: Raw) -> Any:
-    """An int, bool, float or Decimal in the unit; bytes, text, a list."""
+def native(kind: Value, raw: Any) -> Any:
+    """An int, bool, float or Decimal in the unit; bytes, text, a list; a dict for a record."""
+    if isinstance(kind, Record):
+        return {name: native(each, raw[name]) for name, each in kind.values()}
+    if isinstance(kind, Records):
+        return [native(kind.record, each) for each in raw]
     if isinstance(kind, Run):
         if kind.item and isinstance(raw, list):
             return [native(kind.item, each) for each in raw]
@@ -102,8 +106,12 @@ def native(kind: Number | Run, raw: Raw) -> Any:
     )
 
 
-def raw_of(kind: Number | Run, found: Any) -> Raw:
+def raw_of(kind: Value, found: Any) -> Raw:
     """The integer that represents a value. Raises TypeError or ValueError for a value without one."""
+    if isinstance(kind, Record):
+        return _record_of(kind, found)
+    if isinstance(kind, Records):
+        return [_record_of(kind.record, each) for each in found]
     if isinstance(kind, Run):
         if kind.item:
             return [_number_of(kind.item, each) for each in found]
@@ -126,12 +134,29 @@ def _number_of(kind: Number, found: Any) -> int:
     return raw
 
 
-def told(kind: Number | Run, raw: Raw) -> Raw:
+def told(kind: Value, raw: Any) -> Raw:
     """A raw value without what a NaN does not preserve."""
+    if isinstance(kind, Record):
+        return {name: told(each, raw[name]) for name, each in kind.values()}
+    if isinstance(kind, Records):
+        return [_told_record(kind.record, each) for each in raw]
     if isinstance(raw, list):
         assert isinstance(kind, Run)
         return [kind.item.told(each) if kind.item else each for each in raw]
     return kind.told(raw) if isinstance(kind, Number) and isinstance(raw, int) else raw
+
+
+def _told_record(kind: Record, raw: Mapping[str, Any]) -> dict[str, Raw]:
+    return {name: told(each, raw[name]) for name, each in kind.values()}
+
+
+def _record_of(kind: Record, found: Any) -> dict[str, Raw]:
+    return {name: raw_of(each, member(found, name)) for name, each in kind.values()}
+
+
+def member(found: Any, name: str) -> Any:
+    """A value of a record: an item of a mapping, or an attribute."""
+    return found[name] if isinstance(found, Mapping) else getattr(found, naming.attribute(name))
 
 
 class PythonTarget(Target):
@@ -152,10 +177,25 @@ class PythonTarget(Target):
         place = {self._address: address} if self._address else {}
         natives = {naming.attribute(name): each for name, each in self.natives(message, given).items()}
         try:
-            made = self.module.MESSAGES[message.name](**natives, **place)
+            made = self.module.MESSAGES[message.name](**self._objects(message.name, natives), **place)
             return made.to_bytes(), made.to_frame(*self._context(request))
         except self.module.EncodeError as error:
             raise Wrong("encode", str(error)) from None
+
+    def _objects(self, name: str, natives: Mapping[str, Any]) -> dict[str, Any]:
+        """Natives with an object for each record, whose class the annotations of the constructor name."""
+        hints = self.module.MESSAGES[name].__init__.__annotations__
+        return {key: self._object(hints[key], each) for key, each in natives.items()}
+
+    def _object(self, hint: str, found: Any) -> Any:
+        if isinstance(found, list):
+            return [self._object(hint, each) for each in found]
+        if not isinstance(found, dict):
+            return found
+        kind = getattr(self.module, hint.removesuffix(" | None").removeprefix("list[").removesuffix("]"))
+        hints = kind.__init__.__annotations__
+        inner = {naming.attribute(name): each for name, each in found.items()}
+        return kind(**{key: self._object(hints[key], each) for key, each in inner.items()})
 
     def _context(self, request: bytes) -> Sequence[Any]:
         return (self.module.decode_request(request),) if request else ()
@@ -328,7 +368,10 @@ class CTarget(Target):
         """See Target."""
         place: object = request.hex() if request else address if self.reference.address_name else "-"
         payload, wire = self._ask(
-            "encode", message.name, place, *(_word(given[name]) for name, _ in message.values())
+            "encode",
+            message.name,
+            place,
+            *(w for name, kind in message.values() for w in _words(kind, given[name])),
         )
         return _bytes(payload), _bytes(wire)
 
@@ -336,10 +379,9 @@ class CTarget(Target):
         """See Target."""
         context = (request.hex(),) if request else ()
         address, *found = self._ask("decode", message.name, wire.hex() or "-", *context)
-        values = {
-            name: told(kind, _raw(kind, word))
-            for (name, kind), word in zip(message.values(), found, strict=True)
-        }
+        words = iter(found)
+        values = {name: told(kind, _raw(kind, words)) for name, kind in message.values()}
+        assert not list(words)
         return Seen(message.name, None if address == "-" else int(address), values)
 
     def events(self, direction: Direction, stream: bytes) -> list[Heard]:
@@ -365,18 +407,36 @@ class CTarget(Target):
         return answer
 
 
-def _word(raw: Raw) -> str:
-    if isinstance(raw, int):
-        return str(raw)
-    return (raw.hex() if isinstance(raw, bytes) else ",".join(map(str, raw))) or "-"
+def _words(kind: Value, raw: Any) -> Iterator[str]:
+    """The words of a value: one, those of a record, or the number of records and those of each."""
+    if isinstance(kind, Record):
+        for name, each in kind.values():
+            yield from _words(each, raw[name])
+    elif isinstance(kind, Records):
+        yield str(len(raw))
+        for record in raw:
+            yield from _words(kind.record, record)
+    elif isinstance(raw, int):
+        yield str(raw)
+    else:
+        yield (raw.hex() if isinstance(raw, bytes) else ",".join(map(str, raw))) or "-"
 
 
-def _raw(kind: Number | Run, word: str) -> Raw:
+def _raw(kind: Value, words: Iterator[str]) -> Raw:
+    if isinstance(kind, Record):
+        return _raw_record(kind, words)
+    if isinstance(kind, Records):
+        return [_raw_record(kind.record, words) for _ in range(int(next(words)))]
+    word = next(words)
     if isinstance(kind, Number):
         return int(word)
     if kind.item is None:
         return _bytes(word)
     return [int(each) for each in word.split(",")] if word != "-" else []
+
+
+def _raw_record(kind: Record, words: Iterator[str]) -> dict[str, Raw]:
+    return {name: _raw(each, words) for name, each in kind.values()}
 
 
 def _bytes(word: str) -> bytes:

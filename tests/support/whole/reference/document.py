@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
@@ -109,7 +109,45 @@ class Packed:
     members: tuple[tuple[str, int, Number], ...]
 
 
-Kind = Number | Run | Packed
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Fields that are one value."""
+
+    slots: tuple[Slot, ...]
+
+    @property
+    def size(self) -> int:
+        """Size on the wire."""
+        return sum(slot.most_bytes for slot in self.slots)
+
+    def values(self) -> Iterator[tuple[str, Value]]:
+        """Values in wire order."""
+        return _values(self.slots)
+
+
+@dataclass(frozen=True, slots=True)
+class Records:
+    """An array of records; `high` is None until the rest of the payload is known."""
+
+    record: Record
+    low: int
+    high: int | None
+
+    @property
+    def step(self) -> int:
+        """Size of an item."""
+        return self.record.size
+
+    @property
+    def most(self) -> int:
+        """Maximum number of items."""
+        assert self.high is not None
+        return self.high
+
+
+Kind = Number | Run | Packed | Record | Records
+#: The kind of a value.
+Value = Number | Run | Record | Records
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,17 +163,32 @@ class Slot:
     @property
     def fixed(self) -> bool:
         """Whether its size is constant."""
-        return not isinstance(self.kind, Run) or self.kind.low == self.kind.high
+        return not isinstance(self.kind, Run | Records) or self.kind.low == self.kind.high
 
     @property
     def least_bytes(self) -> int:
         """Minimum size on the wire."""
-        return self.kind.step * self.kind.low if isinstance(self.kind, Run) else len(self.kind.pieces)
+        kind = self.kind
+        return kind.step * kind.low if isinstance(kind, Run | Records) else size_of(kind)
 
     @property
     def most_bytes(self) -> int:
         """Maximum size on the wire; 0 for a run without a bound."""
-        return self.kind.step * (self.kind.high or 0) if isinstance(self.kind, Run) else len(self.kind.pieces)
+        kind = self.kind
+        return kind.step * (kind.high or 0) if isinstance(kind, Run | Records) else size_of(kind)
+
+
+def size_of(kind: Number | Packed | Record) -> int:
+    """Size of a single value."""
+    return kind.size if isinstance(kind, Record) else len(kind.pieces)
+
+
+def _values(slots: Iterable[Slot]) -> Iterator[tuple[str, Value]]:
+    for slot in slots:
+        if isinstance(slot.kind, Packed):
+            yield from ((name, number) for name, _, number in slot.kind.members)
+        elif slot.role == "value":
+            yield slot.name, slot.kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,13 +204,9 @@ class Message:
     empty_is_default: bool = False
     checked: bool = True
 
-    def values(self) -> Iterator[tuple[str, Number | Run]]:
+    def values(self) -> Iterator[tuple[str, Value]]:
         """Values in wire order."""
-        for slot in self.slots:
-            if isinstance(slot.kind, Packed):
-                yield from ((name, number) for name, _, number in slot.kind.members)
-            elif slot.role == "value":
-                yield slot.name, slot.kind
+        return _values(self.slots)
 
     @property
     def sizes(self) -> tuple[int, int]:
@@ -234,23 +283,32 @@ class Fields:
 
     def build(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
         """The fields of one message."""
-        slots = tuple(self._slot(name, self._resolved(spec)) for name, spec in fields.items())
+        slots = self._slots(fields)
         room = self._most - sum(slot.most_bytes for slot in slots)
         counts = {slot.counts: slot for slot in slots[::-1] if slot.counts}
         return tuple(_bounded(slot, room, counts.get(slot.name)) for slot in slots)
+
+    def _slots(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
+        return tuple(self._slot(name, self._resolved(spec)) for name, spec in fields.items())
 
     def _resolved(self, spec: Any) -> Doc:
         """A field merged with its named types."""
         written: Doc = {"type": spec} if isinstance(spec, str) else dict(spec)
         base, brackets, count = written["type"].partition("[")
         named = self._document.get("types", {}).get(base.strip())
-        if named is None:
+        if named is None or "fields" in named:
             return written
         below = self._resolved(named)
         return {**below, **written, "type": below["type"] + brackets + count}
 
     def _slot(self, name: str, spec: Doc) -> Slot:
         base, bracket, count = spec["type"].replace(" ", "").partition("[")
+        if base in self._document.get("types", {}):
+            record = Record(self._slots(self._document["types"][base]["fields"]))
+            if not bracket:
+                return Slot(name, record)
+            low, high = whole_span(count.rstrip("]")) if count.rstrip("]") else (0, None)
+            return Slot(name, Records(record, low, high))
         if base in ("bytes", "text") or bracket:
             return Slot(name, self._run(base, count.rstrip("]"), spec))
         number = self._number(base, spec)
@@ -384,7 +442,7 @@ def whole_or_negative(given: object) -> tuple[int, int]:
 
 def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
     kind = slot.kind
-    if not isinstance(kind, Run) or kind.high is not None:
+    if not isinstance(kind, Run | Records) or kind.high is not None:
         return slot
     most = max(0, room) // kind.step
     if counter is not None:

@@ -11,10 +11,13 @@ from tests.support.whole.reference import checks
 from tests.support.whole.reference.document import (
     Doc,
     Message,
+    Number,
+    Records,
     Run,
     byte_pieces,
     octets,
     part_doc,
+    size_of,
     whole_span,
 )
 from tests.support.whole.reference.values import Wrong, get, items_of, put
@@ -325,11 +328,15 @@ def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) ->
     payload = b""
     for slot in message.slots:
         kind = slot.kind
-        size = kind.step * counted.get(slot.name, kind.most) if isinstance(kind, Run) else len(kind.pieces)
+        size = (
+            kind.step * counted.get(slot.name, kind.most)
+            if isinstance(kind, Run | Records)
+            else size_of(kind)
+        )
         data = take(size)
         payload += data
         if slot.counts and slot.counts not in counted:
-            assert not isinstance(kind, Run)
+            assert isinstance(kind, Number)
             try:
                 counted[slot.counts] = items_of(message, slot, get(kind.pieces, data))
             except Wrong:

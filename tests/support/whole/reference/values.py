@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
-from tests.support.whole.reference.document import Kind, Message, Number, Packed, Run, Slot
+from tests.support.whole.reference.document import (
+    Kind,
+    Message,
+    Number,
+    Packed,
+    Record,
+    Records,
+    Run,
+    Slot,
+    Value,
+    size_of,
+)
 
-#: A raw value: a number, a list of numbers, or bytes.
-Raw = int | list[int] | bytes
+#: A raw value: a number, a list of numbers, bytes, a record, or a list of records.
+Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | Sequence[Mapping[str, Raw]]"
 
 
 class Wrong(Exception):
@@ -42,20 +54,40 @@ def check(number: Number, raw: int) -> None:
         raise Wrong("range", str(raw))
 
 
-def default(kind: Number | Run) -> Raw:
+def default(kind: Value) -> Raw:
     """The default of a field."""
     if isinstance(kind, Number):
         return kind.default
+    if isinstance(kind, Record):
+        return _default_record(kind)
+    if isinstance(kind, Records):
+        return [_default_record(kind.record) for _ in range(kind.low)]
     return list(kind.default) if kind.item else bytes(kind.default)
+
+
+def _default_record(kind: Record) -> dict[str, Raw]:
+    return {name: default(each) for name, each in kind.values()}
 
 
 def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
     """The payload of a message."""
-    return b"".join(_encoded(message, slot, values) for slot in message.slots)
+    return _fields(message.slots, values)
 
 
-def _encoded(message: Message, slot: Slot, values: Mapping[str, Raw]) -> bytes:
+def _fields(slots: Sequence[Slot], values: Mapping[str, Raw]) -> bytes:
+    return b"".join(_encoded(slots, slot, values) for slot in slots)
+
+
+def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> bytes:
     kind = slot.kind
+    if isinstance(kind, Record):
+        return _fields(kind.slots, values[slot.name])  # type: ignore[arg-type]
+    if isinstance(kind, Records):
+        records = values[slot.name]
+        assert isinstance(records, Sequence)
+        if not kind.low <= len(records) <= kind.most:
+            raise Wrong("range", f"{len(records)} records")
+        return b"".join(_fields(kind.record.slots, each) for each in records)  # type: ignore[arg-type]
     if isinstance(kind, Packed):
         raw = 0
         for name, shift, number in kind.members:
@@ -64,9 +96,9 @@ def _encoded(message: Message, slot: Slot, values: Mapping[str, Raw]) -> bytes:
     if isinstance(kind, Run):
         return _encoded_run(kind, values[slot.name])
     if slot.role == "count":
-        counted = next(each.kind for each in message.slots if each.name == slot.counts)
+        counted = next(each.kind for each in slots if each.name == slot.counts)
         given = values[slot.counts]
-        assert isinstance(counted, Run)
+        assert isinstance(counted, Run | Records)
         assert not isinstance(given, int)
         return put(kind.pieces, len(given) * (counted.step if slot.counts_in == "bytes" else 1))
     return put(kind.pieces, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
@@ -83,10 +115,11 @@ def _encoded_run(kind: Run, given: Raw) -> bytes:
     if not kind.low <= len(given) <= kind.most:
         raise Wrong("range", f"{len(given)} items")
     if kind.item:
-        return b"".join(put(kind.item.pieces, _number(kind.item, each)) for each in given)
+        return b"".join(put(kind.item.pieces, _number(kind.item, each)) for each in given)  # type: ignore[arg-type]
+    assert isinstance(given, bytes)
     if kind.text and any(each > 0x7F for each in given):
         raise Wrong("range", "text")
-    return bytes(given)
+    return given
 
 
 def decode(message: Message, payload: bytes) -> dict[str, Raw]:
@@ -101,6 +134,11 @@ def decode(message: Message, payload: bytes) -> dict[str, Raw]:
 
 def _decoded(slot: Slot, data: bytes) -> dict[str, Raw]:
     kind = slot.kind
+    if isinstance(kind, Record):
+        return {slot.name: _decoded_record(kind, data)}
+    if isinstance(kind, Records):
+        starts = range(0, len(data), kind.step)
+        return {slot.name: [_decoded_record(kind.record, data[at : at + kind.step]) for at in starts]}
     if isinstance(kind, Run):
         return {slot.name: _decoded_run(kind, data)}
     if slot.role == "reserved":
@@ -119,6 +157,15 @@ def _decoded(slot: Slot, data: bytes) -> dict[str, Raw]:
             raise Wrong("range", slot.name)
         return {}
     return {slot.name: kind.told(raw)}
+
+
+def _decoded_record(kind: Record, data: bytes) -> dict[str, Raw]:
+    values: dict[str, Raw] = {}
+    at = 0
+    for slot in kind.slots:
+        values |= _decoded(slot, data[at : at + slot.most_bytes])
+        at += slot.most_bytes
+    return values
 
 
 def _signed(number: Number, raw: int) -> int:
@@ -170,8 +217,8 @@ def _cut(message: Message, payload: bytes) -> list[tuple[Slot, bytes]]:
 
 def _size(slot: Slot, counted: Mapping[str, int]) -> int | None:
     kind = slot.kind
-    if not isinstance(kind, Run):
-        return len(kind.pieces)
+    if not isinstance(kind, Run | Records):
+        return size_of(kind)
     if slot.name in counted:
         return counted[slot.name] * kind.step
     return kind.most * kind.step if slot.fixed else None
@@ -184,7 +231,7 @@ def _behind(slots: Sequence[Slot], counted: Mapping[str, int]) -> int:
 
 
 def _demand(kind: Kind, size: int) -> None:
-    assert isinstance(kind, Run)
+    assert isinstance(kind, Run | Records)
     if size < 0 or size % kind.step or not kind.low <= size // kind.step <= kind.most:
         raise Wrong("length", "the rest")
 
@@ -200,7 +247,7 @@ def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) ->
 def items_of(message: Message, slot: Slot, raw: int) -> int:
     """The number of items from a count. Raises Wrong if it is illegal for the field."""
     kind = next(each.kind for each in message.slots if each.name == slot.counts)
-    assert isinstance(kind, Run)
+    assert isinstance(kind, Run | Records)
     unit = kind.step if slot.counts_in == "bytes" else 1
     if raw % unit or not kind.low <= raw // unit <= kind.most:
         raise Wrong("length", f"count {raw}")

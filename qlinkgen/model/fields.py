@@ -1,0 +1,185 @@
+"""Fields of messages and of records, and the values that users set and read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar, assert_never
+
+from qlinkgen.model.texts import Text
+from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A named sequence of fields of fixed size, for records of messages."""
+
+    kind: ClassVar = "record"
+    name: str
+    fields: tuple[Field, ...]
+    doc: Text = ""
+    section: Text = ""
+    confirmed: bool = True
+
+    @cached_property
+    def size(self) -> int:
+        """Size on the wire."""
+        return sum(each.max_size for each in self.fields)
+
+    @cached_property
+    def values(self) -> tuple[Value, ...]:
+        """Values in wire order."""
+        return tuple(values_of(self.fields))
+
+    @property
+    def required(self) -> bool:
+        """Whether the caller must provide a value of it."""
+        return any(value.required for value in self.values)
+
+    @property
+    def docs(self) -> dict[str, str]:
+        """Descriptions of fields and of the values inside them, by name."""
+        return docs_of(self.fields)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One record: a value with its own values."""
+
+    layout: Layout
+
+    @property
+    def size(self) -> int:
+        """Bytes on the wire."""
+        return self.layout.size
+
+    @property
+    def required(self) -> bool:
+        """Whether the caller must provide it."""
+        return self.layout.required
+
+
+@dataclass(frozen=True, slots=True)
+class Records:
+    """An array of records."""
+
+    layout: Layout
+    length: Length
+    #: The caller must provide the value: empty is not legal.
+    required: bool = False
+    #: Suffix for the name of its number of items.
+    quantity: str = field(default="count", init=False)
+
+    @property
+    def item_size(self) -> int:
+        """Bytes of one item."""
+        return self.layout.size
+
+
+FieldType = Scalar | Bits | Blob | Array | Record | Records
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field of a message or a record. ``Bits`` hold several named values, all other types one."""
+
+    name: str
+    type: FieldType
+    doc: Text = ""
+    section: Text = ""
+    confirmed: bool = True
+    #: It repeats the field of the same name of the request.
+    echo: bool = False
+
+    @property
+    def min_size(self) -> int:
+        """Minimum size on the wire."""
+        match self.type:
+            case Blob() | Array() | Records():
+                return self.type.length.minimum * self.type.item_size
+            case Scalar() | Bits() | Record():
+                return self.type.size
+            case _:
+                assert_never(self.type)
+
+    @property
+    def max_size(self) -> int:
+        """Maximum size on the wire."""
+        match self.type:
+            case Blob() | Array() | Records():
+                return self.type.length.maximum * self.type.item_size
+            case Scalar() | Bits() | Record():
+                return self.type.size
+            case _:
+                assert_never(self.type)
+
+    @property
+    def quantity(self) -> str:
+        """Suffix for the name of its number of items, "" for one value."""
+        return self.type.quantity if isinstance(self.type, Blob | Array | Records) else ""
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the size is constant."""
+        return not isinstance(self.type, Blob | Array | Records) or self.type.length.fixed
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A value that the user sets and reads: an attribute of a message object, a member of a C struct."""
+
+    name: str
+    type: Scalar | Blob | Array | Record | Records
+    doc: Text
+    #: The field that holds it, and its bits if the field is divided into bits.
+    field: Field
+    bits: BitField | None = None
+
+    @property
+    def required(self) -> bool:
+        """Whether the caller must provide the value; the default is used only in vectors."""
+        return self.type.required
+
+    @property
+    def unit(self) -> str:
+        """The unit of its numbers, "" for bytes, text and records."""
+        kind = self.type.item if isinstance(self.type, Array) else self.type
+        return kind.unit if isinstance(kind, Scalar) else ""
+
+
+def values_of(fields: Iterable[Field]) -> Iterator[Value]:
+    """Values in wire order; constants, reserved bytes and counts are not values."""
+    for each in fields:
+        kind = each.type
+        match kind:
+            case Bits():
+                for member in kind.members:
+                    yield Value(member.name, member.type, member.doc, each, member)
+            case Scalar():
+                if kind.settable:
+                    yield Value(each.name, kind, each.doc, each)
+            case Blob() | Array() | Record() | Records():
+                yield Value(each.name, kind, each.doc, each)
+            case _:
+                assert_never(kind)
+
+
+def docs_of(fields: Iterable[Field]) -> dict[str, str]:
+    """Descriptions of fields and of the values inside them, by name."""
+    found = {}
+    for each in fields:
+        found[each.name] = each.doc
+        if isinstance(each.type, Bits):
+            found |= {member.name: member.doc for member in each.type.members}
+    return found
+
+
+def layouts_of(fields: Iterable[Field]) -> tuple[Layout, ...]:
+    """The layouts of records in fields, each before those that contain it."""
+    found: dict[str, Layout] = {}
+    for each in fields:
+        if isinstance(each.type, Record | Records):
+            inner = layouts_of(each.type.layout.fields)
+            found |= {layout.name: layout for layout in (*inner, each.type.layout)}
+    return tuple(found.values())

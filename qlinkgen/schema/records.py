@@ -1,0 +1,111 @@
+"""Second pass, records: builds the layouts of records, and the fields that hold them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from qlinkgen.model.fields import Field, Layout, Record, Records
+from qlinkgen.schema.compounds import build_length
+from qlinkgen.schema.file_model import Fact, Fields, FieldSpec, RecordSpec, SchemaFile
+from qlinkgen.schema.location import Location
+from qlinkgen.schema.notation import TypeText, type_text
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+#: Maximum number of records inside each other.
+_MAX_DEPTH = 2
+#: Keys of a field that apply to a record.
+_KEYS = frozenset({"type", "echo", *Fact.model_fields})
+
+
+class RecordBuilder:
+    """Builds each record of a file once."""
+
+    def __init__(
+        self, file: SchemaFile, report: Reporter, fields: Callable[[Fields, Path], tuple[Field, ...]]
+    ) -> None:
+        """``fields`` builds the fields of a record."""
+        self._file = file
+        self._report = report
+        self._fields = fields
+        self._built: dict[str, Layout | None] = {}
+        #: Records being built, to detect recursion.
+        self._open: list[str] = []
+
+    def check(self) -> None:
+        """Build every record."""
+        for name, spec in self._file.types.items():
+            if isinstance(spec, RecordSpec):
+                self._layout(name)
+
+    def named(self, spec: FieldSpec) -> TypeText | None:
+        """The type of a field that holds records, None for other fields."""
+        try:
+            text = type_text(spec.type)
+        except ValueError:
+            return None
+        return text if isinstance(self._file.types.get(text.base), RecordSpec) else None
+
+    def build(
+        self, spec: FieldSpec, text: TypeText, payload_max: int, location: Location
+    ) -> Record | Records | None:
+        """The type of a field that holds one record or several."""
+        location.reject(spec, (key for key in spec.model_fields_set if key not in _KEYS), "a record")
+        if text.base in self._open:
+            what = f"record '{text.base}' contains itself"
+            location.fault("recursive-type", "type", what, "use another type")
+            layout = None
+        else:
+            layout = self._layout(text.base)
+        if layout is None or self._report.touched(("types", text.base)):
+            self._report.taint(location.path)
+        if layout is None:
+            return None
+        if text.count is None:
+            return Record(layout)
+        length = build_length(text, layout.size, payload_max, location)
+        if length is None:
+            self._report.taint(location.path)
+            return None
+        return Records(layout, length, required=length.minimum > 0)
+
+    def _layout(self, name: str) -> Layout | None:
+        if name not in self._built:
+            self._open.append(name)
+            self._built[name] = self._new(name)
+            self._open.pop()
+        return self._built[name]
+
+    def _new(self, name: str) -> Layout | None:
+        spec, path = self._file.types[name], ("types", name)
+        assert isinstance(spec, RecordSpec)
+        before = len(self._report.faults)
+        layout = Layout(
+            name, self._fields(spec.fields, (*path, "fields")), spec.doc, spec.section, spec.confirmed
+        )
+        self._check(layout, path)
+        if len(self._report.faults) > before:
+            self._report.taint(path)
+        return layout if layout.size else None
+
+    def _check(self, layout: Layout, path: Path) -> None:
+        if not layout.values:
+            what = f"record {layout.name} has no value: its fields are constants or reserved"
+            hint = "add a field with a value, or put these fields into the messages"
+            self._report.error("bad-record", path, what, hint, of_key=True, needs=((*path, "fields"),))
+        for field in layout.fields:
+            place = (*path, "fields", field.name)
+            if not field.fixed:
+                what = f"{field.name} of the record {layout.name} has no fixed size"
+                hint = "records have a fixed size; give it a number of items, like [4]"
+                self._report.error("bad-record", place, what, hint, of_key=True)
+            if _depth((field,)) >= _MAX_DEPTH:
+                what = f"{field.name} would be a record inside of {_MAX_DEPTH} others"
+                hint = "use fields in place of one of the records"
+                self._report.error("extent-depth", place, what, hint, of_key=True)
+
+
+def _depth(fields: tuple[Field, ...]) -> int:
+    """Number of records inside each other."""
+    inner = [each.type.layout for each in fields if isinstance(each.type, Record | Records)]
+    return max((1 + _depth(layout.fields) for layout in inner), default=0)
