@@ -16,7 +16,7 @@ COMMANDS = {
     "generate": "Write Python, C, construct and vectors for protocols, or check that they are up to date.",
     "lint": "Check schema files; report every error with its line, column, rule and fix.",
     "list": "List the protocols of qlinkgen.",
-    "import": "Write a schema from a file of another format, such as a C header.",
+    "import": "Write a schema from a C header, a table and other formats.",
     "show": "Show a protocol or a message: layout, sizes, transactions.",
     "encode": "Encode values as wire bytes.",
     "decode": "Decode wire bytes: one JSON object per line.",

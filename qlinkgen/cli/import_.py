@@ -77,6 +77,81 @@ def header(
     )
 
 
+def _columns(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:  # noqa: ARG001
+    from qlinkgen.importers.table import KEYS  # noqa: PLC0415
+
+    found: dict[str, str] = {}
+    for each in given:
+        heading, _, key = each.rpartition("=")
+        if not heading or (key and key not in KEYS):
+            raise Failure(
+                f"--map {each}: write COLUMN=KEY with a KEY of {', '.join(KEYS)}, or COLUMN= to ignore it"
+            )
+        found[heading] = key
+    return found
+
+
+def _for_tables(function: F) -> F:
+    """Add the options of tables."""
+    order = click.option(
+        "--byteorder",
+        type=click.Choice(["big", "little"]),
+        default="big",
+        show_default=True,
+        help="Byte order where the table states none.",
+    )
+    columns = click.option(
+        "--map",
+        "columns",
+        metavar="COLUMN=KEY",
+        multiple=True,
+        callback=_columns,
+        help="What a column states, repeatable; without KEY it is ignored.",
+    )
+    return _common(order(columns(function)))
+
+
+@command.command("csv")
+@click.argument("file", metavar="FILE.csv", type=click.Path())
+@_for_tables
+def csv(
+    file: str, byteorder: Literal["big", "little"], columns: dict[str, str], name: str, output: str | None
+) -> int:
+    """Import a table of fields, with a row for each field.
+
+    The keys of columns are message, id, direction, offset, bit, name, type, size, count, scale, bias (the
+    value of raw 0), unit, min, max, range, default, const, values (0=off, 1=on), doc, section and byteorder.
+    Their usual headings are known; --map names others. An empty message repeats the one above it.
+
+    \b
+    qlinkgen import csv fields.csv -o bus.yaml
+    qlinkgen import csv fields.csv --map "Len (B)=size" --map Owner=
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    from qlinkgen.importers.table import Options, read_csv  # noqa: PLC0415
+
+    options = Options(name, byteorder, columns)
+    return _written(file, output, lambda notes: read_csv(file, notes, options))
+
+
+@command.command("xlsx")
+@click.argument("file", metavar="FILE.xlsx", type=click.Path())
+@_for_tables
+def xlsx(
+    file: str, byteorder: Literal["big", "little"], columns: dict[str, str], name: str, output: str | None
+) -> int:
+    """Import the tables of a workbook: every sheet is read like a CSV file.
+
+    In a sheet without a column for the message, all rows are one message with the name of the sheet.
+
+    \b
+    qlinkgen import xlsx protocol.xlsx -o bus.yaml
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    from qlinkgen.importers.table import Options, read_xlsx  # noqa: PLC0415
+
+    options = Options(name, byteorder, columns)
+    return _written(file, output, lambda notes: read_xlsx(file, notes, options))
+
+
 for _each in command.commands.values():
     _each.params.append(debug_option(hidden=True))
 

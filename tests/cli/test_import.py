@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
 
 from tests.cli.conftest import Run
 
+FORMATS = ["header", "csv", "xlsx"]
 HEADER = "struct state {\n  uint8_t a;\n  void *p;\n};\nstruct level { uint16_t level; };\n"
 
 
@@ -49,7 +51,7 @@ def test_nothing_to_import(qlinkgen: Run, header: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("form", ["header"])
+@pytest.mark.parametrize("form", FORMATS)
 def test_what_cannot_be_read(qlinkgen: Run, tmp_path: Path, form: str) -> None:
     for name in ("missing", "."):
         result = qlinkgen("import", form, tmp_path / name)
@@ -57,13 +59,28 @@ def test_what_cannot_be_read(qlinkgen: Run, tmp_path: Path, form: str) -> None:
         assert "cannot read it" in result.err
 
 
-@pytest.mark.parametrize("form", ["header"])
+@pytest.mark.parametrize("form", FORMATS)
 def test_debug_is_known_to_every_format(qlinkgen: Run, tmp_path: Path, form: str) -> None:
     assert "cannot read it" in qlinkgen("import", form, tmp_path / "missing", "--debug").err
 
 
-def test_without_the_package(qlinkgen: Run, header: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pycparser.c_parser", None)
-    result = qlinkgen("import", "header", header)
+def test_columns(qlinkgen: Run, tmp_path: Path) -> None:
+    table = tmp_path / "tank.csv"
+    table.write_text("Feld,Art,Owner\nlevel,u16,bob\n")
+    wrong = qlinkgen("import", "csv", table, "--map", "Art=kind")
+    assert wrong.code == 2
+    assert "--map Art=kind: write COLUMN=KEY with a KEY of message, id," in wrong.err
+    assert qlinkgen("import", "csv", table).code == 1
+    result = qlinkgen("import", "csv", table, "--map", "Art=type", "--map", "feld=name", "--map", "Owner=")
+    assert (result.code, result.err) == (0, "")
+    assert "fields: {level: u16}" in result.out
+
+
+@pytest.mark.parametrize(("form", "package"), [("header", "pycparser.c_parser"), ("xlsx", "openpyxl")])
+def test_without_the_package(
+    qlinkgen: Run, header: Path, monkeypatch: pytest.MonkeyPatch, form: str, package: str
+) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    result = qlinkgen("import", form, header)
     assert result.code == 1
     assert "pip install 'qlinkgen[import]'" in result.err
