@@ -15,6 +15,18 @@ __all__ = ["Direction", "Field", "Message", "Value"]
 Direction = Literal["request", "response", "message"]
 
 
+@dataclass(frozen=True, slots=True)
+class Example:
+    """A frame of the source document, with the full name of its message.
+
+    ``after`` is the request that it answers, b"" if its meaning does not depend on one.
+    """
+
+    message: str
+    wire: bytes
+    after: bytes = b""
+
+
 @dataclass(frozen=True)
 class Message:
     """One message in one direction.

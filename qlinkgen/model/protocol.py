@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import assert_never
 
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
-from qlinkgen.model.message import Direction, Message
+from qlinkgen.model.message import Direction, Example, Message
 from qlinkgen.model.texts import Text, without_texts
 from qlinkgen.model.transaction import Bus, Command, Reply
 from qlinkgen.model.types import ByteOrder, Enum, Flags
@@ -38,6 +38,7 @@ class Protocol:
     schema_file: Text
     #: False after `without_texts`.
     texts: bool = True
+    examples: tuple[Example, ...] = ()
 
     def without_texts(self) -> Protocol:
         """The protocol without free text, so that generated code contains only names and numbers.

@@ -39,6 +39,7 @@ from qlinkgen.schema.kinds import (
     ShortForm,
     Text,
     Time,
+    Values,
     WholeRange,
 )
 from qlinkgen.schema.notation import answer_id, shown
@@ -458,6 +459,25 @@ class DefaultsSpec(_Mapping):
     attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
 
 
+class ExampleSpec(_Mapping):
+    """A frame of the source document, and what it says."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, arbitrary_types_allowed=True)
+
+    wire: ByteText = Field(description="All bytes of the frame, as sent")
+    after: ByteText = Field(
+        default=b"", description="The request that it answers, if its meaning depends on that"
+    )
+    request: Values | None = Field(default=None, description="Values of the request, if it is one")
+    response: Values | None = Field(default=None, description="Values of the response, if it is one")
+    fields: Values | None = Field(default=None, description="Values of a message without a response")
+
+    @property
+    def parts(self) -> Mapping[str, object]:
+        """The values in its header, such as the address."""
+        return self.model_extra or {}
+
+
 class CommandSpec(Fact):
     """A transaction: request, response and their conditions."""
 
@@ -482,6 +502,7 @@ class CommandSpec(Fact):
     repeat: Repeat | None = Field(default=None, description="Whether a request may be repeated")
     in_flight: Count | None = Field(default=None, description="Maximum number of outstanding requests")
     attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
+    examples: list[ExampleSpec] = Field(default_factory=list, description="Frames of the source document")
 
 
 class MessageSpec(Fact):
@@ -492,6 +513,7 @@ class MessageSpec(Fact):
     direction: Literal["request", "response"] | None = Field(
         default=None, description="Direction of the message; default: any node sends it"
     )
+    examples: list[ExampleSpec] = Field(default_factory=list, description="Frames of the source document")
 
 
 class SchemaFile(_Mapping):

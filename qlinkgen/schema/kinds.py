@@ -57,6 +57,12 @@ def _scalar(value: object) -> object:
     return value
 
 
+def _values(value: object) -> object:
+    if not isinstance(value, dict):
+        raise ValueError(f"{shown(value)} is not a mapping; write NAME: VALUE, or {{}}")  # noqa: TRY004
+    return value
+
+
 def _label(value: object) -> object:
     if not isinstance(value, int | str):
         raise ValueError(  # noqa: TRY004 - a wrong value of the file, not of a caller
@@ -128,6 +134,12 @@ ScalarValue = Annotated[
     int | bool | Decimal | str | list[int | bool | Decimal | str],
     PlainValidator(_scalar),
     _json("A number, true or false, text, or a list of these", "number", "boolean", "string", "array"),
+]
+#: Values by name; each is checked against its field.
+Values = Annotated[
+    dict[str, object],
+    PlainValidator(_values),
+    WithJsonSchema({"type": "object", "description": "VALUE: number, text, list or object, as in JSON"}),
 ]
 Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "string", "integer", "boolean")]
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]

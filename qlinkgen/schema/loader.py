@@ -6,6 +6,7 @@ import errno
 import hashlib
 import os
 import stat
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 from qlinkgen._resources import library_dir, schemas_dir
@@ -14,6 +15,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema.addresses import check_addresses
 from qlinkgen.schema.commands import CommandBuilder, build_bus
 from qlinkgen.schema.echoes import check_echoes
+from qlinkgen.schema.examples import build_examples
 from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.messages import MessageBuilder
@@ -132,7 +134,7 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
     if frame is None or report.failed:
         return None
     spec = file.protocol
-    return Protocol(
+    protocol = Protocol(
         name=spec.name,
         title=spec.title or spec.name,
         revision=spec.revision,
@@ -148,3 +150,6 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
         schema_hash=hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()[:12],
         schema_file=file_name,
     )
+    # With another checksum the bytes of the document are wrong.
+    examples = build_examples(file, protocol, report) if crc is None else ()
+    return replace(protocol, examples=examples)

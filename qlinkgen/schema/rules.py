@@ -273,6 +273,12 @@ _ALL = (
         "Otherwise there is nothing to generate.",
     ),
     Rule(
+        "wrong-example",
+        "The bytes of an example are a frame of its message, with the values given.",
+        "An example is a frame of the source document, so it shows whether the description is right. Values "
+        "that are left out have their defaults.",
+    ),
+    Rule(
         "unused-type",
         "Types, enums and flags are used.",
         "An unused name is often a typo.",

@@ -97,17 +97,17 @@ def _mixed(right: Sequence[Right], wrong: Sequence[Wrong]) -> list[Row]:
 def _right(plan: Plan, header: Header, entry: JsonObject) -> Right:
     planned = plan.by_name[entry["message"]]
     message = planned.message
-    by_hand = "kinds" not in entry
+    kinds = tuple(kind for kind in entry.get("kinds", ()) if kind != "example")
     return Right(
         message=message,
-        kinds=() if by_hand else tuple(entry["kinds"]),
+        kinds=kinds,
         address=entry.get(record_key(plan.frame.address), message.default_address),
         values=_values(header, message.values, planned.payload, entry["fields"], entry.get("raw", {})),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),
         request=bytes.fromhex(entry.get("request", "")),
         decode_only=entry.get("decode_only", False),
-        source=_source(entry) if by_hand else "",
+        source="" if kinds else _source(entry) or "an example of the document",
     )
 
 

@@ -7,35 +7,28 @@ of every fault.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import assert_never
 
 from qlinkgen.backends.base import Options, Outputs, banner
 from qlinkgen.backends.vectors import choice, writer
 from qlinkgen.backends.vectors.choice import Chance
 from qlinkgen.backends.vectors.faults import Faults, Good
 from qlinkgen.backends.vectors.writer import Json
-from qlinkgen.model.message import Direction
+from qlinkgen.model.message import Direction, Example
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.model.values import Native, native_from_raw, to_json
+from qlinkgen.model.values import to_json
 from qlinkgen.plan import MessagePlan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import Raw, pack
-from qlinkgen.plan.payload import (
-    BytesStep,
-    Holder,
-    ItemsStep,
-    Member,
-    PayloadPlan,
-    RecordsStep,
-    RecordStep,
-    ValueStep,
-)
+from qlinkgen.plan.natives import native_of
+from qlinkgen.plan.payload import ItemsStep, Member, PayloadPlan, RecordsStep, RecordStep, ValueStep
 
 __all__ = ["KINDS", "generate"]
 
 #: Kinds of vectors of every message. Kinds with the same bytes share a line.
 KINDS = ("defaults", "minimum", "maximum", "a5", "random1", "random2")
+#: Kind of a frame of the source document.
+EXAMPLE = "example"
 _RULES = {"minimum": choice.MINIMUM, "maximum": choice.MAXIMUM, "a5": choice.A5}
 
 
@@ -59,8 +52,17 @@ class _Vectors:
         self._codec = Codec(plan_of(protocol))
 
     def of(self, message: MessagePlan) -> dict[str, Good]:
-        """The vectors of a message by kind."""
-        return {kind: self._one(message, kind) for kind in KINDS}
+        """The vectors of a message by kind, and those of the document."""
+        examples = [each for each in self._protocol.examples if each.message == message.name]
+        return {kind: self._one(message, kind) for kind in KINDS} | {
+            f"{EXAMPLE}{number}": self._example(message, each) for number, each in enumerate(examples, 1)
+        }
+
+    def _example(self, message: MessagePlan, example: Example) -> Good:
+        direction = self._codec.plan.direction_of(message)
+        found = self._codec.decode(example.wire, direction, example.after)
+        payload = pack(message.payload, found.values)
+        return Good(message, found.address, dict(found.values), payload, example.wire, example.after)
 
     def _one(self, message: MessagePlan, kind: str) -> Good:
         chance = Chance(f"{self._protocol.name} {message.name} {kind}")
@@ -94,7 +96,8 @@ class _Vectors:
             yield self._row(same, vectors[same[0]])
 
     def _row(self, kinds: list[str], good: Good) -> Mapping[str, Json]:
-        row: dict[str, Json] = {"message": good.message.name, "kinds": kinds}
+        named = dict.fromkeys(kind if kind in KINDS else EXAMPLE for kind in kinds)
+        row: dict[str, Json] = {"message": good.message.name, "kinds": [*named]}
         if good.address is not None:
             row[record_key(self._codec.plan.frame.address)] = good.address
         row |= _shown(good)
@@ -109,7 +112,7 @@ def _shown(good: Good) -> Mapping[str, Json]:
     raw: dict[str, Json] = {}
     for value, step in zip(good.message.message.values, good.message.payload.settable, strict=True):
         number = good.values[value.name]
-        shown = fields[value.name] = to_json(value, _native(step, number))
+        shown = fields[value.name] = to_json(value, native_of(step, number))
         if isinstance(step, RecordStep | RecordsStep):
             if _has_other_raws(step.record.payload):
                 raw[value.name] = _numbers(step, number)
@@ -157,35 +160,6 @@ def _numbers_of(plan: PayloadPlan, raw: Mapping[str, Raw]) -> Json:
         elif isinstance(value, int):
             found[each.name] = value
     return found
-
-
-def _native(step: Holder, raw: Raw) -> Native:
-    """The native Python value of a raw value."""
-    match step:
-        case ValueStep() | Member():
-            assert isinstance(raw, int)
-            return native_from_raw(step.number, raw)
-        case BytesStep(text=True):
-            assert isinstance(raw, bytes)
-            return raw.decode("ascii")
-        case BytesStep():
-            assert isinstance(raw, bytes)
-            return raw
-        case ItemsStep():
-            assert isinstance(raw, list)
-            return [native_from_raw(step.number, item) for item in raw]
-        case RecordStep():
-            return _native_record(step.record.payload, raw)
-        case RecordsStep():
-            assert isinstance(raw, list)
-            return [_native_record(step.record.payload, each) for each in raw]
-        case _:
-            assert_never(step)
-
-
-def _native_record(plan: PayloadPlan, raw: Raw) -> Mapping[str, Native]:
-    assert isinstance(raw, Mapping)
-    return {each.name: _native(each, raw[each.name]) for each in plan.settable}
 
 
 def _values(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:

@@ -1,0 +1,157 @@
+"""Examples: frames of the source document, each held to the description of its message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from decimal import Decimal
+from typing import TYPE_CHECKING, cast
+
+from qlinkgen.model.message import Example, Message
+from qlinkgen.model.naming import record_key
+from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.values import BadValue, Json, default_of, from_json, to_json
+from qlinkgen.schema.file_model import ExampleSpec, SchemaFile
+from qlinkgen.schema.notation import shown
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+if TYPE_CHECKING:
+    from qlinkgen.plan.codec import Codec, Decoded
+
+_RULE = "wrong-example"
+
+
+def build_examples(file: SchemaFile, protocol: Protocol, report: Reporter) -> tuple[Example, ...]:
+    """The examples of a file; reports those that differ from its description."""
+    found = [*_specs(file)]
+    if not found:
+        return ()
+    # Few files have any, and lint starts sooner without the plan.
+    from qlinkgen.plan import plan_of  # noqa: PLC0415
+    from qlinkgen.plan.codec import Codec  # noqa: PLC0415
+
+    checker = _Checker(protocol, Codec(plan_of(protocol)), report)
+    return tuple(example for path, spec in found if (example := checker.example(spec, path)))
+
+
+def _specs(file: SchemaFile) -> Iterator[tuple[Path, ExampleSpec]]:
+    for group, specs in (("commands", file.commands), ("messages", file.messages)):
+        for name, spec in specs.items():
+            for index, example in enumerate(spec.examples):
+                yield (group, name, "examples", index), example
+
+
+class _Checker:
+    """Decodes each example and compares its values."""
+
+    def __init__(self, protocol: Protocol, codec: Codec, report: Reporter) -> None:
+        self._protocol = protocol
+        self._codec = codec
+        self._report = report
+
+    def example(self, spec: ExampleSpec, path: Path) -> Example | None:
+        """The example, None if it was reported."""
+        found = self._values(spec, path)
+        if found is None:
+            return None
+        message, key, values = found
+        decoded = self._decoded(message, spec, path)
+        if decoded is None:
+            return None
+        parts = {each: value for each, value in spec.parts.items() if each != key}
+        self._compare_header(message, decoded, parts, path)
+        self._compare(message, decoded, values, (*path, key))
+        return Example(message.name, spec.wire, spec.after)
+
+    def _error(self, path: Path, what: str, hint: str, *, of_key: bool = False) -> None:
+        self._report.error(_RULE, path, what, hint, of_key=of_key)
+
+    def _values(self, spec: ExampleSpec, path: Path) -> tuple[Message, str, Mapping[str, Json]] | None:
+        """The message of the example, the key of its values, and these; None if that was reported."""
+        forms = self._forms(str(path[0]), str(path[1]))
+        typed = {"request": spec.request, "response": spec.response, "fields": spec.fields}
+        given = {key: values for key, values in (*typed.items(), *spec.parts.items()) if values is not None}
+        found = [key for key in given if key in forms or key in typed]
+        if len(found) != 1 or found[0] not in forms:
+            what = f"an example has the values of one message, not {listed(found)}"
+            self._error(path, what, f"write its values under {listed(forms, 'or')}")
+            return None
+        (key,) = found
+        values = given[key]
+        if not isinstance(values, Mapping):
+            self._error((*path, key), f"{shown(values)} is not a mapping", "write NAME: VALUE, or {}")
+            return None
+        return forms[key], key, cast("Mapping[str, Json]", values)
+
+    def _forms(self, group: str, name: str) -> Mapping[str, Message]:
+        """The messages of a command, or the one of this name, by the key of their values."""
+        if group == "messages":
+            return {"fields": self._protocol.by_name[name]}
+        command = next(each for each in self._protocol.commands if each.name == name)
+        both = {"request": command.request, "response": command.response}
+        return {key: each for key, each in both.items() if each} | {
+            reply.name: reply.message for reply in command.replies
+        }
+
+    def _decoded(self, message: Message, spec: ExampleSpec, path: Path) -> Decoded | None:
+        """What the bytes say; None if that was reported."""
+        from qlinkgen.plan.reading import BadFrame  # noqa: PLC0415  # see build_examples
+
+        place, plan = (*path, "wire"), self._codec.plan
+        direction = plan.direction_of(plan.message(message.name))
+        try:
+            decoded = self._codec.decode(spec.wire, direction, spec.after)
+        except BadFrame as bad:
+            what = f"this is not a frame of {message.name}: {bad.kind} at byte {bad.end}"
+            hint = f"`qlinkgen explain {self._protocol.schema_file} {spec.wire.hex()}` describes every byte"
+            self._error(place, what, hint)
+            return None
+        found = decoded.message.name
+        if found != message.name:
+            self._error(place, f"this is a frame of {found}", f"move the example to {found}")
+            return None
+        sent = self._codec.encode(found, decoded.values, decoded.address, spec.after)
+        if sent != spec.wire:
+            what = f"an encoder sends these values as {sent.hex(' ').upper()}"
+            self._error(place, what, "change the bytes or the description")
+        return decoded
+
+    def _compare_header(
+        self, message: Message, decoded: Decoded, given: Mapping[str, object], path: Path
+    ) -> None:
+        """Compare the address."""
+        name = self._protocol.address_name if message.addresses else None
+        known = [record_key(name)] if name else []
+        for key in given:
+            if key not in known:
+                hint = did_you_mean(key, ("wire", "after", *known), f"known here: {listed(known)}")
+                self._error((*path, key), f"unknown key {shown(key)}", hint, of_key=True)
+        if name and given.get(record_key(name), message.default_address) != decoded.address:
+            place = (*path, record_key(name))
+            self._error(place, f"{name} is {decoded.address} in these bytes", "correct one of both")
+
+    def _compare(self, message: Message, decoded: Decoded, given: Mapping[str, Json], path: Path) -> None:
+        """Compare the values; those that are left out have their default."""
+        from qlinkgen.plan.natives import native_of  # noqa: PLC0415  # see build_examples
+
+        values = {value.name: value for value in message.values}
+        unknown = [key for key in given if key not in values]
+        for key in unknown:
+            hint = did_you_mean(key, values, f"its values are {listed(values)}")
+            self._error((*path, key), f"{message.name} has no value {shown(key)}", hint, of_key=True)
+        for (name, value), step in zip(values.items(), decoded.message.payload.settable, strict=True):
+            if unknown and name not in given:
+                continue  # probably misspelt
+            found = to_json(value, native_of(step, decoded.values[name]))
+            try:
+                said = to_json(value, from_json(value, given[name]) if name in given else default_of(value))
+            except BadValue as bad:
+                self._error((*path, name), str(bad), f"these bytes have {_text(found)}")
+                continue
+            if said != found:
+                what = f"{name} is {_text(found)} in these bytes"
+                self._error((*path, name), what, "correct one of both", of_key=name not in given)
+
+
+def _text(value: Json) -> str:
+    return str(value) if isinstance(value, int | float | Decimal) else shown(value)
