@@ -11,6 +11,7 @@ from pymodbus.pdu import bit_message as bits
 from pymodbus.pdu import other_message as other
 from pymodbus.pdu import register_message as registers
 from pymodbus.pdu.diag_message import DiagnosticBase
+from pymodbus.pdu.exceptionresponse import ExceptionResponse
 
 from qlinkgen.model.message import Direction
 from tests.library.protocols import Record, pairs
@@ -81,6 +82,14 @@ _KINDS: Mapping[str, tuple[type[ModbusPDU], Mapping[str, str]]] = {
 _NAMES = {kind: name for name, (kind, _) in _KINDS.items()}
 #: What pymodbus calls a value, and back; it has two states each of a coil, and of a server.
 _COIL = {"off": [False], "on": [True]}
+_FUNCTIONS = {"diagnostics": 8} | {
+    name.partition(".")[0]: kind.function_code for name, (kind, _) in _KINDS.items()
+}
+_CODES = (
+    None, "illegal_function", "illegal_data_address", "illegal_data_value", "server_device_failure",
+    "acknowledge", "server_device_busy", None, "memory_parity_error", None, "gateway_path_unavailable",
+    "gateway_target_failed",
+)  # fmt: skip
 _STATUS = {0: 1, 0xFFFF: 0}
 _GIVEN: Mapping[str, Callable[[Any], Any]] = {
     "write_single_coil.request": _COIL.get,
@@ -95,7 +104,10 @@ UNKNOWN: frozenset[str] = frozenset()
 def build(record: Record) -> bytes | None:
     name, fields = record["message"], record["fields"]
     pdu: ModbusPDU
-    if name.startswith("diagnostics"):
+    if name.endswith(".exception"):
+        function, code = _FUNCTIONS[name.partition(".")[0]], fields["code"]
+        pdu = ExceptionResponse(function, _CODES.index(code) if code in _CODES else code)
+    elif name.startswith("diagnostics"):
         pdu = DiagnosticBase(message=fields["data"])
         pdu.sub_function_code = fields["function"]
     elif name == "report_server_id.response":
@@ -121,6 +133,10 @@ def _given(name: str, field: str, value: Any) -> Any:
 
 def read(wire: bytes, direction: Direction) -> Record | None:
     _, pdu = FramerRTU(DecodePDU(is_server=direction == "request")).handleFrame(wire, 0, 0)
+    if isinstance(pdu, ExceptionResponse):
+        command = next(each for each, number in _FUNCTIONS.items() if number | 0x80 == pdu.function_code)
+        code = dict(enumerate(_CODES)).get(pdu.exception_code) or pdu.exception_code
+        return {"message": f"{command}.exception", "node": pdu.dev_id, "fields": {"code": code}}
     if pdu is None or (name := _NAMES.get(type(pdu))) is None:
         return None
     fields = {each: getattr(pdu, attribute) for each, attribute in _KINDS[name][1].items()}
