@@ -17,11 +17,21 @@ from qlinkgen.plan.describe import (
     size_text,
     sizing_text,
     span_text,
+    term_text,
     transparency_text,
     type_text,
 )
 from qlinkgen.plan.framing import CheckPart, Envelope, FramePlan, Part, PayloadPart
-from qlinkgen.plan.payload import BitsStep, BytesStep, ItemsStep, PayloadPlan, RecordsStep, Step, least_size
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    ItemsStep,
+    PayloadPlan,
+    RecordsStep,
+    Step,
+    least_size,
+    term_of,
+)
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -128,5 +138,5 @@ def _steps(title: str, payload: PayloadPlan) -> None:
 def _bytes(step: Step) -> str:
     """Return the size of a step in bytes."""
     if isinstance(step, BytesStep | ItemsStep | RecordsStep) and not step.fixed:
-        return step.name if step.item_size == 1 else f"{step.item_size}*{step.name}"
+        return term_text(term_of(step))
     return str(least_size(step))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import assert_never
 
+from qlinkgen.plan.content import unpack_items
 from qlinkgen.plan.describe import id_text, value_text
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -85,9 +86,8 @@ def _of_field(field: Step | Member, span: Span) -> str:
             text = repr(span.raw.decode("ascii", "backslashreplace"))
             return text if field.text else f"{len(span.raw)} bytes"
         case ItemsStep():
-            starts = range(0, len(span.raw), field.item_size)
-            items = (field.item.unpack(span.raw[at : at + field.item_size]) for at in starts)
-            return ", ".join(map(str, items))
+            number = number if field.packed else len(span.raw) // field.item_size
+            return ", ".join(map(str, unpack_items(field, span.raw, number)))
         case RecordStep() | RecordsStep():
             return f"{len(span.raw)} bytes"
         case _:

@@ -71,10 +71,13 @@ class Records:
     #: Suffix for the name of its number of items.
     quantity: str = field(default="count", init=False)
 
-    @property
-    def item_size(self) -> int:
-        """Bytes of one item."""
-        return self.layout.size
+    def size_of(self, number: int) -> int:
+        """Size of so many records."""
+        return number * self.layout.size
+
+    def items_in(self, size: int) -> int:
+        """Maximum number of records that fit a size."""
+        return size // self.layout.size
 
 
 FieldType = Scalar | Bits | Blob | Array | Record | Records
@@ -97,7 +100,7 @@ class Field:
         """Minimum size on the wire."""
         match self.type:
             case Blob() | Array() | Records():
-                return self.type.length.minimum * self.type.item_size
+                return self.type.size_of(self.type.length.minimum)
             case Scalar() | Bits() | Record():
                 return self.type.size
             case _:
@@ -108,7 +111,7 @@ class Field:
         """Maximum size on the wire."""
         match self.type:
             case Blob() | Array() | Records():
-                return self.type.length.maximum * self.type.item_size
+                return self.type.size_of(self.type.length.maximum)
             case Scalar() | Bits() | Record():
                 return self.type.size
             case _:

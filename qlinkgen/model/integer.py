@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 ByteOrder = Literal["big", "little"]
+#: Order of numbers of a few bits in a row of bits: the first one is in the least, or most, significant bits.
+BitOrder = Literal["least", "most"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +54,31 @@ def pack_chunks(value: int, chunks: tuple[Chunk, ...]) -> bytes:
 def unpack_chunks(data: bytes, chunks: tuple[Chunk, ...]) -> int:
     """The unsigned integer in its wire bytes; unused bits are ignored."""
     return sum((byte & chunk.mask) << chunk.shift for byte, chunk in zip(data, chunks, strict=True))
+
+
+def packed_size(number: int, bits: int) -> int:
+    """Bytes of a row of so many numbers; the bits after them are unused."""
+    return (number * bits + 7) // 8
+
+
+def pack_row(numbers: Sequence[int], bits: int, order: BitOrder) -> bytes:
+    """The bytes of unsigned numbers of a few bits in a row; unused bits are zero."""
+    size, whole = packed_size(len(numbers), bits), 0
+    for number in numbers if order == "most" else reversed(numbers):
+        whole = whole << bits | number
+    if order == "least":
+        return whole.to_bytes(size, "little")
+    return (whole << 8 * size - bits * len(numbers)).to_bytes(size, "big")
+
+
+def unpack_row(data: bytes, number: int, bits: int, order: BitOrder) -> list[int]:
+    """The unsigned numbers of `pack_row`; unused bits are ignored."""
+    mask, starts = (1 << bits) - 1, range(0, number * bits, bits)
+    if order == "least":
+        whole = int.from_bytes(data, "little")
+        return [whole >> at & mask for at in starts]
+    whole = int.from_bytes(data, "big") >> 8 * len(data) - bits * number
+    return [whole >> at & mask for at in reversed(starts)]
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,14 @@ from functools import cached_property
 from typing import ClassVar, Literal
 
 from qlinkgen.model.floats import Float
-from qlinkgen.model.integer import ByteOrder, Chunk, Integer, byte_chunks, group_chunks
+from qlinkgen.model.integer import BitOrder, ByteOrder, Chunk, Integer, byte_chunks, group_chunks, packed_size
 from qlinkgen.model.texts import Text
 
 __all__ = [
     "DOUBLE_BITS",
     "Array",
     "BitField",
+    "BitOrder",
     "Bits",
     "Blob",
     "ByteOrder",
@@ -309,25 +310,37 @@ class Blob:
     #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
 
-    #: Bytes of one item.
-    item_size: int = field(default=1, init=False)
     #: Suffix for the name of its number of items.
     quantity: str = field(default="size", init=False)
+
+    @staticmethod
+    def size_of(number: int) -> int:
+        """Size of so many bytes."""
+        return number
+
+    @staticmethod
+    def items_in(size: int) -> int:
+        """Number of bytes that fit a size."""
+        return size
 
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """An array of integers."""
+    """An array of numbers, of whole bytes each or, if it is ``packed``, of a few bits in a row."""
 
     item: Scalar
     length: Length
     default: tuple[int, ...] = ()
+    packed: BitOrder | None = None
     #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
     #: Suffix for the name of its number of items.
     quantity: str = field(default="count", init=False)
 
-    @property
-    def item_size(self) -> int:
-        """Bytes of one item."""
-        return self.item.size
+    def size_of(self, number: int) -> int:
+        """Size of so many items."""
+        return packed_size(number, self.item.bits) if self.packed else number * self.item.size
+
+    def items_in(self, size: int) -> int:
+        """Maximum number of items that fit a size."""
+        return 8 * size // self.item.bits if self.packed else size // self.item.size

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias, assert_never
 
-from qlinkgen.model.integer import Integer
+from qlinkgen.model.integer import Integer, pack_row, unpack_row
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Condition
 from qlinkgen.plan.payload import (
@@ -32,6 +32,7 @@ from qlinkgen.plan.payload import (
     Step,
     ValueStep,
     limits,
+    term_of,
 )
 
 Raw: TypeAlias = "int | bytes | list[int] | Mapping[str, Raw] | Sequence[Mapping[str, Raw]]"
@@ -118,7 +119,7 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
         case ConstantStep() | ReservedStep():
             return step.integer.pack(step.value)
         case CountStep():
-            number = counts[step.run] * step.scale
+            number = step.term.value(counts[step.run])
             if number > step.integer.maximum:
                 raise Unsendable(step.run, values[step.run])
             return step.integer.pack(number)
@@ -132,7 +133,7 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
             _count(step, values[step.name])
             items = values[step.name]
             assert isinstance(items, list)
-            return b"".join(step.item.pack(_checked(step.name, step.number, item)) for item in items)
+            return pack_items(step, [_checked(step.name, step.number, item) for item in items])
         case RecordStep():
             return _record(step.name, step.record, values[step.name])
         case RecordsStep():
@@ -151,6 +152,23 @@ def _record(name: str, record: RecordPlan, value: object) -> bytes:
         return pack(record.payload, value)
     except Unsendable as unsendable:
         raise Unsendable(f"{name}.{unsendable.field}", unsendable.value) from None
+
+
+def pack_items(step: ItemsStep, numbers: Sequence[int]) -> bytes:
+    """The bytes of legal items."""
+    if step.packed:
+        return pack_row([number & step.item.mask for number in numbers], step.item.bits, step.packed)
+    return b"".join(map(step.item.pack, numbers))
+
+
+def unpack_items(step: ItemsStep, data: bytes, number: int) -> list[int]:
+    """The items at the beginning of ``data``, which are not checked."""
+    if step.packed:
+        own = data[: term_of(step).value(number)]
+        bits = unpack_row(own, number, step.item.bits, step.packed)
+        return list(map(step.item.signed_value, bits))
+    starts = range(0, step.item_size * number, step.item_size)
+    return [step.item.unpack(data[at : at + step.item_size]) for at in starts]
 
 
 def _member_bits(member: Member, values: Mapping[str, Raw]) -> int:
@@ -210,7 +228,7 @@ def count_items(plan: PayloadPlan, payload: bytes) -> dict[str, int]:
             case Learn():
                 counts[each.count.run] = _learn(each.count, payload, counts)
             case Compare():
-                if _number(each.count, payload, counts) != counts[each.count.run] * each.count.scale:
+                if _number(each.count, payload, counts) != each.count.term.value(counts[each.count.run]):
                     raise BadContent("length", each.count.name)
             case _:
                 assert_never(each)
@@ -266,8 +284,7 @@ def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> di
                 raise BadContent("range", step.name, at)
             return {step.name: taken}
         case ItemsStep():
-            starts = range(0, step.item_size * counts.get(step.name, step.length.maximum), step.item_size)
-            return {step.name: [_valid(step.name, step.item, step.conditions, data[i:], at) for i in starts]}
+            return {step.name: _valid_items(step, data, counts.get(step.name, step.length.maximum), at)}
         case RecordStep() | RecordsStep():
             return {step.name: _unpacked_records(step, data, counts, at)}
         case ReservedStep():
@@ -294,6 +311,17 @@ def _unpacked_record(name: str, record: RecordPlan, data: bytes, at: int) -> dic
         return unpack(record.payload, data[: record.size])
     except BadContent as bad:
         raise BadContent(bad.kind, f"{name}.{bad.field}", at + bad.offset) from None
+
+
+def _valid_items(step: ItemsStep, data: bytes, number: int, at: int) -> list[int]:
+    items = unpack_items(step, data, number)
+    stray = not step.packed and any(
+        step.item.stray(data[start : start + step.item_size])
+        for start in range(0, step.item_size * number, step.item_size)
+    )
+    if stray or any(broken(step.conditions, item) for item in items):
+        raise BadContent("range", step.name, at)
+    return items
 
 
 def _valid(name: str, integer: Integer, rules: tuple[Condition, ...], data: bytes, at: int) -> int:

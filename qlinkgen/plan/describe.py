@@ -21,7 +21,7 @@ from qlinkgen.model.types import (
 )
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 from qlinkgen.plan.framing import (
     AddressPart,
     ByLength,
@@ -160,7 +160,8 @@ def type_text(step: Step | Member) -> str:
         case BytesStep():
             return f"{'text' if step.text else 'bytes'}[{_length_text(step.length)}]"
         case ItemsStep():
-            return f"{_scalar_text(step.number)}[{_length_text(step.length)}]"
+            row = f" in a row of bits, {step.packed} first" if step.packed else ""
+            return f"{_scalar_text(step.number)}[{_length_text(step.length)}]{row}"
         case RecordStep():
             return step.record.name
         case RecordsStep():
@@ -269,13 +270,19 @@ def must_text(step: Step | Member) -> str:
 
 def count_unit(step: CountStep) -> str:
     """The unit of a count."""
-    return "items" if step.scale == 1 else "bytes"
+    return "bytes" if step.term.packed or step.term.factor > 1 else "items"
 
 
 def size_text(size: Size) -> str:
     """A size: ``4``, ``3 + 2*samples``."""
-    terms = [f"{term.factor}*{term.run}" if term.factor > 1 else term.run for term in size.terms]
-    return " + ".join([str(size.fixed)] * bool(size.fixed or not terms) + terms)
+    terms = map(term_text, size.terms)
+    return " + ".join([*[str(size.fixed)] * bool(size.fixed or not size.terms), *terms])
+
+
+def term_text(term: Term) -> str:
+    """The size of a run: ``2*samples``, ``(11*samples + 7) / 8``."""
+    product = f"{term.factor}*{term.run}" if term.factor > 1 else term.run
+    return f"({product} + 7) / 8" if term.packed else product
 
 
 def condition_text(rule: Condition) -> str:
@@ -297,6 +304,8 @@ def sizing_text(each: Sizing) -> str:
         case Learn():
             count, bounds = each.count, condition_text(each.count.bounds)
             return f"{count.run}: {_counted_text(count)}; {count.name} is {bounds}"
+        case Compare() if each.count.term.packed:
+            return f"{each.count.run}: {each.count.name} must be {term_text(each.count.term)}"
         case Compare():
             return f"{each.count.run}: {_counted_text(each.count)}, which must agree"
         case Infer():

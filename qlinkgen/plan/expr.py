@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from qlinkgen.model.integer import packed_size
+
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """``factor`` bytes for each item of the run ``run``."""
+    """``factor`` bytes for each item of the run ``run``, or bits if they are ``packed`` to whole bytes."""
 
     run: str
     factor: int
+    packed: bool = False
+
+    def value(self, number: int) -> int:
+        """The size in bytes of so many items."""
+        return packed_size(number, self.factor) if self.packed else number * self.factor
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +32,13 @@ class Size:
         """This size with more fixed bytes."""
         return Size(self.fixed + other, self.terms)
 
-    def plus(self, run: str, factor: int) -> Size:
+    def plus(self, term: Term) -> Size:
         """This size with a term for one more run."""
-        return Size(self.fixed, (*self.terms, Term(run, factor)))
+        return Size(self.fixed, (*self.terms, term))
 
     def value(self, counts: Mapping[str, int]) -> int:
         """The size in bytes for the given number of items of each run."""
-        return self.fixed + sum(term.factor * counts[term.run] for term in self.terms)
+        return self.fixed + sum(term.value(counts[term.run]) for term in self.terms)
 
 
 @dataclass(frozen=True, slots=True)

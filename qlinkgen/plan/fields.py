@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.model.integer import Integer
-from qlinkgen.plan.content import BadContent, broken, count_items
+from qlinkgen.plan.content import BadContent, broken, count_items, unpack_items
 from qlinkgen.plan.expr import Condition
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -25,6 +25,7 @@ from qlinkgen.plan.payload import (
     Step,
     ValueStep,
     least_size,
+    term_of,
 )
 from qlinkgen.plan.spans import Around, Span
 
@@ -64,6 +65,7 @@ class Fields:
         except BadContent:
             self.bad = sound
         self._judging = judging and sound and not self.bad
+        self._counts = counts
         self._divide(counts)
 
     def _divide(self, counts: Mapping[str, int]) -> None:
@@ -83,6 +85,8 @@ class Fields:
         match step:
             case BytesStep() | ItemsStep() | RecordsStep() if not step.fixed:
                 number = counts.get(step.name, self._learned.get(step.name))
+                if step.packed:
+                    return max(0, left) if number is None else term_of(step).value(number)
                 return step.item_size * (max(0, left) // step.item_size if number is None else number)
             case _:
                 return least_size(step)
@@ -135,10 +139,29 @@ class Fields:
 
     def _items(self, step: ItemsStep, raw: bytes, places: tuple[int, ...]) -> None:
         bad = None
+        if step.packed:
+            self._row(step, raw, places)
+            return
         for at in reversed(range(0, len(raw), step.item_size)):
             if _is_refused(step.item, step.conditions, raw[at : at + step.item_size]):
                 bad = places[at]
         self._span(step, places, None, bad)
+
+    def _row(self, step: ItemsStep, raw: bytes, places: tuple[int, ...]) -> None:
+        """Add a row of bits; the number of its span is that of its items."""
+        number = step.length.maximum
+        if not step.fixed:
+            number = self._counts.get(step.name, self._learned.get(step.name, 8 * len(raw) // step.item.bits))
+        bad = [
+            (at, item)
+            for at, item in enumerate(unpack_items(step, raw, number))
+            if broken(step.conditions, item)
+        ]
+        wrong = bool(bad) and self._judging
+        if wrong:
+            self.wrong.append(Wrong(step, bad[0][1], places[bad[0][0] * step.item.bits // 8]))
+        if places:
+            self.spans.append(Span(step, places, raw, len(places), number, "range" if wrong else ""))
 
     def _integer(
         self, step: Step, integer: Integer, rules: tuple[Condition, ...], places: tuple[int, ...]

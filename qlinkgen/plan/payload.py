@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import assert_never
 
-from qlinkgen.model.fields import Field, Layout, Record, Records
-from qlinkgen.model.integer import Integer
+from qlinkgen.model.fields import Field, FieldType, Layout, Record, Records
+from qlinkgen.model.integer import BitOrder, Integer
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import (
     Array,
@@ -29,7 +29,7 @@ from qlinkgen.model.types import (
     Scalar,
     Settable,
 )
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +100,7 @@ class CountStep:
     """The size of ``run``, in items or bytes; filled by the codec.
 
     Attributes:
-        scale: factor from items to the number sent: 1 if items are counted, the size of an item if bytes
-            are.
+        term: the number sent: the number of items, or the size of the run.
         bounds: minimum and maximum of the number sent.
     """
 
@@ -109,8 +108,14 @@ class CountStep:
     place: Place
     integer: Integer
     run: str
-    scale: int
+    term: Term
     bounds: Within
+
+    @property
+    def scale(self) -> int:
+        """Divisor from the number sent to the number of items, which a packed run does not have."""
+        assert not self.term.packed
+        return self.term.factor
 
 
 @dataclass(frozen=True)
@@ -151,6 +156,8 @@ class BytesStep:
 
     #: Bytes of one item.
     item_size = 1
+    #: See ItemsStep.
+    packed = None
     #: Suffix for the name of the number of bytes.
     quantity = "size"
 
@@ -162,7 +169,7 @@ class BytesStep:
 
 @dataclass(frozen=True)
 class ItemsStep:
-    """A run of integers."""
+    """A run of integers, of whole bytes each or, if it is ``packed``, of a few bits in a row."""
 
     name: str
     place: Place
@@ -171,13 +178,15 @@ class ItemsStep:
     length: Length
     default: tuple[int, ...]
     required: bool
+    packed: BitOrder | None
 
     #: Suffix for the name of the number of items.
     quantity = "count"
 
     @property
     def item_size(self) -> int:
-        """Bytes of one item."""
+        """Bytes of one item, which one that is packed does not have."""
+        assert not self.packed
         return self.item.size
 
     @property
@@ -233,6 +242,8 @@ class RecordsStep:
     length: Length
     required: bool
 
+    #: See ItemsStep.
+    packed = None
     #: Suffix for the name of the number of records.
     quantity = "count"
 
@@ -320,13 +331,13 @@ class PayloadPlan:
 
     def least_of(self, known: Collection[str]) -> Size:
         """Minimum size if the numbers of items of some runs are known; `size` if all are."""
-        fixed = sum(run.length.minimum * run.item_size for run in self.runs if run.name not in known)
+        fixed = sum(least_size(run) for run in self.runs if run.name not in known)
         return Size(self.size.fixed + fixed, tuple(term for term in self.size.terms if term.run in known))
 
     def sendable(self, run: RunStep) -> Within:
         """Numbers of items that can be sent: at most what each of its counts can hold."""
         counts = [step for step in self.steps if isinstance(step, CountStep) and step.run == run.name]
-        most = min([run.length.maximum, *(each.integer.maximum // each.scale for each in counts)])
+        most = min([run.length.maximum, *(_countable(each) for each in counts)])
         return Within(run.length.minimum, most)
 
     def run(self, name: str) -> RunStep:
@@ -375,7 +386,7 @@ def least_size(step: Step) -> int:
         case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
             return step.integer.size
         case BytesStep() | ItemsStep() | RecordsStep():
-            return step.length.minimum * step.item_size
+            return term_of(step).value(step.length.minimum)
         case RecordStep():
             return step.record.size
         case _:
@@ -391,6 +402,19 @@ def is_required(each: Holder) -> bool:
             return each.required
         case _:
             assert_never(each)
+
+
+def term_of(run: RunStep) -> Term:
+    """The size of a run."""
+    if run.packed:
+        return Term(run.name, run.item.bits, packed=True)
+    return Term(run.name, run.item_size)
+
+
+def _countable(count: CountStep) -> int:
+    """The maximum number of items that a count can tell."""
+    term, most = count.term, count.integer.maximum
+    return 8 * most // term.factor if term.packed else most // term.factor
 
 
 def conditions(number: Scalar) -> tuple[Condition, ...]:
@@ -446,7 +470,7 @@ class _Planner:
             rest = self._all[index:]
             back = sum(each.max_size for each in rest) if all(each.fixed for each in rest) else None
             steps.append(self._step(field, Place(front, back)))
-            front = front + field.max_size if field.fixed else front.plus(field.name, _item_size(field))
+            front = front + field.max_size if field.fixed else front.plus(_term(field.name, field.type))
         return PayloadPlan(
             steps=tuple(steps),
             sizing=tuple(self._sizing(steps, front)),
@@ -467,8 +491,9 @@ class _Planner:
                 return BytesStep(field.name, place, kind.text, kind.length, kind.default, kind.required)
             case Array():
                 return ItemsStep(
-                    field.name, place, kind.item.integer, kind.item, kind.length, kind.default, kind.required
-                )
+                    field.name, place, kind.item.integer, kind.item, kind.length, kind.default, kind.required,
+                    kind.packed,
+                )  # fmt: skip
             case Record():
                 return RecordStep(field.name, place, record_plan(kind.layout))
             case Records():
@@ -487,9 +512,9 @@ class _Planner:
             case Count(run, unit):
                 counted = self._fields[run].type
                 assert isinstance(counted, Blob | Array | Records)
-                scale = counted.item_size if unit == "bytes" else 1
-                bounds = Within(counted.length.minimum * scale, counted.length.maximum * scale)
-                return CountStep(name, place, scalar.integer, run, scale, bounds)
+                term = _term(run, counted) if unit == "bytes" else Term(run, 1)
+                bounds = Within(term.value(counted.length.minimum), term.value(counted.length.maximum))
+                return CountStep(name, place, scalar.integer, run, term, bounds)
             case _:
                 assert_never(scalar.role)
 
@@ -520,6 +545,18 @@ def _member(member: BitField) -> Member:
     return Member(member.name, member.shift, member.type.bits, member.type)
 
 
-def _item_size(field: Field) -> int:
-    assert isinstance(field.type, Blob | Array | Records)
-    return field.type.item_size
+def _term(name: str, kind: FieldType) -> Term:
+    """The size of a field of variable size."""
+    match kind:
+        case Array(packed=None):
+            return Term(name, kind.item.size)
+        case Array():
+            return Term(name, kind.item.bits, packed=True)
+        case Records():
+            return Term(name, kind.layout.size)
+        case Blob():
+            return Term(name, 1)
+        case Scalar() | Bits() | Record():
+            raise AssertionError(f"{name} has a constant size")
+        case _:
+            assert_never(kind)

@@ -76,7 +76,8 @@ class Span:
         places: wire offsets, ascending; a member has those of its integer.
         raw: the bytes at these offsets.
         size: the expected number of bytes.
-        number: the integer that they encode, None if they are incomplete or not an integer.
+        number: the integer that they encode, or the number of items in a row of bits; None if they are
+            incomplete or another field.
         fault: kind of the fault in them, "" if there is none.
         inside: the record that they are in, followed by a dot: "satellites[3]."; "" outside of records.
     """

@@ -13,15 +13,41 @@ from qlinkgen.schema.notation import TypeText, byte_string, shown, whole_range
 from qlinkgen.schema.numbers import defaulted, quantified
 from qlinkgen.schema.scalars import Meaning, ScalarBuilder
 
-_NUMBER_KEYS = ("byteorder", "groups", "parts", "scale", "offset", "range", "raw_range", "counts", "bits")
+_NUMBER_KEYS = (
+    "byteorder",
+    "groups",
+    "parts",
+    "scale",
+    "offset",
+    "range",
+    "raw_range",
+    "counts",
+    "bits",
+    "packed",
+)
 _WHOLE_KEYS = ("const", "reserved", "counts", "bits")
-_CONTAINER_KEYS = ("scale", "offset", "range", "raw_range", "default", "const", "reserved", "counts", "unit")
+_CONTAINER_KEYS = (
+    "packed",
+    "scale",
+    "offset",
+    "range",
+    "raw_range",
+    "default",
+    "const",
+    "reserved",
+    "counts",
+    "unit",
+)
 
 
-def build_length(text: TypeText, item_size: int, payload_max: int, location: Location) -> Length | None:
+#: Maximum number of bits in a row: an index of a bit is a size_t of C, which may have 16 bits.
+_MAX_BITS_IN_A_ROW = 0xFFF8
+
+
+def build_length(text: TypeText, item_bits: int, payload_max: int, location: Location) -> Length | None:
     """The number of items from the brackets of a type; without a number, up to the size of the payload."""
     if text.count is None or not text.count.strip():
-        return Length(0, payload_max // item_size)
+        return Length(0, 8 * payload_max // item_bits)
     try:
         first, last = whole_range(text.count)
     except ValueError:
@@ -36,8 +62,8 @@ def build_length(text: TypeText, item_size: int, payload_max: int, location: Loc
             "remove the field, or raise the count",
         )
         return None
-    if last * item_size > MAX_PAYLOAD:
-        what = f"{text.base}[{text.count}] has up to {last * item_size} bytes"
+    if last * item_bits > 8 * MAX_PAYLOAD:
+        what = f"{text.base}[{text.count}] has up to {last * item_bits // 8} bytes"
         location.fault("payload-too-long", "type", what, f"use at most {MAX_PAYLOAD}")
         return None
     return Length(first, last)
@@ -50,7 +76,7 @@ def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, location: Loca
         location.key_fault(
             "not-applicable", "const", f"'const' has no effect on {text.base}", "use integers with const"
         )
-    length = build_length(text, 1, payload_max, location)
+    length = build_length(text, 8, payload_max, location)
     if length is None:
         return None
     default = _blob_default(spec, text, length, location)
@@ -96,13 +122,18 @@ def build_array(
         else:
             what = f"the items of an array cannot have '{key}', as their type has"
             location.fault("bad-array", "type", what, "use a field for each")
-    length = build_length(text, item.size, payload_max, location)
+    length = build_length(text, item.bits if spec.packed else 8 * item.size, payload_max, location)
     if length is None:
         return None
     given = isinstance(spec.default, list) or "default" in location.written
     default = _array_default(spec.default, item, length, location) if given else ()
     required = spec.default is None and length.minimum > 0
-    return Array(item, length, default + (item.default,) * (length.minimum - len(default)), required)
+    if spec.packed and length.maximum * item.bits > _MAX_BITS_IN_A_ROW:
+        what = f"{length.maximum} items of {item.bits} bits are too many in a row"
+        location.fault("payload-too-long", "type", what, f"use at most {_MAX_BITS_IN_A_ROW // item.bits}")
+        return None
+    filled = default + (item.default,) * (length.minimum - len(default))
+    return Array(item, length, filled, spec.packed, required)
 
 
 def _array_default(given: object, item: Scalar, length: Length, location: Location) -> tuple[int, ...]:

@@ -75,7 +75,14 @@ class FieldBuilder:
         for index, field in enumerate(fields):
             if isinstance(field.type, Scalar) and isinstance(count := field.type.role, Count):
                 later = {other.name: other for other in fields[index + 1 :]}
-                if self._check_count(field, field.type, count, later, (*path, field.name, "counts")):
+                place = (*path, field.name, "counts")
+                if self._check_count(field, field.type, count, later, place):
+                    if count.unit == "bytes" and count.run not in counters and _is_packed(later[count.run]):
+                        what = f"{field.name} does not tell the number of items of {count.run}"
+                        hint = "a byte may hold several; put a count in items before it"
+                        self._report.error(
+                            "bad-count", place, what, hint, needs=(place[:-1], (*path, count.run))
+                        )
                     counters.setdefault(count.run, field.name)
         return [_with_counter(field, counters.get(field.name)) for field in fields]
 
@@ -93,7 +100,8 @@ class FieldBuilder:
             return False
         # An item of a byte string is a byte.
         unit = "bytes" if isinstance(target.type, Blob) else count.unit
-        most = target.type.length.maximum * (target.type.item_size if unit == "bytes" else 1)
+        most = target.type.length.maximum
+        most = target.type.size_of(most) if unit == "bytes" else most
         if most > scalar.maximum and (*path[:-2], target.name) not in self._types.unbounded:
             what = f"{field.name} counts up to {scalar.maximum}, but {target.name} has up to {most} {unit}"
             self._report.error(
@@ -102,6 +110,7 @@ class FieldBuilder:
         return True
 
     def _check_open_ends(self, fields: Sequence[Field], path: Path) -> None:
+        self._check_packed(fields, path)
         open_ends = [field.name for field in fields if is_open(field)]
         # An integer with an error may be the count of one of them.
         counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
@@ -115,6 +124,17 @@ class FieldBuilder:
             self._report.taint((*path, name))
         if open_ends:
             self._check_later_counts(open_ends[0], fields, path, counts)
+
+    def _check_packed(self, fields: Sequence[Field], path: Path) -> None:
+        """Check that a packed array of variable size has a count."""
+        counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
+        for field in fields:
+            if is_open(field) and _is_packed(field):
+                what = f"the size of the payload does not tell the number of items of {field.name}"
+                hint = f"add a field with counts: {field.name} before it, or use a fixed number"
+                place = (*path, field.name)
+                self._report.error("bad-count", place, what, hint, of_key=True, needs=(place, *counts))
+                self._report.taint(place)
 
     def _check_later_counts(
         self, name: str, fields: Sequence[Field], path: Path, counts: Sequence[Path]
@@ -146,10 +166,11 @@ class FieldBuilder:
     def _filled(self, field: Field, room: int, counters: Mapping[str, Scalar], path: Path) -> Field:
         kind, place = field.type, (*path, field.name)
         assert isinstance(kind, Blob | Array | Records)
-        most = max(0, room) // kind.item_size
+        most = kind.items_in(max(0, room))
         counter = counters.get(kind.length.counted_by)
         if counter and isinstance(counter.role, Count):
-            most = min(most, counter.maximum // (kind.item_size if counter.role.unit == "bytes" else 1))
+            limit = counter.maximum
+            most = min(most, kind.items_in(limit) if counter.role.unit == "bytes" else limit)
         if most == 0:
             what = f"the payload has no room for {field.name}"
             hint = f"the frame allows {self._payload_max} bytes; shorten the other fields"
@@ -163,6 +184,10 @@ def _with_counter(field: Field, counter: str | None) -> Field:
     if counter is None or not isinstance(kind, Blob | Array | Records):
         return field
     return replace(field, type=replace(kind, length=replace(kind.length, counted_by=counter)))
+
+
+def _is_packed(field: Field) -> bool:
+    return isinstance(field.type, Array) and field.type.packed is not None
 
 
 def is_open(field: Field) -> bool:

@@ -138,6 +138,9 @@ class FieldSpec(Fact):
     parts: list[WholeRange] | None = Field(
         default=None, description="Bit ranges in wire order; each begins a new byte"
     )
+    packed: Literal["least", "most"] | None = Field(
+        default=None, description="An array of bits in a row: which bits of a byte its first item has"
+    )
     scale: Rational | None = Field(default=None, description="Value of one step in the unit")
     offset: Rational | None = Field(default=None, description="Value of raw 0 in the unit")
     unit: Text | None = Field(default=None, description="Unit of the value")

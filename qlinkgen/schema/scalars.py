@@ -131,6 +131,8 @@ class ScalarBuilder:
 
     def build(self, spec: FieldSpec, base: str, plain: Plain, location: Location) -> Scalar | None:
         """The scalar of a field; None if its layout is unknown."""
+        if spec.packed and plain.meaning == "bool":
+            plain = replace(plain, bits=1)
         chunks = self._chunks(spec, plain.bits, base, location)
         if chunks is None:
             return None
@@ -149,7 +151,25 @@ class ScalarBuilder:
             return replace(scalar, role=Reserved())
         return scalar if spec.const is None else replace(scalar, role=Constant())
 
+    def _in_a_row(
+        self, spec: FieldSpec, bits: int, base: str, location: Location
+    ) -> tuple[Chunk, ...] | None:
+        """Items of a packed array have bits, but not bytes."""
+        if FLOAT.match(base):
+            location.fault("not-applicable", "packed", f"'packed' has no effect on {base}", "remove it")
+            return None
+        if not 1 <= bits <= MAX_BITS:
+            location.fault("bad-width", "type", f"{base} has {bits} bits", f"use 1 to {MAX_BITS}")
+            return None
+        if self._file.groups is not None:
+            what = f"bits in a row cannot be sent in groups of {self._file.groups.bits} bits"
+            location.fault("bad-width", "packed", what, "remove it")
+        location.reject(spec, ("byteorder", "groups", "parts"), "bits in a row")
+        return ()
+
     def _chunks(self, spec: FieldSpec, bits: int, base: str, location: Location) -> tuple[Chunk, ...] | None:
+        if spec.packed is not None:
+            return self._in_a_row(spec, bits, base, location)
         if not 1 <= bits <= MAX_BITS:
             location.fault("bad-width", "type", f"{base} has {bits} bits", f"use 1 to {MAX_BITS}")
             return None

@@ -118,6 +118,7 @@ class TypeBuilder:
             self._note_unbounded(text, location)
             item = self._scalars.build(_item(spec, text.base, location), text.base, plain, location)
             return build_array(item, spec, text, self._payload_max, location) if item else None
+        location.reject(spec, ("packed",), "a single number")
         if spec.bits is None:
             return self._scalars.build(spec, text.base, plain, location)
         container = self._scalars.build(_bare(spec, text.base), text.base, plain, location)
@@ -188,7 +189,7 @@ class TypeBuilder:
 
 def _item(spec: FieldSpec, base: str, location: Location) -> FieldSpec:
     """The keys of the items of an array, with the default of their named type."""
-    keys = ["byteorder", "groups", "parts", "scale", "offset", "unit", "range", "raw_range"]
+    keys = ["byteorder", "groups", "parts", "scale", "offset", "unit", "range", "raw_range", "packed"]
     keys += ["default"] if "default" not in location.written and not isinstance(spec.default, list) else []
     return FieldSpec(type=base).model_copy(update={key: getattr(spec, key) for key in keys})
 

@@ -210,7 +210,7 @@ def _cut(message: Message, most: int) -> Message:
 def _cut_field(each: Field, spare: int) -> Field:
     kind = each.type
     assert isinstance(kind, Array | Blob)
-    length = replace(kind.length, maximum=kind.length.maximum - -(-spare // kind.item_size))
+    length = replace(kind.length, maximum=kind.items_in(kind.size_of(kind.length.maximum) - spare))
     if isinstance(kind, Blob):
         return replace(each, type=replace(kind, length=length, default=kind.default[: length.maximum]))
     return replace(each, type=replace(kind, length=length, default=kind.default[: length.maximum]))

@@ -9,7 +9,7 @@ from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.encode import item_offset, loop
 from qlinkgen.backends.c.layout import pointer
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
-from qlinkgen.backends.c.sizes import Learner, index_of, local, size_text
+from qlinkgen.backends.c.sizes import Learner, index_of, local, size_text, term_text
 from qlinkgen.model import naming
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.types import Scalar
@@ -80,7 +80,7 @@ class Decoder(Learner):
                 self.refuse([f"size {'!=' if whole else '<'} {grouped(self.least)}"], "LENGTH")
             case Compare():
                 count = each.count
-                items = f"({count.scale}U * {local(count.run)})" if count.scale > 1 else local(count.run)
+                items = term_text(count.term, local(count.run))
                 number, own = self.number(count), Within(0, count.integer.maximum)
                 negative = checks.broken([own], number, Within(0, count.integer.mask), count.integer.bits)
                 self.refuse([f"{number} != {items}", *negative], "LENGTH")
@@ -136,9 +136,7 @@ class Decoder(Learner):
             case ItemsStep():
                 count = self._number_of(step)
                 outer, self.lines = self.lines, []
-                self._assign(
-                    f"{target}[index]", step.number, self._get(step.place, step.item, item_offset(step))
-                )
+                self._assign(f"{target}[index]", step.number, self._item(step))
                 self.lines = outer + loop(count, self.lines)
             case RecordStep():
                 self.lines += self._record(step.record, target, step.place)
@@ -155,6 +153,14 @@ class Decoder(Learner):
         at, upper = pointer("payload", index_of(place, local, further)), self.layouts.prefix.upper()
         call = f"{self.layouts.records[record.name]}_get_(&{target}, {at})"
         return checks.refusal([f"{call} != {upper}_OK"], f"{upper}_ERROR_RANGE")
+
+    def _item(self, step: ItemsStep) -> str:
+        """The bits of the item at an index."""
+        if not step.packed:
+            return self._get(step.place, step.item, item_offset(step))
+        self.reads = True
+        start = pointer("payload", index_of(step.place, local))
+        return self.layouts.get_row(step.item, step.packed, start, "index")
 
     def _get(self, place: Place, integer: Integer, further: str = "") -> str:
         """The bits of an integer; adds the check of its unused bits."""

@@ -71,7 +71,8 @@ def _wire_type(step: Step) -> str:
         case BytesStep():
             return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]"
         case ItemsStep():
-            return f"{_integer(step.item)}[{_length(step.length)}]{_order(step.item)}"
+            order = f" in a row, {step.packed} first" if step.packed else _order(step.item)
+            return f"{_integer(step.item)}[{_length(step.length)}]{order}"
         case RecordStep():
             return step.record.name
         case RecordsStep():

@@ -8,8 +8,8 @@ from typing import assert_never
 from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.layout import Layouts, pointer
 from qlinkgen.backends.c.names import count_type, unsigned, unsigned_type
-from qlinkgen.backends.c.sizes import index_of, local, local_size, size_text
-from qlinkgen.model.integer import Integer
+from qlinkgen.backends.c.sizes import index_of, local, local_size, size_text, term_text
+from qlinkgen.model.integer import BitOrder, Integer, packed_size
 from qlinkgen.model.naming import member as member_of
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Within
@@ -29,6 +29,7 @@ from qlinkgen.plan.payload import (
     RunStep,
     Step,
     ValueStep,
+    term_of,
 )
 
 
@@ -130,7 +131,10 @@ class Encoder:
                 pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
                 self._put(step.place, step.integer, pattern)
             case CountStep():
-                number = f"({local(step.run)} * {step.scale}U)" if step.scale > 1 else local(step.run)
+                number = (
+                    f"({local(step.run)} * {step.term.factor}U)" if step.term.factor > 1 else local(step.run)
+                )
+                number = f"((({number}) + 7U) / 8U)" if step.term.packed else number
                 self._put(step.place, step.integer, f"({unsigned_type(step.integer.bits)}){number}")
             case BitsStep():
                 self._put(step.place, step.integer, _whole(step))
@@ -139,6 +143,8 @@ class Encoder:
                 self.lines += self._loop(
                     step, [f"payload[{index}] = message->{member_of(step.name)}[index];"]
                 )
+            case ItemsStep() if step.packed:
+                self._write_row(step, step.packed)
             case ItemsStep():
                 item = checks.as_unsigned(step.number, f"message->{member_of(step.name)}[index]")
                 index = index_of(step.place, local_size, item_offset(step))
@@ -157,6 +163,17 @@ class Encoder:
 
     def _put_record(self, record: RecordPlan) -> str:
         return f"{self.layouts.records[record.name]}_put_"
+
+    def _write_row(self, step: ItemsStep, order: BitOrder) -> None:
+        """Clear the bytes, and set the bits of each item."""
+        most = packed_size(step.length.maximum, step.item.bits)
+        size = f"{most}U" if step.fixed else term_text(term_of(step), local_size(step.name))
+        place = index_of(step.place, local_size)
+        octet = index_of(step.place, local_size, "index")
+        self.lines += loop(size, [f"payload[{octet}] = 0U;"])
+        item = checks.as_unsigned(step.number, f"message->{member_of(step.name)}[index]")
+        put = self.layouts.put_row(step.item, order, pointer("payload", place), "index", item)
+        self.lines += self._loop(step, [put])
 
     def _put(self, place: Place, integer: Integer, value: str) -> None:
         self.lines.append(self.layouts.put(integer, "payload", index_of(place, local_size), value))

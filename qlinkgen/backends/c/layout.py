@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
-from qlinkgen.model.integer import Chunk, Integer
+from qlinkgen.model.integer import BitOrder, Chunk, Integer
 from qlinkgen.model.types import Scalar
 
 Chunks = tuple[Chunk, ...]
@@ -32,6 +32,8 @@ class Layouts:
     _names: dict[tuple[int, Chunks], str] = field(default_factory=dict)
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
+    #: Rows of bits that are read or written: the width of the C type of an item, and the order.
+    _rows: set[tuple[str, int, BitOrder]] = field(default_factory=set)
     #: Widths of the C types that need sign extension.
     extended: set[int] = field(default_factory=set)
 
@@ -67,6 +69,52 @@ class Layouts:
         self._partial.add((integer.bits, integer.chunks))
         return f"{self._call('unused_bits', integer)}({pointer(place, index)})"
 
+    def get_row(self, item: Integer, order: BitOrder, start: str, index: str) -> str:
+        """An expression for the unsigned value of an item in a row of bits."""
+        width = storage(item.bits)
+        self._rows.add(("get", width, order))
+        return f"{self.prefix}_get_row_{order}_{width}_({start}, {_times(item.bits, index)}, {item.bits}U)"
+
+    def put_row(self, item: Integer, order: BitOrder, start: str, index: str, value: str) -> str:
+        """A statement that sets the bits of an item in a row of zero bits."""
+        width = storage(item.bits)
+        self._rows.add(("put", width, order))
+        at = _times(item.bits, index)
+        return f"{self.prefix}_put_row_{order}_{width}_({start}, {at}, {item.bits}U, {value});"
+
+    def _row_helpers(self) -> list[Helper]:
+        found = []
+        for width, order in sorted({(width, order) for _, width, order in self._rows}):
+            lines: list[str] = []
+            place = "at % 8U" if order == "least" else "7U - (at % 8U)"
+            index = "bit" if order == "least" else "bits - 1U - bit"
+            parameters = "size_t at, size_t bits"
+            kind, name = f"uint{width}_t", f"row_{order}_{width}_"
+            if ("put", width, order) in self._rows:
+                lines += [
+                    f"static inline void {self.prefix}_put_{name}(uint8_t *to, {parameters}, {kind} value)",
+                    "{",
+                    "    for (size_t bit = 0U; bit < bits; ++bit, ++at) {",
+                    f"        const unsigned int one = (unsigned int)(value >> ({index})) & 1U;",
+                    f"        to[at / 8U] = (uint8_t)(to[at / 8U] | (one << ({place})));",
+                    "    }",
+                    "}",
+                ]
+            if ("get", width, order) in self._rows:
+                lines += [
+                    f"static inline {kind} {self.prefix}_get_{name}(const uint8_t *from, {parameters})",
+                    "{",
+                    f"    {kind} value = 0U;",
+                    "    for (size_t bit = 0U; bit < bits; ++bit, ++at) {",
+                    f"        const {kind} one = ({kind})((from[at / 8U] >> ({place})) & 1U);",
+                    f"        value = ({kind})(value | ({kind})(one << ({index})));",
+                    "    }",
+                    "    return value;",
+                    "}",
+                ]
+            found.append(Helper(f"Numbers in a row of bits, {order} significant ones first", tuple(lines)))
+        return found
+
     def extend(self, raw: str, bits: int) -> str:
         """An expression that sign-extends a number of ``bits`` bits."""
         width = storage(bits)
@@ -76,7 +124,8 @@ class Layouts:
 
     def helpers(self) -> list[Helper]:
         """The functions of all layouts in use."""
-        return [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
+        whole = [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
+        return [*whole, *self._row_helpers()]
 
     def _call(self, verb: str, integer: AnyInteger) -> str:
         key = (integer.bits, integer.chunks)
@@ -123,6 +172,10 @@ class Layouts:
             f"    return ({terms}) != 0U;",
             "}",
         ]
+
+
+def _times(factor: int, index: str) -> str:
+    return index if factor == 1 else f"{factor}U * {index}"
 
 
 def pointer(place: str, index: str) -> str:

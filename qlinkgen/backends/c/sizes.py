@@ -9,7 +9,7 @@ from qlinkgen.backends.c.checks import broken, refusal
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, grouped
 from qlinkgen.model.message import Message
-from qlinkgen.plan.expr import Size, Within
+from qlinkgen.plan.expr import Size, Term, Within
 from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place, payload_plan
 from qlinkgen.plan.tree import MessagePlan
 
@@ -17,10 +17,13 @@ from qlinkgen.plan.tree import MessagePlan
 def size_text(size: Size, count: Callable[[str], str]) -> str:
     """A size as an expression; ``count`` prints the number of items of a run as a size_t."""
     terms = [f"{size.fixed}U"] if size.fixed or not size.terms else []
-    for term in size.terms:
-        number = count(term.run)
-        terms.append(f"({term.factor}U * {number})" if term.factor > 1 else number)
-    return " + ".join(terms)
+    return " + ".join([*terms, *(term_text(term, count(term.run)) for term in size.terms)])
+
+
+def term_text(term: Term, number: str) -> str:
+    """The size of a run of so many items."""
+    product = f"({term.factor}U * {number})" if term.factor > 1 else number
+    return f"(({product} + 7U) / 8U)" if term.packed else product
 
 
 def size_terms(message: Message, struct: str) -> str:

@@ -32,12 +32,13 @@ _PACKAGE_DOC = '''\
 _SUPPORT = {
     "_fields": "ArrayField BitFields Bits Boolean BytesField Clear Count Groups Member Message OpenFlags "
     "Ranged Scaled TextField like",
+    "_packed": "PackedField",
     "_frames": "CRC Address Check Constant DelimitedFrame Fletcher Id Length Mark MarkedFrame Packet Payload "
     "Stuffing Sum Xor messages_of",
     "_frecords": "Record",
 }
 #: Copied only if a tree uses it.
-_OPTIONAL = {"_frecords": "Record"}
+_OPTIONAL = {"_frecords": "Record", "_packed": "PackedField"}
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
 }
@@ -67,7 +68,7 @@ def _imports(everything: tuple[Definition, ...]) -> str:
     by_origin: dict[str, list[str]] = {}
     for name in sorted(names, key=_order):
         by_origin.setdefault(_ORIGINS.get(name, "construct"), []).append(name)
-    blocks = (["decimal"], ["construct"], ["._fields", "._frames", "._frecords"])
+    blocks = (["decimal"], ["construct"], ["._fields", "._frames", "._frecords", "._packed"])
     lines = (
         "".join(_import(origin, by_origin[origin]) for origin in block if origin in by_origin)
         for block in blocks

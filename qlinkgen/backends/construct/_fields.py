@@ -266,12 +266,18 @@ class Scaled(Adapter):
 
 
 class Count(Subconstruct):
-    """The number of items of the field ``of``; ``step`` is the size of an item if bytes are counted."""
+    """The number of items of the field ``of``; ``step`` is the size of an item if bytes are counted.
 
-    def __init__(self, subcon: Construct, of: str, step: int = 1) -> None:
+    In the bytes of a ``packed`` field an item has ``step`` bits.
+    """
+
+    def __init__(
+        self, subcon: Construct, of: str, step: int = 1, *, packed: bool = False
+    ) -> None:
         super().__init__(subcon)
         self.of = of
         self.step = step
+        self.packed = packed
         self.flagbuildnone = True
 
     def number(self, data: bytes) -> int:
@@ -285,9 +291,13 @@ class Count(Subconstruct):
     def _build(
         self, obj: object, stream: BinaryIO, context: Container, path: str
     ) -> object:
-        return self.subcon._build(
-            len(context[self.of]) * self.step, stream, context, path
-        )
+        number = self.told(len(context[self.of]))
+        return self.subcon._build(number, stream, context, path)
+
+    def told(self, items: int) -> int:
+        """The number for so many items."""
+        number = items * self.step
+        return (number + 7) // 8 if self.packed else number
 
 
 class ArrayField(Construct):
@@ -299,6 +309,10 @@ class ArrayField(Construct):
         self.size = int(item.sizeof())
         self.minimum = minimum
         self.maximum = maximum
+
+    def extent(self, number: int) -> int:
+        """Size of so many items."""
+        return number * self.size
 
     def checked(self, number: int, path: str) -> int:
         """The number of items, checked against the limits."""
@@ -414,7 +428,7 @@ class Message(Construct):
 
     def _size(self, field: Renamed, counts: Mapping[str, int]) -> int:
         run = self.runs.get(field.name)
-        return run.size * counts.get(field.name, 0) if run else int(field.sizeof())
+        return run.extent(counts.get(field.name, 0)) if run else int(field.sizeof())
 
     def measured(self, take: Callable[[int], bytes]) -> bytes:
         """Read a payload with ``take``; its size follows from its counts."""
@@ -423,15 +437,20 @@ class Message(Construct):
             size = self._size(field, counts)
             if isinstance(field.subcon, Count) and field.subcon.of not in counts:
                 data += take(at + size - len(data))
-                counts[field.subcon.of] = self._learned(field, data[at:], "")
+                counts[field.subcon.of] = self._learned(field, data[at:], "", counts)
             at += size
         return data + take(at - len(data))
 
-    def _learned(self, field: Renamed, data: bytes, path: str) -> int:
-        """The number of items from a count."""
+    def _learned(
+        self, field: Renamed, data: bytes, path: str, known: Mapping[str, int]
+    ) -> int:
+        """The number of items from a count; that of packed bytes must be known already."""
         cell, of = data[: field.sizeof()], field.subcon.of
         if len(cell) < field.sizeof():
             raise RangeError(f"{field.name} is missing", path=path)
+        if field.subcon.packed:
+            number = known.get(of, 0)
+            return number if field.subcon.number(cell) == field.subcon.told(number) else -1
         number, rest = divmod(field.subcon.number(cell), field.subcon.step)
         if rest:
             raise RangeError(
@@ -439,8 +458,10 @@ class Message(Construct):
             )
         return self.runs[of].checked(number, path)
 
-    def _cells(self, data: bytes, path: str) -> list[tuple[Renamed, bytes]]:
-        """The fields with their bytes. Raises RangeError for wrong sizes."""
+    def _cells(
+        self, data: bytes, path: str
+    ) -> list[tuple[Renamed, bytes, int | None]]:
+        """The fields with their bytes and numbers of items. Raises RangeError for wrong sizes."""
         if not self.least <= len(data) <= self.most:
             raise RangeError(
                 f"{len(data)} bytes, {self.name} has {self.least}..{self.most}",
@@ -450,7 +471,7 @@ class Message(Construct):
         for field in self.fields:
             run = self.runs.get(field.name)
             if isinstance(field.subcon, Count):
-                number = self._learned(field, data[at:], path)
+                number = self._learned(field, data[at:], path, counts)
                 if counts.setdefault(field.subcon.of, number) != number:
                     raise RangeError(
                         f"{field.name} does not agree with {field.subcon.of}", path=path
@@ -464,7 +485,7 @@ class Message(Construct):
                     )
                 counts[field.name] = run.checked(number, path)
             size = self._size(field, counts)
-            cells.append((field, data[at : at + size]))
+            cells.append((field, data[at : at + size], counts.get(field.name)))
             at += size
         if at != len(data):
             raise RangeError(
@@ -477,8 +498,8 @@ class Message(Construct):
         if not data and self.empty_is_default:
             data = self.build({})
         values = Container()
-        for field, cell in self._cells(data, path):
-            found = field.parse(cell)
+        for field, cell, number in self._cells(data, path):
+            found = field.parse(cell, number=number)
             if isinstance(field.subcon, BitFields):
                 values.update(found)
             elif isinstance(field.subcon, Default):

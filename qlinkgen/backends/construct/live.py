@@ -45,7 +45,8 @@ class Live:
 
 def live(protocol: Protocol, options: Options | None = None) -> Live:
     """The structures of a protocol."""
-    modules = ("construct", f"{__package__}._fields", f"{__package__}._frames", f"{__package__}._frecords")
+    own = ("_fields", "_frames", "_frecords", "_packed")
+    modules = ("construct", *(f"{__package__}.{name}" for name in own))
     names: dict[str, Value] = {"Decimal": Decimal, "float": float}
     for module in modules:
         names |= vars(importlib.import_module(module))

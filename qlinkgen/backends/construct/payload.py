@@ -60,6 +60,14 @@ def _raw(number: Scalar, kind: Integer) -> Node:
     return integer(kind)
 
 
+def _item(step: ItemsStep) -> Node:
+    """The construct of an item; one in a row of bits is like a bit field."""
+    if not step.packed:
+        return _raw(step.number, step.item)
+    signed = (("signed", True),) if step.item.signed else ()
+    return Call("Bits", (0, step.item.bits - 1), signed)
+
+
 class Names:
     """Names of the definitions of a module: schema names in capitals, with a suffix if they are taken."""
 
@@ -132,7 +140,7 @@ class Types:
                 case ValueStep():
                     yield step.number, _raw(step.number, step.integer)
                 case ItemsStep():
-                    yield step.number, _raw(step.number, step.item)
+                    yield step.number, _item(step)
                 case BitsStep():
                     yield from ((each.number, _bits(each)) for each in step.members)
                 case ConstantStep() | ReservedStep() | CountStep() | BytesStep():
@@ -198,8 +206,7 @@ class _Field:
                 data = Call("Bytes", (step.integer.size,))
                 return self._named(step, Call("Rebuild", (data, step.integer.pack(step.value))))
             case CountStep():
-                scale = (step.scale,) if step.scale > 1 else ()
-                return self._named(step, Call("Count", (integer(step.integer), step.run, *scale)))
+                return self._named(step, _count(step))
             case BitsStep():
                 members = tuple(map(self._member, step.members))
                 return self._named(step, Call("BitFields", (integer(step.integer, signed=False), *members)))
@@ -209,9 +216,9 @@ class _Field:
                 )
                 return self._run(step, kind, (), default)
             case ItemsStep():
-                item = self._types.of(step.number, _raw(step.number, step.item))
+                kind, item = ("PackedField", _row(step)) if step.packed else ("ArrayField", ())
                 items = Sequence(tuple(_shown(step.number, each) for each in step.default))
-                return self._run(step, "ArrayField", (item,), items)
+                return self._run(step, kind, (self._types.of(step.number, _item(step)), *item), items)
             case RecordStep():
                 node = Call("Default", (Ref(self._types.records[step.record.name]), Call("Container")))
                 return self._named(step, node)
@@ -236,6 +243,18 @@ class _Field:
 
     def _value(self, number: Scalar, raw: Node) -> Node:
         return Call("Default", (self._types.of(number, raw), _shown(number, number.default)))
+
+
+def _count(step: CountStep) -> Call:
+    term = step.term
+    scale: tuple[Node, ...] = (term.factor,) if term.packed or term.factor > 1 else ()
+    packed = (("packed", True),) if term.packed else ()
+    return Call("Count", (integer(step.integer), step.run, *scale), packed)
+
+
+def _row(step: ItemsStep) -> tuple[Node, ...]:
+    """Bits of an item, and whether it begins with the most significant ones."""
+    return (step.item.bits, step.packed == "most")
 
 
 def _shown(number: Scalar, raw: int) -> Node:

@@ -11,7 +11,7 @@ from qlinkgen.backends.python.layout import WIDTH, indented, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
-from qlinkgen.model.integer import Integer
+from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Enum, Flags, Float, Scalar
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.framing import (
@@ -41,6 +41,7 @@ from qlinkgen.plan.payload import (
     Sizing,
     Step,
     ValueStep,
+    term_of,
 )
 from qlinkgen.plan.tree import MessagePlan
 
@@ -380,7 +381,8 @@ class Decoder:
         if self._tabled:
             number = self._size(step.integer, local, at, step.name, offset)
             items = f"len({_items_of(self._tabled)})"
-            expected = f"{step.scale} * {items}" if step.scale > 1 else items
+            factor = step.term.factor
+            expected = f"{factor} * {items}" if factor > 1 else items
             self._sizes += [f"if {number} != {expected}:", self._bad_layout]
         elif (taken := integers.get(step.integer, local, self.place.byteorder)).stray:
             self._get(step.integer, local, at)
@@ -426,8 +428,8 @@ class Decoder:
 
     def _slice(self, step: RunStep, target: str) -> None:
         """Assign the bytes of a run of variable size."""
-        front, size, data = step.place.front, step.item_size, self.place.data
-        count = f"{size} * {step.name}_count" if size > 1 else f"{step.name}_count"
+        front, term, data = step.place.front, term_of(step), self.place.data
+        count = integers.term_text(term)
         start = self._from(front)
         taken = slice_of(data, start, f"{start} + {count}" if start != "0" else count)
         # The argument may be a memoryview.
@@ -439,7 +441,10 @@ class Decoder:
         kind, plain = step.number.meaning, _is_plain(step.number)
         whole, target = f"message.{attribute(step.name)}", _items_of(step)
         code = floats.letter(step.number, step.item, self.place.byteorder)
-        if code and step.fixed:
+        if step.packed:
+            self._row_of_bits(step, target, at)
+            plain = plain or step.number.meaning == "bool"
+        elif code and step.fixed:
             row = self._row(at, starred=True)
             row.codes.append(f"{step.length.maximum}{code}")
             row.targets.append(f"*{target}")
@@ -486,6 +491,39 @@ class Decoder:
             f"except {place.use('DecodeError')} as error:",
             f"    raise {place.use('inside')}({', '.join(seen)}) from None",
         ]
+
+    def _row_of_bits(self, step: ItemsStep, target: str, at: Size) -> None:
+        """Unpack items of a few bits; bits after them are ignored."""
+        raw, bits, item = f"{step.name}_raw", step.item.bits, step.item
+        if step.fixed:
+            size = packed_size(step.length.maximum, bits)
+            row = self._row(at)
+            row.codes.append(f"{size}s")
+            row.targets.append(raw)
+        else:
+            self._slice(step, raw)
+        number = str(step.length.maximum) if step.fixed else f"{step.name}_count"
+        row_bits = (
+            number if bits == 1 else str(step.length.maximum * bits) if step.fixed else f"{bits} * {number}"
+        )
+        order = "little" if step.packed == "least" else "big"
+        whole = f'int.from_bytes({raw}, "{order}")'
+        if step.packed == "most":
+            spare = str(-step.length.maximum * bits % 8) if step.fixed else f"8 * len({raw}) - {row_bits}"
+            whole += f" >> {spare}" if spare != "0" else ""
+        self._values.append(f"{step.name}_whole = {whole}")
+        if step.number.meaning == "bool":  # the text of binary digits is faster than shifts
+            width = number if step.fixed else f"{{{number}}}"
+            back = "[::-1]" if step.packed == "least" else ""
+            digits = f'f"{{{step.name}_whole:0{width}b}}"{back}[:{number}]'
+            self._values.append(f'message.{attribute(step.name)} = [digit == "1" for digit in {digits}]')
+            return
+        last = str((step.length.maximum - 1) * bits) if step.fixed else f"{row_bits} - {bits}"
+        starts = f"range(0, {row_bits}, {bits})" if step.packed == "least" else f"range({last}, -1, -{bits})"
+        found = f"{step.name}_whole >> at & 0x{item.mask:X}"
+        if item.signed:
+            found = integers.sign_extended(f"({found})", bits)
+        self._values.append(f"{target} = [{found} for at in {starts}]")
 
     def _odd_items(self, step: ItemsStep, target: str, at: Size) -> None:
         """Unpack items that struct does not support, or not in this byte order."""
@@ -561,7 +599,7 @@ def _is_plain(number: Scalar) -> bool:
 
 
 def _expected(count: CountStep) -> str:
-    return f"{count.scale} * {count.run}_count" if count.scale > 1 else f"{count.run}_count"
+    return integers.term_text(count.term)
 
 
 def _divided(run: RunStep, number: str, unit: int, otherwise: str) -> list[str]:

@@ -13,7 +13,7 @@ from qlinkgen.backends.python.layout import (
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
-from qlinkgen.model.integer import Integer
+from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Float, Scalar
 from qlinkgen.plan.expr import Condition, Within
 from qlinkgen.plan.framing import (
@@ -39,6 +39,7 @@ from qlinkgen.plan.payload import (
     Step,
     ValueStep,
     limits,
+    term_of,
 )
 from qlinkgen.plan.tree import MessagePlan
 
@@ -168,10 +169,7 @@ class Encoder:
             case ConstantStep() | ReservedStep():
                 self._number(step.integer, step.value)
             case CountStep():
-                count = f"{step.run}_count"
-                self._computed(
-                    step.name, step.integer, f"{step.scale} * {count}" if step.scale > 1 else count
-                )
+                self._computed(step.name, step.integer, integers.term_text(step.term))
             case BitsStep():
                 self._bits(step)
             case BytesStep():
@@ -279,6 +277,9 @@ class Encoder:
                     f"{step.name}_items = [{self.scales[step.name]}.raw(item) for item in {source}]"
                 )
                 source = f"{step.name}_items"
+            if step.packed:
+                self._row_of_bits(step, source)
+                return
             if not code:
                 self._odd_items(step, source)
                 return
@@ -295,6 +296,31 @@ class Encoder:
         else:
             order = self.place.prefix
             self._pieces.append(f'{self.place.use("pack")}(f"{order}{{{step.name}_count}}{code}", *{source})')
+
+    def _row_of_bits(self, step: ItemsStep, source: str) -> None:
+        """Add items of a few bits: the text of their binary digits is faster than shifts."""
+        bits, mask = step.item.bits, step.item.mask
+        rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
+        self._terms += [f"all({integers.holds(rule, 'item')} for item in {source})" for rule in rules]
+        item = f"item & 0x{mask:X}" if step.item.signed else "item"
+        number = str(step.length.maximum) if step.fixed else f"{step.name}_count"
+        size = str(packed_size(step.length.maximum, bits)) if step.fixed else f"{step.name}_bytes"
+        if not step.fixed:
+            self._lines.append(f"{size} = {integers.term_text(term_of(step))}")
+        ordered = f"reversed({source})" if step.packed == "least" else source
+        digits = f'"".join([f"{{{item}:0{bits}b}}" for item in {ordered}]) or "0"'
+        whole = f"int({digits}, 2)"
+        if step.packed == "most":
+            row = f"{bits} * {number}" if bits > 1 else number
+            spare = str(-step.length.maximum * bits % 8) if step.fixed else f"8 * {size} - {row}"
+            whole = f"({whole} << {spare})" if spare != "0" else whole
+        order = "little" if step.packed == "least" else "big"
+        data = f'{whole}.to_bytes({size}, "{order}")'
+        self._late.append(f"{step.name}_octets = {data}")
+        if step.fixed:
+            self._add(f"{size}s", f"{step.name}_octets")
+        else:
+            self._pieces.append(f"{step.name}_octets")
 
     def _odd_items(self, step: ItemsStep, source: str) -> None:
         """Add items that struct does not support, in this byte order or with these conditions."""

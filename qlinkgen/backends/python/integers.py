@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.backends.python.layout import slice_of
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer
-from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Within
+from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 
 #: Format letters of struct for integers by size; lower case is signed.
 _LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
@@ -155,10 +155,14 @@ def broken(condition: Condition, number: str) -> str:
 def size_terms(size: Size) -> list[str]:
     """The terms of a size over the local variables of counts."""
     terms = [str(size.fixed)] if size.fixed or not size.terms else []
-    for term in size.terms:
-        count = f"{term.run}_count"
-        terms.append(f"{term.factor} * {count}" if term.factor > 1 else count)
-    return terms
+    return [*terms, *map(term_text, size.terms)]
+
+
+def term_text(term: Term) -> str:
+    """The size of a run over the local variable of its count."""
+    count = f"{term.run}_count"
+    product = f"{term.factor} * {count}" if term.factor > 1 else count
+    return f"({product} + 7) // 8" if term.packed else product
 
 
 def size_text(size: Size) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from qlinkgen.backends.python import integers
 from qlinkgen.plan.expr import Within
-from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan
+from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, term_of
 
 
 def measure_lines(payload: PayloadPlan) -> list[str]:
@@ -36,7 +36,7 @@ def _learned(payload: PayloadPlan, count: CountStep) -> list[str]:
         return f"{start} + {fixed}" if fixed else start
 
     number = integers.read(count.integer, "data", at)
-    least, item = run.length.minimum, run.item_size
+    least, term = run.length.minimum, term_of(run)
     lines += [f"if len(data) < {at(count.integer.size)}:", "    return size"]
     odd = ""
     if count.scale > 1:
@@ -44,10 +44,10 @@ def _learned(payload: PayloadPlan, count: CountStep) -> list[str]:
         lines.append(f"{name}, {count.run}_odd = divmod({number}, {count.scale})")
     else:
         lines.append(f"{name} = {number}")
-    more = f"({name} - {least})" if least and item > 1 else f"{name} - {least}" if least else name
+    more = integers.term_text(term) + (f" - {term.value(least)}" if least else "")
     return [
         *lines,
         f"if {odd}{integers.broken(Within(least, run.length.maximum), name)}:",
         f"    return -({at(count.integer.size)})",
-        f"size += {item} * {more}" if item > 1 else f"size += {more}",
+        f"size += {more}",
     ]

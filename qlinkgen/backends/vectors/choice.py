@@ -95,6 +95,8 @@ class Rule:
         return found
 
     def _bits(self, integer: Integer) -> int:
+        if not integer.chunks:  # in a row of bits
+            return int.from_bytes((self._pattern * 8)[:8], "little")
         return unpack_chunks((self._pattern * integer.size)[: integer.size], integer.chunks)
 
     def _chosen(self, scalar: Scalar, bits: int) -> int:

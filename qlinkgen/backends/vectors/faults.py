@@ -16,7 +16,7 @@ from qlinkgen.backends.vectors.choice import filled
 from qlinkgen.backends.vectors.writer import Json
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.content import Raw, count_items, pack
+from qlinkgen.plan.content import Raw, count_items, pack, pack_items, unpack_items
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -309,7 +309,7 @@ def _spoilt_simple(step: SimpleStep, data: bytes) -> Iterator[tuple[str, int, by
             if step.text and step.length.minimum:
                 yield step.name, data[0] | 0x80, bytes((data[0] | 0x80,))
         case ItemsStep():
-            yield from _beside(step.name, step.item, step.conditions if step.length.minimum else ())
+            yield from _items(step, data)
         case ReservedStep():
             pass
         case _:
@@ -321,6 +321,19 @@ def _spoilt_record(name: str, record: RecordPlan, data: bytes) -> Iterator[tuple
         at = step.place.front.fixed
         for inner, number, spoilt in _spoilt(step, data[at:]):
             yield f"{name}.{inner}", number, data[:at] + spoilt
+
+
+def _items(step: ItemsStep, data: bytes) -> Iterator[tuple[str, int, bytes]]:
+    """An illegal first item of a run that has always some."""
+    if not step.length.minimum:
+        return
+    if not step.packed:
+        yield from _beside(step.name, step.item, step.conditions)
+        return
+    items = unpack_items(step, data, step.length.minimum)
+    for rule in step.conditions:
+        for number in _outside(rule, step.item.minimum, step.item.maximum):
+            yield step.name, number, pack_items(step, [number, *items[1:]])
 
 
 def _beside(name: str, integer: Integer, rules: Iterable[Condition]) -> Iterator[tuple[str, int, bytes]]:

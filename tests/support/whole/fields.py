@@ -215,6 +215,9 @@ class FieldMaker:
         base, _, count = written["type"].partition("[")
         if base in self.records:
             return int(self.records[base].size * int(count.rstrip("]") or 1))
+        if "packed" in written:
+            base = self.enums.get(base, {"type": base})["type"]
+            return -(-int(count.rstrip("]")) * (1 if base == "bool" else int(base[1:])) // 8)
         named = self.named.get(base)
         if named is not None:
             return self._packet_size(
@@ -416,6 +419,9 @@ class FieldMaker:
         if roll < 0.5 and self.shape.text:
             spec = {"type": f"text[{number}]"}
             return spec | ({"default": "a" * number} if rng.random() < 0.5 else {}), number
+        if roll > 0.85 and not self.shape.groups:
+            kind, spec, bits = self._bits_in_a_row()
+            return {"type": f"{kind}[{number}]", **spec}, -(-bits * number // 8)
         kind, order, size = self._item()
         return {"type": f"{kind}[{number}]", **order}, size * number
 
@@ -426,6 +432,41 @@ class FieldMaker:
         if self.rng.random() < 0.3:
             spec = {"type": spec, "doc": self.words.text()}
         return spec, self.records[name].size * max(1, times)
+
+    def _bits_in_a_row(self) -> tuple[str, Doc, int]:
+        """Type, keys and bits of an item of a packed array."""
+        rng = self.rng
+        kind = rng.choice(("bool", "bool", "u1", "u3", "i5", "u11", "i11", "u8", "u13", "u24", "i33", "u64"))
+        bits = 1 if kind == "bool" else int(kind[1:])
+        keys: Doc = {"packed": rng.choice(("least", "most"))}
+        small = next((name for name, enum in self.enums.items() if enum["type"] == "u3"), "")
+        if kind == "u3" and small:
+            return small, keys, 3
+        if bits > 1 and rng.random() < 0.3:
+            keys |= rng.choice(({"range": "1..2"}, {"scale": "1/2"}, {"range": "0..1"}))
+        return kind, keys, bits
+
+    def _row(self, name: str, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
+        """A packed array of variable size, with a count of its items and perhaps one of its bytes."""
+        rng = self.rng
+        kind, spec, bits = self._bits_in_a_row()
+        most = min(rng.choice((1, 3, 8, 17, 40, 250)), (room.left - room.least - 6) * 8 // bits)
+        if most < 2:
+            return
+        opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
+        self._count(name, "items", most, made, opened, taken=taken, room=room)
+        if rng.random() < 0.4:
+            after = next(
+                at
+                for at, (_, each) in enumerate(made)
+                if isinstance(each, dict) and each.get("counts") == name
+            )
+            size, before = -(-most * bits // 8), made[: after + 1]
+            del made[: after + 1]
+            self._count(name, "bytes", size, made, opened - after, taken=taken, room=room)
+            made[:0] = before
+        made.append((name, {"type": f"{kind}[{rng.choice((0, 0, 1, most - 1))}..{most}]", **spec}))
+        room.left -= -(-most * bits // 8)
 
     def _packed(self, taken: set[str]) -> tuple[Any, int]:
         """Bit fields of every kind inside an integer."""
@@ -461,6 +502,9 @@ class FieldMaker:
     def _variable(self, name: str, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         """A field of variable size: with one or two preceding counts, or as the rest of the payload."""
         rng = self.rng
+        if rng.random() < 0.15 and not self.shape.groups:
+            self._row(name, made, taken, room)
+            return
         kind, spec, step = self._variable_kind()
         most = min(rng.choice((1, 3, 8, 40, 250)), (room.left - room.least - 4) // step)
         if most < 1:

@@ -87,11 +87,21 @@ class Run:
     low: int
     high: int | None
     default: tuple[int, ...]
+    #: Items of a few bits in a row, the first one in these bits.
+    packed: str = ""
 
     @property
     def step(self) -> int:
         """Size of an item."""
         return len(self.item.pieces) if self.item else 1
+
+    def bytes_of(self, number: int) -> int:
+        """Size of so many items."""
+        return -(-number * self.item.bits // 8) if self.packed and self.item else number * self.step
+
+    def items_in(self, size: int) -> int:
+        """Number of items that fit."""
+        return 8 * size // self.item.bits if self.packed and self.item else size // self.step
 
     @property
     def most(self) -> int:
@@ -132,11 +142,20 @@ class Records:
     record: Record
     low: int
     high: int | None
+    packed: str = ""
 
     @property
     def step(self) -> int:
         """Size of an item."""
         return self.record.size
+
+    def bytes_of(self, number: int) -> int:
+        """Size of so many records."""
+        return number * self.step
+
+    def items_in(self, size: int) -> int:
+        """Number of records that fit."""
+        return size // self.step
 
     @property
     def most(self) -> int:
@@ -169,13 +188,13 @@ class Slot:
     def least_bytes(self) -> int:
         """Minimum size on the wire."""
         kind = self.kind
-        return kind.step * kind.low if isinstance(kind, Run | Records) else size_of(kind)
+        return kind.bytes_of(kind.low) if isinstance(kind, Run | Records) else size_of(kind)
 
     @property
     def most_bytes(self) -> int:
         """Maximum size on the wire; 0 for a run without a bound."""
         kind = self.kind
-        return kind.step * (kind.high or 0) if isinstance(kind, Run | Records) else size_of(kind)
+        return kind.bytes_of(kind.high or 0) if isinstance(kind, Run | Records) else size_of(kind)
 
 
 def size_of(kind: Number | Packed | Record) -> int:
@@ -340,11 +359,13 @@ class Fields:
             text = str(spec["default"])
             default = tuple(text.encode("ascii") if base == "text" else bytes.fromhex(text))
         fill = item.default if item else ord(" ") if base == "text" else 0
-        return Run(item, base == "text", low, high, default + (fill,) * (low - len(default)))
+        filled = default + (fill,) * (low - len(default))
+        return Run(item, base == "text", low, high, filled, spec.get("packed", ""))
 
     def _number(self, base: str, spec: Doc) -> Number:
         bits, signed, scale, truth, forbidden = self._carrier(base)
-        pieces = self._pieces(bits, spec)
+        bits = 1 if truth and "packed" in spec else bits
+        pieces = () if "packed" in spec else self._pieces(bits, spec)
         low = 0 if not signed else -(1 << bits - 1)
         high = 1 if truth else (1 << bits - signed) - 1
         real = base in ("f16", "f32", "f64")
@@ -444,10 +465,11 @@ def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
     kind = slot.kind
     if not isinstance(kind, Run | Records) or kind.high is not None:
         return slot
-    most = max(0, room) // kind.step
+    most = kind.items_in(max(0, room))
     if counter is not None:
         assert isinstance(counter.kind, Number)
-        most = min(most, counter.kind.high // (kind.step if counter.counts_in == "bytes" else 1))
+        limit = counter.kind.high
+        most = min(most, kind.items_in(limit) if counter.counts_in == "bytes" else limit)
     return replace(slot, kind=replace(kind, high=max(1, most)))
 
 

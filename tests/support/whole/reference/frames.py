@@ -329,7 +329,7 @@ def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) ->
     for slot in message.slots:
         kind = slot.kind
         size = (
-            kind.step * counted.get(slot.name, kind.most)
+            kind.bytes_of(counted.get(slot.name, kind.most))
             if isinstance(kind, Run | Records)
             else size_of(kind)
         )

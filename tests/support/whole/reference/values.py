@@ -100,7 +100,8 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
         given = values[slot.counts]
         assert isinstance(counted, Run | Records)
         assert not isinstance(given, int)
-        return put(kind.pieces, len(given) * (counted.step if slot.counts_in == "bytes" else 1))
+        told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
+        return put(kind.pieces, told)
     return put(kind.pieces, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
 
 
@@ -114,6 +115,14 @@ def _encoded_run(kind: Run, given: Raw) -> bytes:
     assert not isinstance(given, int)
     if not kind.low <= len(given) <= kind.most:
         raise Wrong("range", f"{len(given)} items")
+    if kind.item and kind.packed:
+        assert isinstance(given, list)
+        numbers = [_number(kind.item, each) & (1 << kind.item.bits) - 1 for each in given]
+        digits = [f"{each:0{kind.item.bits}b}" for each in numbers]
+        text = "".join(each if kind.packed == "most" else each[::-1] for each in digits)
+        text += "0" * (-len(text) % 8)
+        octets = [text[at : at + 8] for at in range(0, len(text), 8)]
+        return bytes(int(each if kind.packed == "most" else each[::-1], 2) for each in octets)
     if kind.item:
         return b"".join(put(kind.item.pieces, _number(kind.item, each)) for each in given)  # type: ignore[arg-type]
     assert isinstance(given, bytes)
@@ -127,12 +136,12 @@ def decode(message: Message, payload: bytes) -> dict[str, Raw]:
     if not payload and message.empty_is_default:
         return {name: default(kind) for name, kind in message.values()}
     values: dict[str, Raw] = {}
-    for slot, data in _cut(message, payload):
-        values |= _decoded(slot, data)
+    for slot, data, number in _cut(message, payload):
+        values |= _decoded(slot, data, number)
     return values
 
 
-def _decoded(slot: Slot, data: bytes) -> dict[str, Raw]:
+def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
     kind = slot.kind
     if isinstance(kind, Record):
         return {slot.name: _decoded_record(kind, data)}
@@ -140,7 +149,7 @@ def _decoded(slot: Slot, data: bytes) -> dict[str, Raw]:
         starts = range(0, len(data), kind.step)
         return {slot.name: [_decoded_record(kind.record, data[at : at + kind.step]) for at in starts]}
     if isinstance(kind, Run):
-        return {slot.name: _decoded_run(kind, data)}
+        return {slot.name: _decoded_run(kind, data, kind.most if number is None else number)}
     if slot.role == "reserved":
         return {}
     if stray(kind.pieces, data):
@@ -163,7 +172,7 @@ def _decoded_record(kind: Record, data: bytes) -> dict[str, Raw]:
     values: dict[str, Raw] = {}
     at = 0
     for slot in kind.slots:
-        values |= _decoded(slot, data[at : at + slot.most_bytes])
+        values |= _decoded(slot, data[at : at + slot.most_bytes], None)
         at += slot.most_bytes
     return values
 
@@ -179,7 +188,12 @@ def _checked(number: Number, raw: int) -> int:
     return number.told(raw)
 
 
-def _decoded_run(kind: Run, data: bytes) -> Raw:
+def _decoded_run(kind: Run, data: bytes, number: int) -> Raw:
+    if kind.item and kind.packed:
+        most, bits = kind.packed == "most", kind.item.bits
+        text = "".join(f"{byte:08b}" if most else f"{byte:08b}"[::-1] for byte in data)
+        digits = [text[at : at + bits] for at in range(0, number * bits, bits)]
+        return [_checked(kind.item, int(each if most else each[::-1], 2)) for each in digits]
     if kind.item is None:
         if kind.text and any(each > 0x7F for each in data):
             raise Wrong("range", "text")
@@ -193,9 +207,9 @@ def _decoded_run(kind: Run, data: bytes) -> Raw:
     return items
 
 
-def _cut(message: Message, payload: bytes) -> list[tuple[Slot, bytes]]:
+def _cut(message: Message, payload: bytes) -> list[tuple[Slot, bytes, int | None]]:
     """The bytes of each field."""
-    cut: list[tuple[Slot, bytes]] = []
+    cut: list[tuple[Slot, bytes, int | None]] = []
     counted: dict[str, int] = {}
     at = 0
     for index, slot in enumerate(message.slots):
@@ -208,7 +222,7 @@ def _cut(message: Message, payload: bytes) -> list[tuple[Slot, bytes]]:
             raise Wrong("length", slot.name)
         if slot.counts:
             _note(message, slot, data, counted)
-        cut.append((slot, data))
+        cut.append((slot, data, counted.get(slot.name)))
         at += size
     if at != len(payload):
         raise Wrong("length", "bytes are left")
@@ -220,8 +234,8 @@ def _size(slot: Slot, counted: Mapping[str, int]) -> int | None:
     if not isinstance(kind, Run | Records):
         return size_of(kind)
     if slot.name in counted:
-        return counted[slot.name] * kind.step
-    return kind.most * kind.step if slot.fixed else None
+        return kind.bytes_of(counted[slot.name])
+    return kind.bytes_of(kind.most) if slot.fixed else None
 
 
 def _behind(slots: Sequence[Slot], counted: Mapping[str, int]) -> int:
@@ -239,7 +253,13 @@ def _demand(kind: Kind, size: int) -> None:
 def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) -> None:
     """Read a count; a second one must agree."""
     assert isinstance(slot.kind, Number)
-    items = items_of(message, slot, get(slot.kind.pieces, data))
+    raw = get(slot.kind.pieces, data)
+    run = next(each.kind for each in message.slots if each.name == slot.counts)
+    if isinstance(run, Run) and run.packed and slot.counts_in == "bytes":
+        if raw != run.bytes_of(counted[slot.counts]):
+            raise Wrong("length", "counts differ")
+        return
+    items = items_of(message, slot, raw)
     if counted.setdefault(slot.counts, items) != items:
         raise Wrong("length", "counts differ")
 
