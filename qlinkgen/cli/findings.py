@@ -15,10 +15,20 @@ from qlinkgen.plan.describe import (
     limits_text,
     number_of,
     number_text,
+    part_text,
     span_text,
     value_text,
 )
-from qlinkgen.plan.framing import ByLength, ByMark, CheckPart, ConstantPart, LengthPart, MarkPart
+from qlinkgen.plan.framing import (
+    ByLength,
+    ByMark,
+    CellPart,
+    CheckPart,
+    ConstantPart,
+    EqualPart,
+    LengthPart,
+    MarkPart,
+)
 from qlinkgen.plan.payload import ConstantStep, Member, Step
 from qlinkgen.plan.spans import Dissection, Fault, Rule
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
@@ -53,8 +63,7 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             cause = "the capture begins inside another frame, or the beginning of one was lost"
             return f"{counted(fault.seen)} before the {_start(found)}, outside a frame", cause
         case Rule.CONSTANT:
-            assert isinstance(of, ConstantPart)
-            return f"{of.name} is {found.cells[of.name].data.hex(' ')}, must be {of.data.hex(' ')}", ""
+            return _constant(found, fault)
         case Rule.WHOLE:
             return _missing(found, fault)
         case Rule.ALONE:
@@ -105,6 +114,16 @@ def _beginning(found: Dissection, fault: Fault) -> Words:
     preamble = found.plan.frame.envelope.preamble.hex(" ")
     cause = "the capture began late, or a byte of the preamble was lost"
     return f"preamble {preamble} missing", cause
+
+
+def _constant(found: Dissection, fault: Fault) -> Words:
+    part = fault.of
+    assert isinstance(part, ConstantPart | CellPart | EqualPart)
+    right = part.data.hex(" ") if isinstance(part, ConstantPart) else part_text(part, found.plan.frame)
+    if isinstance(part, EqualPart):
+        other = part.of.integer.unpack(found.cells[part.of.name].data)
+        right = f"{right}: {part.integer.pack(part.value(other)).hex(' ')}"
+    return f"{part.name} is {found.cells[part.name].data.hex(' ')}, must be {right}", ""
 
 
 def _start(found: Dissection) -> str:

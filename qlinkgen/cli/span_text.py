@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import assert_never
 
 from qlinkgen.plan.content import unpack_items
-from qlinkgen.plan.describe import id_text, value_text
+from qlinkgen.plan.describe import id_text, part_text, value_text
 from qlinkgen.plan.framing import (
     AddressPart,
+    CellPart,
     CheckPart,
     ConstantPart,
+    EqualPart,
     IdPart,
     LengthPart,
     MarkPart,
@@ -63,6 +65,8 @@ def _of_part(found: Dissection, part: Part, span: Span) -> str:
             return str(span.number)
         case IdPart():
             return _id(found)
+        case CellPart() | EqualPart():
+            return f"0x{span.number or 0:0{2 * part.size}X}, {part_text(part, found.plan.frame)}"
         case MarkPart():
             return _mark(found, part, span)
         case PayloadPart():

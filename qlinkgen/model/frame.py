@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -12,7 +13,7 @@ from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Scalar
 
 #: The role of a part of a frame.
-Role = Literal["constant", "length", "message", "address", "payload", "checksum"]
+Role = Literal["constant", "length", "message", "address", "payload", "checksum", "bits", "derived"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +50,47 @@ class Checksum:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PartBits:
+    """Consecutive bits of a part.
+
+    ``shift`` is the lowest of them in the integer of the part, ``at`` the place of a piece of the message
+    id in the whole id.
+    """
+
+    name: str
+    role: Literal["message", "direction", "address", "constant"]
+    shift: int
+    bits: int
+    at: int = 0
+    #: Legal values of a constant; the first is sent.
+    constants: tuple[int, ...] = ()
+    #: The value for each direction.
+    directions: Mapping[str, int] = field(default_factory=dict)
+    doc: Text = ""
+
+    @property
+    def is_id(self) -> bool:
+        """Whether they are a piece of the message id."""
+        return self.role in ("message", "direction")
+
+    @property
+    def mask(self) -> int:
+        """Mask of the bits, in place."""
+        return ((1 << self.bits) - 1) << self.shift
+
+
+@dataclass(frozen=True, slots=True)
+class Derivation:
+    """A number that follows from an earlier part: complemented if ``inverted``, plus ``added``."""
+
+    of: str
+    inverted: bool = False
+    added: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """A part of a frame. ``scalar`` is the integer of a length, message id or address."""
+    """A part of a frame. ``scalar`` is the integer of all parts but constants, payload and checksum."""
 
     name: str
     role: Role
@@ -60,6 +100,10 @@ class Part:
     constant: bytes = b""
     scalar: Scalar | None = None
     checksum: Checksum | None = None
+    #: What its bits hold: all of a message id or address, those described of a part with role "bits", whose
+    #: others are sent as 0 and ignored when received.
+    bits: tuple[PartBits, ...] = ()
+    derivation: Derivation | None = None
     #: Names of the parts that a length counts.
     counts: tuple[str, ...] = ()
     #: Payload only: minimum and maximum size.
@@ -112,6 +156,18 @@ class DelimitedFrame:
         """Difference between the length field and the payload size."""
         length = self.part("length")
         return sum(part.size for part in self.parts if length and part.name in length.counts)
+
+    @cached_property
+    def id_bits(self) -> tuple[PartBits, ...]:
+        """The pieces of the message id, the most significant first; a whole part is one piece."""
+        found = [bits for part in self.parts for bits in part.bits if bits.is_id]
+        return tuple(sorted(found, key=lambda each: -each.at))
+
+    @property
+    def address(self) -> PartBits | None:
+        """The address, None if there is none."""
+        found = (bits for part in self.parts for bits in part.bits)
+        return next((each for each in found if each.role == "address"), None)
 
     @property
     def payload(self) -> Part:

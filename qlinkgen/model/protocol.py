@@ -74,8 +74,7 @@ class Protocol:
             case MarkedFrame():
                 return self.frame.address_name
             case DelimitedFrame():
-                part = self.frame.part("address")
-                return part.name if part else None
+                return self.frame.address.name if self.frame.address else None
             case PacketFrame():
                 return None
             case _:

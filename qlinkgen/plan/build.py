@@ -10,9 +10,11 @@ from qlinkgen.plan import select
 from qlinkgen.plan.expr import OneOf, Within
 from qlinkgen.plan.framing import (
     AddressPart,
+    CellPart,
     CheckPart,
     ConstantPart,
     Envelope,
+    EqualPart,
     FramePlan,
     IdPart,
     LengthPart,
@@ -94,7 +96,7 @@ def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
             return int(message.id == mark)
         case AddressPart(size=1):
             return int(any(first <= mark <= last for first, last in message.addresses))
-        case LengthPart() | IdPart() | AddressPart() | CheckPart() | MarkPart():
+        case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart() | CheckPart() | MarkPart():
             return part.size
         case _:
             assert_never(part)

@@ -3,12 +3,12 @@
 Every target checks a whole frame in this order:
 
 1. data that is empty or shorter than the frame: ``truncated``;
-2. in wire order, up to the end of the header: a wrong constant is ``frame``, a wrong inserted byte
-   ``stuffing``, a length out of range ``length``; in a frame without a length an unknown message number is
-   ``unknown``, and a count out of range ``length``;
+2. in wire order, up to the end of the header: a wrong constant or derived number is ``frame``, a wrong
+   inserted byte ``stuffing``, a length out of range ``length``; in a frame without a length an unknown
+   message number is ``unknown``, and a count out of range ``length``;
 3. a wrong check value over parts of the header alone, before the payload: ``crc``;
-4. a wrong constant after the payload: ``frame``; where only the payload is stuffed, a wrong inserted byte is
-   ``stuffing`` and a payload that is too long ``length``;
+4. a wrong constant or derived number after the payload: ``frame``; where only the payload is stuffed, a wrong
+   inserted byte is ``stuffing`` and a payload that is too long ``length``;
 5. bytes after the end: ``length``;
 6. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
 7. a message number that the direction does not have: ``unknown``;
@@ -30,24 +30,31 @@ from qlinkgen.plan import content
 from qlinkgen.plan.content import BadContent, Raw, Unsendable
 from qlinkgen.plan.framing import (
     AddressPart,
+    AddressSlot,
+    CellPart,
     CheckPart,
     ConstantPart,
+    ConstantSlot,
     Envelope,
+    EqualPart,
     Hunt,
     IdPart,
+    IdSlot,
     InStep,
     LengthPart,
     MarkPart,
     Marks,
+    Numeric,
     PayloadPart,
     Rescan,
+    Slot,
 )
 from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, read_marked
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Parts whose bytes do not depend on other parts.
-Unchecked = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | PayloadPart
+Unchecked = ConstantPart | Numeric | MarkPart | PayloadPart
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,15 +218,41 @@ def _cell(part: Unchecked, payload: bytes, number: int, address: int) -> bytes:
     match part:
         case ConstantPart():
             return part.data
-        case LengthPart():
-            return part.integer.pack(len(payload) + part.bias)
-        case IdPart():
-            return part.integer.pack(number)
-        case AddressPart():
-            return part.integer.pack(address)
+        case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
+            return part.integer.pack(_number(part, payload, number, address))
         case MarkPart():
             return bytes((part.byte(number, address),))
         case PayloadPart():
             return payload
         case _:
             assert_never(part)
+
+
+def _number(part: Numeric, payload: bytes, number: int, address: int) -> int:
+    """The integer of a part."""
+    match part:
+        case LengthPart():
+            return len(payload) + part.bias
+        case IdPart():
+            return number
+        case AddressPart():
+            return address
+        case CellPart():
+            return sum(_bits(slot, number, address) << slot.shift for slot in part.slots)
+        case EqualPart():
+            return part.value(_number(part.of, payload, number, address))
+        case _:
+            assert_never(part)
+
+
+def _bits(slot: Slot, number: int, address: int) -> int:
+    """The bits of a slot."""
+    match slot:
+        case IdSlot():
+            return number >> slot.at & (1 << slot.bits) - 1
+        case AddressSlot():
+            return address
+        case ConstantSlot():
+            return slot.values[0]
+        case _:
+            assert_never(slot)

@@ -24,14 +24,19 @@ from qlinkgen.plan.check import Check
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 from qlinkgen.plan.framing import (
     AddressPart,
+    AddressSlot,
     ByLength,
     ByMark,
     ByMessage,
+    CellPart,
     CheckPart,
     ConstantPart,
+    ConstantSlot,
+    EqualPart,
     FramePlan,
     Hunt,
     IdPart,
+    IdSlot,
     InStep,
     LengthPart,
     MarkPart,
@@ -39,6 +44,7 @@ from qlinkgen.plan.framing import (
     Part,
     PayloadPart,
     Rescan,
+    Slot,
 )
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -340,6 +346,11 @@ def part_text(part: Part, frame: FramePlan) -> str:
         case MarkPart():
             what = part.id_name if part.end_id is None else f"{part.end_id} in place of {part.id_name}"
             return f"0x{part.marker:02X}, {part.address_name}, {what}"
+        case CellPart():
+            return "; ".join(f"bits {_slot_text(part, slot)}" for slot in part.slots)
+        case EqualPart():
+            added = f" {part.added:+d}".replace("+", "+ ").replace("-", "- ") if part.added else ""
+            return f"{'complement of ' if part.inverted else ''}{part.of.name}{added}"
         case PayloadPart():
             return "the message's fields"
         case CheckPart():
@@ -347,6 +358,22 @@ def part_text(part: Part, frame: FramePlan) -> str:
             return text if part.check.complete else f"{text}; bits {_sent_bits_text(part.check)} are sent"
         case _:
             assert_never(part)
+
+
+def _slot_text(part: CellPart, slot: Slot) -> str:
+    last = slot.shift + slot.bits - 1
+    place = span_text(slot.shift, last)
+    match slot:
+        case IdSlot():
+            return f"{place} message id" + (
+                f" from bit {slot.at}" if slot.at or slot.bits < part.integer.bits else ""
+            )
+        case AddressSlot():
+            return f"{place} address"
+        case ConstantSlot():
+            return f"{place} {' or '.join(f'0x{value:X}' for value in slot.values)}"
+        case _:
+            assert_never(slot)
 
 
 def check_text(check: Check, frame: FramePlan) -> str:

@@ -22,17 +22,21 @@ from qlinkgen.plan.framing import (
     ByLength,
     ByMark,
     ByMessage,
+    CellPart,
     CheckPart,
     ConstantPart,
+    EqualPart,
     Hunt,
     IdPart,
     LengthPart,
     MarkPart,
+    Numeric,
     Part,
     PayloadPart,
+    gathered,
 )
 from qlinkgen.plan.payload import Member, Step
-from qlinkgen.plan.reading import BadFrame, Cursor, Incomplete
+from qlinkgen.plan.reading import BadFrame, Cursor, Incomplete, is_wrong
 from qlinkgen.plan.spans import Around, Cell, Dissection, Fault, Rule, Span
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -187,6 +191,7 @@ class _Walk:
             if isinstance(part, MarkPart) and self._interrupted(part):
                 self.wanted[part.name] = 0
             self._take(part, self.wanted.get(part.name, part.size))
+        self._identify()
 
     def _interrupted(self, part: MarkPart) -> bool:
         """Whether a header occurs in place of the end."""
@@ -265,19 +270,13 @@ class _Walk:
         """Set number, address and message as far as received."""
         if self.frame.needs_request and self.direction == "response":
             self.number = self.request[0] if self.request else None
-        for part in self.envelope.front:
-            match part:
-                case IdPart():
-                    self.number = self._number_in(part, part.integer)
-                case AddressPart():
-                    self.address = self._number_in(part, part.integer)
-                case MarkPart():
-                    byte = self.cells[part.name].data[0]
-                    self.number, self.address = part.id_of(byte), part.address_of(byte)
-                case ConstantPart() | LengthPart() | PayloadPart() | CheckPart():
-                    pass
-                case _:
-                    assert_never(part)
+        elif isinstance(first := self.envelope.parts[0], MarkPart):
+            byte = self.cells[first.name].data[0]
+            self.number, self.address = first.id_of(byte), first.address_of(byte)
+        else:
+            cells = {name: cell.data for name, cell in self.cells.items()}
+            self.number = gathered(self.envelope.id, cells)
+            self.address = gathered(self.envelope.address, cells) if self.envelope.address else None
         self.message = None if self.number is None else self.known.get(self.number)
 
     def _number_in(self, part: Part, integer: Integer) -> int | None:
@@ -347,12 +346,8 @@ class _Walk:
             match part:
                 case ConstantPart():
                     self._constant(part)
-                case LengthPart():
-                    self._length(part)
-                case IdPart():
-                    self._span(part, self.number, "unknown" if self._unknown(part) else "")
-                case AddressPart():
-                    self._span(part, self.address, self._addressed(part))
+                case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
+                    self._numeric(part)
                 case MarkPart():
                     self._mark(part)
                 case PayloadPart():
@@ -364,12 +359,41 @@ class _Walk:
         if self.frame.needs_request and self.direction == "response" and self.message is None:
             self._fault("unknown", Rule.MESSAGE, 0, seen=self.number)
 
+    def _numeric(self, part: Numeric) -> None:
+        match part:
+            case LengthPart():
+                self._length(part)
+            case IdPart():
+                self._span(part, self.number, "unknown" if self._unknown(part) else "")
+            case AddressPart():
+                self._span(part, self.address, self._addressed(part))
+            case CellPart() | EqualPart():
+                self._cell(part)
+            case _:
+                assert_never(part)
+
     def _constant(self, part: ConstantPart) -> None:
         data, places = self._found(part).data, self._found(part).places
         wrong = not part.data.startswith(data)
         if wrong:
             self._fault("frame", Rule.CONSTANT, places[0], part)
         self._span(part, None, "frame" if wrong else "")
+
+    def _cell(self, part: CellPart | EqualPart) -> None:
+        """Check the constants, the message number and the address in the bits of an integer."""
+        cells, number = (
+            {name: cell.data for name, cell in self.cells.items()},
+            self._number_in(part, part.integer),
+        )
+        fault = ""
+        if number is not None and is_wrong(part, cells):
+            fault = "frame"
+            self._fault(fault, Rule.CONSTANT, self._found(part).places[0], part, number)
+        if self.envelope.id and self.envelope.id[-1].part is part and self._unknown(part):
+            fault = fault or "unknown"
+        if isinstance(part, CellPart) and any(bits.part is part for bits in self.envelope.address):
+            fault = fault or self._addressed(part)
+        self._span(part, number, fault)
 
     def _bound(self, part: LengthPart) -> None:
         number = self._number_in(part, part.integer)
@@ -387,7 +411,7 @@ class _Walk:
         self._fault(kind, Rule.MESSAGE, self._found(part).places[0], part, self.number)
         return True
 
-    def _addressed(self, part: AddressPart | MarkPart) -> str:
+    def _addressed(self, part: AddressPart | CellPart | MarkPart) -> str:
         """The kind of fault in the address, "" if there is none."""
         allowed = self.message.allowed if self.message else None
         if self.address is None or allowed is None or allowed.holds(self.address):

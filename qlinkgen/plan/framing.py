@@ -7,12 +7,12 @@ protocol is an id and a payload, its response a payload and a check value.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.frame import Part as StatedPart
 from qlinkgen.model.integer import Chunk, Integer, byte_chunks
 from qlinkgen.model.message import Direction
@@ -143,7 +143,118 @@ class CheckPart:
         return self.check.size
 
 
-Part = ConstantPart | LengthPart | IdPart | AddressPart | MarkPart | PayloadPart | CheckPart
+@dataclass(frozen=True, slots=True)
+class IdSlot:
+    """Bits with a piece of the message number, which begins at its bit ``at``."""
+
+    shift: int
+    bits: int
+    at: int
+
+
+@dataclass(frozen=True, slots=True)
+class AddressSlot:
+    """Bits with the address of the node."""
+
+    shift: int
+    bits: int
+
+    #: Place in the address.
+    at = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantSlot:
+    """Bits with one of several legal numbers, the first of which is sent."""
+
+    shift: int
+    bits: int
+    values: tuple[int, ...]
+
+    def holds(self, number: int) -> bool:
+        """Whether the bits of the integer have a legal value."""
+        return number >> self.shift & (1 << self.bits) - 1 in self.values
+
+
+Slot = IdSlot | AddressSlot | ConstantSlot
+
+
+@dataclass(frozen=True, slots=True)
+class CellPart:
+    """An integer whose bits have several roles; bits without one are sent as 0 and ignored when received."""
+
+    name: str
+    integer: Integer
+    slots: tuple[Slot, ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return self.integer.size
+
+    @property
+    def constants(self) -> tuple[ConstantSlot, ...]:
+        """The constants among its bits."""
+        return tuple(slot for slot in self.slots if isinstance(slot, ConstantSlot))
+
+
+@dataclass(frozen=True, slots=True)
+class EqualPart:
+    """An integer derived from an earlier one of the same size: inverted or not, plus ``added``."""
+
+    name: str
+    integer: Integer
+    of: LengthPart | IdPart | AddressPart | CellPart
+    inverted: bool
+    added: int
+
+    @property
+    def size(self) -> int:
+        """Bytes before stuffing."""
+        return self.integer.size
+
+    def value(self, number: int) -> int:
+        """The integer for a value of the other."""
+        return ((~number if self.inverted else number) + self.added) & self.integer.mask
+
+
+@dataclass(frozen=True, slots=True)
+class Bits:
+    """Where bits of a message number or an address travel: in a part from bit ``shift`` on.
+
+    Attributes:
+        at: their first bit in the number.
+    """
+
+    part: IdPart | AddressPart | CellPart
+    shift: int
+    bits: int
+    at: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether the part holds them alone."""
+        return self.bits == self.part.integer.bits
+
+    @property
+    def mask(self) -> int:
+        """Mask of the bits, before they are shifted into place."""
+        return (1 << self.bits) - 1
+
+
+def gathered(pieces: tuple[Bits, ...], cells: Mapping[str, bytes]) -> int | None:
+    """The number or address in the bytes of parts; None if a piece is missing."""
+    number = 0
+    for bits in pieces:
+        data = cells.get(bits.part.name, b"")
+        if len(data) < bits.part.size:
+            return None
+        number |= (bits.part.integer.unpack(data) >> bits.shift & bits.mask) << bits.at
+    return number
+
+
+Numeric = LengthPart | IdPart | AddressPart | CellPart | EqualPart
+Part = ConstantPart | Numeric | MarkPart | PayloadPart | CheckPart
 
 
 # The end of a frame -----------------------------------------------------------------------------------------
@@ -277,15 +388,15 @@ class Envelope:
         """The length, None if there is none."""
         return next((part for part in self.parts if isinstance(part, LengthPart)), None)
 
-    @property
-    def id(self) -> IdPart | None:
-        """The number of the message, None if it shares a byte or is not sent."""
-        return next((part for part in self.parts if isinstance(part, IdPart)), None)
+    @cached_property
+    def id(self) -> tuple[Bits, ...]:
+        """The pieces of the message number in wire order, () if it shares a marked byte or is not sent."""
+        return tuple(bits for part in self.parts for bits in _bits_of(part, IdPart, IdSlot))
 
-    @property
-    def address(self) -> AddressPart | None:
-        """The address, None if it shares a byte or is not sent."""
-        return next((part for part in self.parts if isinstance(part, AddressPart)), None)
+    @cached_property
+    def address(self) -> tuple[Bits, ...]:
+        """The bits of the address, () if it shares a marked byte or is not sent."""
+        return tuple(bits for part in self.parts for bits in _bits_of(part, AddressPart, AddressSlot))
 
     @cached_property
     def checks(self) -> tuple[CheckPart, ...]:
@@ -314,6 +425,15 @@ class Envelope:
             left.remove(part)
             done.append(part)
         return tuple(done)
+
+    def known_at(self, part: Part, pieces: tuple[Bits, ...]) -> bool:
+        """Whether a receiver of the header knows all pieces at the end of this part."""
+        done = self.front[: self.front.index(part) + 1]
+        return all(bits.part in done for bits in pieces)
+
+    def identifies(self, part: Part) -> bool:
+        """Whether the part holds bits of the message number or the address."""
+        return any(bits.part is part for bits in (*self.id, *self.address))
 
     def offset(self, wanted: Part) -> int:
         """Offset of a part; the payload counts as empty."""
@@ -348,6 +468,17 @@ class Envelope:
                     runs.append([part])
                 last = index
         return tuple(map(tuple, runs))
+
+
+def _bits_of(part: Part, whole: type[Part], slot: type[Slot]) -> Iterator[Bits]:
+    if isinstance(part, IdPart | AddressPart) and isinstance(part, whole):
+        yield Bits(part, 0, part.integer.bits, 0)
+    elif isinstance(part, CellPart):
+        yield from (
+            Bits(part, each.shift, each.bits, each.at)
+            for each in part.slots
+            if isinstance(each, slot) and not isinstance(each, ConstantSlot)
+        )
 
 
 @dataclass(frozen=True)
@@ -387,6 +518,14 @@ class FramePlan:
         return isinstance(self.receiver, InStep)
 
     @property
+    def checks_header(self) -> bool:
+        """Whether only message number and address in the header distinguish a frame from noise."""
+        envelope = self.envelope
+        identifying = (part for part in envelope.front if envelope.identifies(part))
+        bare = isinstance(self.receiver, Rescan) and self.receiver.bare
+        return bare and any(envelope.known_at(part, envelope.id) for part in identifying)
+
+    @property
     def max_payload(self) -> int:
         """Maximum payload size of the frame."""
         return self.envelope.payload.most
@@ -424,14 +563,15 @@ def frame_plan(frame: Frame) -> FramePlan:
 
 def _delimited(frame: DelimitedFrame) -> FramePlan:
     transparency = _transparency(frame)
-    envelope = Envelope(tuple(_part(frame, part, transparency) for part in frame.parts))
+    envelope = Envelope(_parts(frame, transparency))
+    address = frame.address
     return FramePlan(
         envelopes=dict.fromkeys(("request", "response", "message"), envelope),
         end=ByLength(envelope.length) if envelope.length else ByMessage(),
         transparency=transparency,
         receiver=_receiver(envelope, transparency),
-        address=envelope.address.name if envelope.address else "",
-        id_name=envelope.id.name if envelope.id else "",
+        address=address.name if address else "",
+        id_name=frame.id_bits[-1].name if frame.id_bits else "",
     )
 
 
@@ -448,6 +588,21 @@ def _transparency(frame: DelimitedFrame) -> Transparency:
     return FrameStuffing(rule, sum(part.size for part in front), sum(part.size for part in back))
 
 
+def _parts(frame: DelimitedFrame, transparency: Transparency) -> tuple[Part, ...]:
+    parts: dict[str, Part] = {}
+    for part in frame.parts:
+        parts[part.name] = _derived(part, parts) if part.derivation else _part(frame, part, transparency)
+    return tuple(parts.values())
+
+
+def _derived(part: StatedPart, before: Mapping[str, Part]) -> Part:
+    assert part.scalar is not None
+    assert part.derivation is not None
+    source = before[part.derivation.of]
+    assert isinstance(source, LengthPart | IdPart | AddressPart | CellPart)
+    return EqualPart(part.name, part.scalar.integer, source, part.derivation.inverted, part.derivation.added)
+
+
 def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -> Part:
     match part.role:
         case "constant":
@@ -457,8 +612,10 @@ def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -
         case "checksum":
             assert part.checksum is not None
             return CheckPart(part.name, Check(part.checksum))
-        case "length" | "message" | "address":
+        case "length" | "message" | "address" | "bits":
             return _integer_part(frame, part, transparency)
+        case "derived":
+            raise AssertionError(f"{part.name} follows from another part")
         case _:
             assert_never(part.role)
 
@@ -466,13 +623,27 @@ def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -
 def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -> Part:
     assert part.scalar is not None
     integer = part.scalar.integer
-    if part.role == "message":
+    if part.role == "message" and part.bits == frame.id_bits:
         return IdPart(part.name, integer)
     if part.role == "address":
         return AddressPart(part.name, integer)
+    if part.bits:
+        return CellPart(part.name, integer, tuple(map(_slot, part.bits)))
     bias, payload = frame.length_bias, frame.payload
     most = min(integer.maximum, bias + transparency.most_sent(payload.max_size))
     return LengthPart(part.name, integer, bias, bias + payload.min_size, most)
+
+
+def _slot(bits: PartBits) -> Slot:
+    match bits.role:
+        case "message" | "direction":
+            return IdSlot(bits.shift, bits.bits, bits.at)
+        case "address":
+            return AddressSlot(bits.shift, bits.bits)
+        case "constant":
+            return ConstantSlot(bits.shift, bits.bits, bits.constants)
+        case _:
+            assert_never(bits.role)
 
 
 def _receiver(envelope: Envelope, transparency: Transparency) -> Receiver:
@@ -500,8 +671,8 @@ def _unique(envelope: Envelope, stuffing: FrameStuffing) -> bool:
         return False
     assert check is not None
     inner = envelope.parts[1:-1]
-    plain = not any(isinstance(part, ConstantPart) for part in inner)
-    number = envelope.id is not None and envelope.id.size == 1
+    plain = not any(isinstance(part, ConstantPart | CellPart | EqualPart) for part in inner)
+    number = [bits.part.size for bits in envelope.id] == [1]
     return plain and number and envelope.coverage(check) == (inner,) and check.check.regular is not None
 
 

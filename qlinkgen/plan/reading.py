@@ -17,15 +17,19 @@ from qlinkgen.plan.framing import (
     ByLength,
     ByMark,
     ByMessage,
+    CellPart,
     CheckPart,
     ConstantPart,
+    EqualPart,
     FramePlan,
     IdPart,
     LengthPart,
     MarkPart,
+    Numeric,
     Part,
     PayloadPart,
     Rescan,
+    gathered,
 )
 from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan
@@ -190,6 +194,7 @@ class FrameReader:
         """
         rule = self._whole.rule if self._whole else None
         cursor, taken = Cursor(wire, start, rule, hunting=hunting), Taken()
+        self._identify(taken)
         length = 0
         for part in self._envelope.front:
             length = self._head(cursor, part, taken) or length
@@ -197,6 +202,7 @@ class FrameReader:
         sent = self._payload(cursor, taken, length)
         for part in self._envelope.back:
             taken.cells[part.name] = self._take(cursor, part, part.size)
+        self._identify(taken)
         taken.end = cursor.at
         taken.due = bytes((rule.insert,)) if rule and cursor.due else b""
         taken.payload = self._judged(taken, sent)
@@ -215,10 +221,9 @@ class FrameReader:
                     if taken.cells[part.name][-1] != byte:
                         raise NoFrame("frame", cursor.at - 1)
                 return 0
-            case LengthPart() | IdPart() | AddressPart():
-                data = self._take(cursor, part, part.size)
-                taken.cells[part.name] = data
-                return self._number(cursor, part, part.integer.unpack(data), taken)
+            case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
+                taken.cells[part.name] = self._take(cursor, part, part.size)
+                return self._numeric(cursor, part, taken)
             case CheckPart():
                 taken.cells[part.name] = self._take(cursor, part, part.size)
                 return 0
@@ -234,23 +239,24 @@ class FrameReader:
             if taken.cells[part.name] != part.check.pack(value):
                 raise BadFrame("crc", cursor.at)
 
-    def _number(
-        self, cursor: Cursor, part: LengthPart | IdPart | AddressPart, value: int, taken: Taken
-    ) -> int:
-        match part:
-            case LengthPart():
-                if not part.least <= value <= part.most:
-                    raise BadFrame("length", cursor.at)
-                return value
-            case IdPart():
-                taken.number = value
-            case AddressPart():
-                taken.address = value
-            case _:
-                assert_never(part)
-        if self._bare:
-            self._check_known(cursor, taken)
+    def _numeric(self, cursor: Cursor, part: Numeric, taken: Taken) -> int:
+        """Check a number of the header; returns the value of a length."""
+        if isinstance(part, LengthPart):
+            value = part.integer.unpack(taken.cells[part.name])
+            if not part.least <= value <= part.most:
+                raise BadFrame("length", cursor.at)
+            return value
+        if is_wrong(part, taken.cells):
+            raise NoFrame("frame", cursor.at)
+        if self._envelope.identifies(part):
+            self._identify(taken)
+            if self._bare:
+                self._check_known(cursor, taken)
         return 0
+
+    def _identify(self, taken: Taken) -> None:
+        taken.number = gathered(self._envelope.id, taken.cells)
+        taken.address = gathered(self._envelope.address, taken.cells) if self._envelope.address else None
 
     def _check_known(self, cursor: Cursor, taken: Taken) -> None:
         """Without a leading constant, only number and address distinguish a frame from noise."""
@@ -292,9 +298,9 @@ class FrameReader:
                 return sent + self._take(cursor, part, size - len(sent))
 
     def _judged(self, taken: Taken, sent: bytes) -> bytes:
-        """The unstuffed payload; checks the constants after it."""
+        """The unstuffed payload; checks the constants and derived numbers after it."""
         for part in self._envelope.back:
-            if isinstance(part, ConstantPart) and taken.cells[part.name] != part.data:
+            if is_wrong(part, taken.cells):
                 raise BadFrame("frame", taken.end)
         if self._alone is None:
             return sent
@@ -304,6 +310,23 @@ class FrameReader:
         if len(payload) > self._envelope.payload.most:
             raise BadFrame("length", taken.end)
         return payload
+
+
+def is_wrong(part: Part, cells: Mapping[str, bytes]) -> bool:
+    """Whether a received constant, or a derived number, is wrong."""
+    match part:
+        case ConstantPart():
+            return cells[part.name] != part.data
+        case CellPart():
+            number = part.integer.unpack(cells[part.name])
+            return not all(slot.holds(number) for slot in part.constants)
+        case EqualPart():
+            right = part.value(part.of.integer.unpack(cells[part.of.name]))
+            return part.integer.unpack(cells[part.name]) != right
+        case LengthPart() | IdPart() | AddressPart() | MarkPart() | PayloadPart() | CheckPart():
+            return False
+        case _:
+            assert_never(part)
 
 
 def read_marked(plan: FramePlan, known: Mapping[int, MessagePlan], wire: bytes) -> Taken:

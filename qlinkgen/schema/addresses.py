@@ -38,8 +38,7 @@ def _highest(frame: Frame) -> int | None:
         case MarkedFrame():
             return frame.address_bits.mask
         case DelimitedFrame():
-            part = frame.part("address")
-            return part.scalar.maximum if part and part.scalar else None
+            return (1 << frame.address.bits) - 1 if frame.address else None
         case PacketFrame():
             return None
         case _:

@@ -21,7 +21,7 @@ from qlinkgen.schema.file_model import (
 from qlinkgen.schema.kinds import Label
 from qlinkgen.schema.layouts import fields_of, fields_path
 from qlinkgen.schema.messages import MessageBuilder, Written
-from qlinkgen.schema.notation import AnswerId, Duration, shown
+from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
@@ -82,7 +82,7 @@ class CommandBuilder:
         self.commands.append(
             Command(
                 name=name,
-                id=spec.id,
+                id=request.id,
                 request=request,
                 response=response,
                 addressing=addressing,
@@ -128,7 +128,7 @@ class CommandBuilder:
         self._check_answered(addressing, response, path)
         section, build = self._section(spec), self._build.directed
         place = (*path, "request") if spec.request is not None else ("defaults", "request")
-        written = Written("request", spec.id, (*path, "id"), request or {}, place)
+        written = Written("request", StatedId(spec.id), (*path, "id"), request or {}, place)
         asked = build(name, spec, written, addressing=addressing, section=section)
         self.messages.append(asked)
         if response is None or response == "none":
@@ -261,15 +261,17 @@ class CommandBuilder:
 
     def _called(self, message: Message) -> str:
         """The name of what states the number of a message: a command, or a message with one of its own."""
-        spec = self._file.commands.get(message.command)
-        return message.name if spec and spec.id != message.id else message.command
+        own = self._build.id_places[message.name] not in (
+            ("commands", message.command, "id"),
+            ("messages", message.name, "id"),
+        )
+        return message.name if own else message.command
 
     def _check_id_fits(self, message: Message, path: Path) -> None:
         most = 0xFF
         match self._frame:
             case DelimitedFrame():
-                part = self._frame.part("message")
-                most = part.scalar.maximum if part and part.scalar else most
+                return  # checked when it was composed
             case MarkedFrame():
                 most = self._frame.id_bits.mask
                 if message.id == self._frame.end_id:

@@ -29,6 +29,7 @@ from qlinkgen.schema.kinds import (
     AnyRange,
     ByteText,
     Characters,
+    Consts,
     Count,
     Id,
     Label,
@@ -161,9 +162,14 @@ class FieldSpec(Fact):
     )
 
 
-PartRole = Literal["constant", "length", "message", "address", "payload", "checksum"]
+PartRole = Literal["constant", "length", "message", "address", "direction", "payload", "checksum"]
+#: What a part turns out to be: its role, or an integer whose bits have several, or that follows from another.
+PartKind = PartRole | Literal["bits", "derived"]
 #: The role that a key tells.
-_TELLING: Final[Mapping[str, PartRole]] = {
+_TELLING: Final[Mapping[str, PartKind]] = {
+    "bits": "bits",
+    "equals": "derived",
+    "const": "constant",
     "counts": "length",
     "value": "constant",
     "text": "constant",
@@ -172,6 +178,7 @@ _TELLING: Final[Mapping[str, PartRole]] = {
 #: Bytes as a short form; names are in lower case.
 _HEX_PAIRS = re.compile(r"\s*(?:[0-9A-F]{2}\s*)+\Z", re.ASCII)
 
+Directions = Annotated[dict[Literal["request", "response"], Id], Field(min_length=2)]
 ShortField = Annotated[FieldSpec, ShortForm("type", "string")]
 Fields = dict[str, ShortField]
 
@@ -219,16 +226,36 @@ AnyAlgorithm = Annotated[
 ]
 
 
+class PartBitSpec(_Mapping):
+    """Consecutive bits of a part of a frame."""
+
+    at: WholeRange = Field(description="Bit, or first..last bit; 0 is the least significant")
+    role: Literal["message", "address", "direction"] | None = Field(
+        default=None, description="What they hold, unless they are constant"
+    )
+    const: Consts | None = Field(default=None, description="Legal values, the first of which is sent")
+    values: Directions | None = Field(default=None, description="The value for each direction")
+    doc: Text = Field(default="", description="Description, in one sentence")
+
+
 class PartSpec(Fact):
     """A part of a frame."""
 
     role: PartRole | None = Field(
         default=None, description="Role of the part, if no other key tells it: counts, value, text, algorithm"
     )
-    type: str | None = Field(default=None, description="Integer type: u8, u16, u24, u32 or u64")
+    type: str | None = Field(default=None, description="Integer type: u8, u16 ... u64")
     byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
     value: ByteText | None = Field(default=None, description="The constant bytes")
     text: Characters | None = Field(default=None, description="The constant bytes, as characters")
+    const: Consts | None = Field(
+        default=None, description="Legal values of a constant integer, the first of which is sent"
+    )
+    values: Directions | None = Field(default=None, description="The value for each direction")
+    equals: str | None = Field(
+        default=None, description="Earlier part with the same value; ~PART, PART + N: derived from it"
+    )
+    bits: dict[str, PartBitSpec] | None = Field(default=None, description="Roles of the bits of the integer")
     counts: list[str] | None = Field(default=None, description="Parts whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     algorithm: AnyAlgorithm | None = Field(
@@ -247,7 +274,7 @@ class PartSpec(Fact):
     rejected: Id | None = Field(default=None, description="Check value that rejects an unknown command")
 
     @property
-    def told(self) -> PartRole | None:
+    def told(self) -> PartKind | None:
         """The role, stated or told by other keys; None if nothing tells it."""
         if self.role is not None:
             return self.role
@@ -379,7 +406,7 @@ def _is_long(value: Mapping[str, object]) -> bool:
         return False
     if "fields" in value:
         return isinstance(value["fields"], dict)
-    return not isinstance(value["id"], dict) and _is_answer_id(value["id"])
+    return _is_answer_id(value["id"])
 
 
 def _is_answer_id(value: object) -> bool:
@@ -446,6 +473,16 @@ class ReplySpec(Fact):
 Replies = dict[str, ReplySpec]
 
 
+def _id_form(value: object) -> str:
+    return f"{BRANCH}parts" if isinstance(value, dict) else f"{BRANCH}number"
+
+
+MessageId = Annotated[
+    Annotated[dict[str, Id], Tag(f"{BRANCH}parts")] | Annotated[Id, Tag(f"{BRANCH}number")],
+    Discriminator(_id_form),
+]
+
+
 class DefaultsSpec(_Mapping):
     """Defaults for commands."""
 
@@ -487,7 +524,9 @@ class CommandSpec(Fact):
     section: Text | None = Field(  # type: ignore[assignment]  # None: that of `defaults`
         default=None, description="Section of the source document that states it"
     )
-    id: Id = Field(description="Its number in the frame")
+    id: MessageId | None = Field(
+        default=None, description="Its number in the frame; PART: NUMBER for each part, if there are several"
+    )
     request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
     response: Response | None = Field(
         default=None, description="Fields, {} for an empty response, {id:, fields:}, or none"
@@ -511,7 +550,9 @@ class CommandSpec(Fact):
 class MessageSpec(Fact):
     """A message without a response."""
 
-    id: Id = Field(description="Its number in the frame")
+    id: MessageId | None = Field(
+        default=None, description="Its number in the frame; PART: NUMBER for each part, if there are several"
+    )
     fields: Fields = Field(description="Its fields, in wire order")
     direction: Literal["request", "response"] | None = Field(
         default=None, description="Direction of the message; default: any node sends it"

@@ -10,6 +10,7 @@ from qlinkgen.model.types import Chunk
 from qlinkgen.schema.file_model import MarkedSpec, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.parts import PartBuilder
+from qlinkgen.schema.pieces import MAX_ID_BITS, placed
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.stuffing import build_stuffing, check_unique
@@ -78,16 +79,19 @@ class FrameBuilder:
 
     def _delimited(self, specs: Mapping[str, PartSpec]) -> DelimitedFrame | None:
         path: Path = ("frame", "parts")
-        if not self._parts.roles_fit(specs, ("message", "payload"), path):
+        if not self._parts.roles_fit(specs, ("payload",), path):
             return None
         main = _main_check(specs)
-        parts = tuple(
-            (self._parts if name == main else self._others).build(name, spec, specs, (*path, name))
-            for name, spec in specs.items()
+        parts = placed(
+            tuple(
+                (self._parts if name == main else self._others).build(name, spec, specs, (*path, name))
+                for name, spec in specs.items()
+            )
         )
         spec = self._file.frame
         stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
         frame = DelimitedFrame(parts, stuffing, spec.doc, spec.section)
+        self._check_pieces(frame, path)
         self._check_order(frame, path)
         self._check_empty(frame, path)
         if self._is_circular(frame, path):
@@ -97,12 +101,16 @@ class FrameBuilder:
         return frame
 
     def _check_order(self, frame: DelimitedFrame, path: Path) -> None:
-        """Check that length, id and address precede the payload."""
+        """Check that what determines the end precedes the payload."""
         names = [part.name for part in frame.parts]
         payload = names.index(frame.payload.name)
+        measured = frame.part("length") is None
         for index, part in enumerate(frame.parts):
-            if part.role in ("length", "message", "address") and index > payload:
+            identifies = measured and any(bits.is_id for bits in part.bits)
+            if (part.role == "length" or identifies) and index > payload:
                 what, hint = f"{part.name} follows the payload", "move it before the payload"
+                if identifies:
+                    what = f"{what}, whose size follows from it"
                 self._parts.fault("bad-frame", (*path, part.name), what, hint)
 
     def _check_empty(self, frame: DelimitedFrame, path: Path) -> None:
@@ -128,6 +136,28 @@ class FrameBuilder:
             place, hint = (*path, name, "over"), "omit one of them from over"
             self._report.error("check-cycle", place, what, hint, of_key=True)
         return bool(left)
+
+    def _check_pieces(self, frame: DelimitedFrame, path: Path) -> None:
+        """Check the size of the message id, and of derived numbers."""
+        parts = {part.name: part for part in frame.parts}
+        if sum(bits.bits for bits in frame.id_bits) > MAX_ID_BITS:
+            what = f"{listed([bits.name for bits in frame.id_bits])} have more than {MAX_ID_BITS} bits"
+            self._parts.fault("bad-frame", path, what, "give some of them other roles")
+        for part in frame.parts:
+            source = parts[part.derivation.of] if part.derivation else part
+            numeric = source.scalar is not None and source.role != "derived"
+            if part.derivation and not (numeric and part.scalar and source.size == part.size):
+                what = f"{part.name} cannot equal {source.name}"
+                hint = "use a number of the same size that is not derived itself"
+                self._report.error("bad-frame", (*path, part.name, "equals"), what, hint)
+            elif (
+                part.derivation
+                and source.role == "length"
+                and frame.stuffing
+                and frame.stuffing.before_checksum
+            ):
+                what = f"{part.name} cannot repeat a length of stuffed bytes"
+                self._report.error("bad-frame", (*path, part.name, "equals"), what, "stuff the whole frame")
 
     def _check_length(self, frame: DelimitedFrame, path: Path) -> None:
         length = frame.part("length")

@@ -141,6 +141,12 @@ Values = Annotated[
     PlainValidator(_values),
     WithJsonSchema({"type": "object", "description": "VALUE: number, text, list or object, as in JSON"}),
 ]
+Consts = Annotated[
+    list[Annotated[StrictInt, Field(ge=0)]],
+    BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
+    Field(min_length=1),
+    WithJsonSchema({"anyOf": [{"type": "integer"}, {"type": "array", "items": {"type": "integer"}}]}),
+]
 Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "string", "integer", "boolean")]
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
 Count = Annotated[StrictInt, Field(ge=1)]
@@ -148,6 +154,6 @@ Id = Annotated[StrictInt, Field(ge=0)]
 AnswerNumber = Annotated[
     notation.AnswerId,
     PlainValidator(notation.answer_id),
-    _json("A number, or request.id + 0x80", "string", "integer"),
+    _json("A number, or request.id + 0x80; PART: NUMBER for several parts", "string", "integer", "object"),
 ]
 Order = Literal["big", "little"]

@@ -11,6 +11,8 @@ from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
 from qlinkgen.schema.fields import FieldBuilder, is_open
 from qlinkgen.schema.file_model import CommandSpec, Fields, MessageSpec, ReplySpec, SchemaFile
+from qlinkgen.schema.notation import StatedId
+from qlinkgen.schema.pieces import IdBuilder
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
@@ -29,7 +31,7 @@ class Written(NamedTuple):
     """
 
     part: str
-    number: int
+    number: StatedId
     number_path: Path
     fields: Fields
     path: Path
@@ -50,12 +52,13 @@ class MessageBuilder:
         #: Paths of the fields and of the number of each message, by its name.
         self.places: dict[str, Path] = {}
         self.id_places: dict[str, Path] = {}
+        self._ids = IdBuilder(report, frame)
 
     @property
     def addressed(self) -> bool:
         """Whether the frame has an address."""
         if isinstance(self._frame, DelimitedFrame):
-            return self._frame.part("address") is not None
+            return self._frame.address is not None
         return isinstance(self._frame, MarkedFrame)
 
     def directed(
@@ -68,7 +71,7 @@ class MessageBuilder:
             name=f"{name}.{direction}",
             command=name,
             direction=direction,
-            id=layout.number,
+            id=self._number(layout, direction, f"{name}.{direction}"),
             fields=self._fields.build(layout.fields, layout.path),
             doc=spec.doc,
             section=section,
@@ -89,7 +92,7 @@ class MessageBuilder:
             name=name,
             command=command or name,
             direction="response",
-            id=layout.number,
+            id=self._number(layout, "response", name),
             fields=self._fields.build(layout.fields, layout.path),
             doc=spec.doc,
             section=spec.section,
@@ -101,6 +104,11 @@ class MessageBuilder:
         self._add(message, layout)
         return message
 
+    def _number(self, layout: Written, direction: Direction, name: str) -> int:
+        path, command = layout.number_path, name.partition(".")[0]
+        usual = path in (("commands", command, "id"), ("messages", name, "id"))
+        return self._ids.number(layout.number, direction, path, "" if usual else name)
+
     def _add(self, message: Message, layout: Written) -> None:
         self.places[message.name] = layout.path
         self.id_places[message.name] = layout.number_path
@@ -109,12 +117,13 @@ class MessageBuilder:
     def single(self, name: str, spec: MessageSpec) -> Message:
         """A message without a response."""
         path: Path = ("messages", name, "fields")
+        layout = Written(name, StatedId(spec.id), ("messages", name, "id"), spec.fields, path)
         nodes = self._bus.nodes if self.addressed else None
         message = Message(
             name=name,
             command=name,
             direction=spec.direction or "message",
-            id=spec.id,
+            id=self._number(layout, spec.direction or "message", name),
             fields=self._fields.build(spec.fields, path),
             doc=spec.doc,
             section=spec.section,
@@ -123,7 +132,7 @@ class MessageBuilder:
             addresses=(nodes,) if nodes else (),
             default_address=nodes[0] if nodes else 0,
         )
-        self._add(message, Written(name, spec.id, ("messages", name, "id"), spec.fields, path))
+        self._add(message, layout)
         if isinstance(self._frame, PacketFrame) and spec.direction != "request":
             what = f"{name} is not the response to a request"
             hint = "add direction: request, or make it a command"

@@ -104,6 +104,15 @@ class _Checker:
                 self.spelling(name, ("frame", group, name))
                 if part.told == "address":
                     address = name
+                for inner, bits in (part.bits or {}).items():
+                    place = ("frame", group, name, "bits", inner)
+                    self.spelling(inner, place)
+                    if inner in (getattr(file.frame, group) or {}):
+                        self._error(
+                            "name-clash", place, f"{inner} is also a part of the frame", "rename one of them"
+                        )
+                    if bits.role == "address":
+                        address = inner
         return address
 
     def fields(self, fields: Fields, path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -134,16 +135,31 @@ def duration(value: object) -> Duration:
     raise ValueError(f"{shown(value)} is not a time; write 3 bytes, 260 us, 10 ms or 1 s")
 
 
+#: The number of a message as written: one, or one for each part that it consists of.
+Given = int | Mapping[str, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class StatedId:
+    """The number of a message as written, and what is added to it."""
+
+    given: Given
+    added: int = 0
+
+
 @dataclass(frozen=True, slots=True)
 class AnswerId:
     """The number of an answer, or what is added to that of the request."""
 
-    number: int
+    number: int | Mapping[str, int]
     relative: bool = False
 
-    def of(self, request: int) -> int:
+    def of(self, request: Given) -> StatedId:
         """The number of the answer to a request, which may not fit the frame."""
-        return request + self.number if self.relative else self.number
+        if self.relative:
+            assert isinstance(self.number, int)
+            return StatedId(request, self.number)
+        return StatedId(self.number)
 
 
 def answer_id(value: object) -> AnswerId:
@@ -152,6 +168,12 @@ def answer_id(value: object) -> AnswerId:
         return value
     if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
         return AnswerId(int(value))
+    if (
+        isinstance(value, dict)
+        and value
+        and all(type(each) in (int, DecimalNumber) for each in value.values())
+    ):
+        return AnswerId({str(name): int(each) for name, each in value.items()})
     if isinstance(value, str) and (match := _ANSWER_ID.match(value)):
         number = int(match["number"] or "0", 0)
         return AnswerId(-number if match["sign"] == "-" else number, relative=True)

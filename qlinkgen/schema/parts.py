@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from qlinkgen.model import checksum as catalogue
-from qlinkgen.model.frame import Checksum, Part
+from qlinkgen.model.frame import Checksum, Derivation, Part, Role
 from qlinkgen.model.types import Chunk, Scalar, byte_chunks
-from qlinkgen.schema.file_model import CrcSpec, PartSpec, SchemaFile
+from qlinkgen.schema.file_model import CrcSpec, PartKind, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.notation import shown
+from qlinkgen.schema.pieces import PieceBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
-_INTEGERS = {"u8": 1, "u16": 2, "u24": 3, "u32": 4, "u64": 8}
-_SINGLE_ROLES = ("length", "message", "address", "payload")
-_ROLE_KEYS = {
-    "constant": ("value", "text"),
+_INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
+_SINGLE_ROLES = ("length", "address", "direction", "payload")
+_ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
+    "constant": ("value", "text", "type", "byteorder", "const"),
+    "bits": ("type", "byteorder", "bits"),
+    "derived": ("type", "byteorder", "equals"),
+    "direction": ("type", "byteorder", "values"),
     "length": ("type", "byteorder", "counts"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
@@ -28,6 +33,10 @@ _KEYS = (
     "byteorder",
     "value",
     "text",
+    "const",
+    "values",
+    "equals",
+    "bits",
     "counts",
     "size",
     "algorithm",
@@ -41,6 +50,11 @@ _KEYS = (
 )
 
 
+_DERIVED = re.compile(
+    r"\s*(?P<not>~?)\s*(?P<part>[a-z][a-z0-9_]*)\s*(?P<added>[-+]\s*[0-9]{1,20})?\s*\Z", re.ASCII
+)
+
+
 class PartBuilder:
     """Builds the parts of one frame."""
 
@@ -49,10 +63,10 @@ class PartBuilder:
         self._file = file
         self._report = report
         self._crc = crc
+        self._pieces = PieceBuilder(report)
 
     def roles_fit(self, specs: Mapping[str, PartSpec], needed: Sequence[str], path: Path) -> bool:
-        """Check that every part has a role, required roles are present, and most occur once."""
-        roles = [spec.told for spec in specs.values()]
+        """Check that every part has a role, that required ones are present, and single ones occur once."""
         fit = True
         for name in (name for name, spec in specs.items() if spec.told is None):
             if not any(self._report.touched((*path, name, key)) for key in ("role", *_KEYS)):
@@ -62,17 +76,16 @@ class PartBuilder:
                 )
                 self._report.error("bad-frame", (*path, name), what, hint, of_key=True, absent=True)
             fit = False
-        for index, (name, spec) in enumerate(specs.items()):
-            if spec.told in _SINGLE_ROLES and spec.told in roles[:index]:
-                first = next(other for other, each in specs.items() if each.told == spec.told)
-                what, hint = (
-                    f"{name} and {first} are both the {spec.told}",
-                    "a frame has one of each role but constant and checksum",
-                )
-                self.fault("bad-frame", (*path, name), what, hint)
+        first: dict[str, str] = {}
+        for name, role, place in _roles(specs, path):
+            other = first.setdefault(role, name)
+            if role in _SINGLE_ROLES and other != name:
+                what = f"{name} and {other} are both the {role}"
+                hint = "a frame has one of each role but constant, message and checksum"
+                self.fault("bad-frame", place, what, hint)
                 fit = False
         for role in needed:
-            if role not in roles and None not in roles:
+            if role not in first and "None" not in first:
                 what, hint = f"the frame has no {role}", f"add a part with role: {role}"
                 self._report.error("bad-frame", path, what, hint, of_key=True, absent=True)
                 fit = False
@@ -83,8 +96,10 @@ class PartBuilder:
         role = spec.told
         assert role is not None
         self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS[role]], role, path)
+        if role == "constant" and spec.const is not None:
+            self.reject(spec, ("value", "text"), "constant with a type", path)
         value, size, checksum, scalar = b"", (0, 0), None, None
-        if role == "constant":
+        if role == "constant" and spec.const is None:
             value = self.constant(spec, path)
         elif role == "payload":
             size = self.payload_size(spec, path)
@@ -95,9 +110,18 @@ class PartBuilder:
             if role == "length" and not spec.counts:
                 self._lacks("counts", "add counts: [PART, ...]", path)
             self.known(spec.counts or (), names, (*path, "counts"))
+        kind: Role = role if role != "direction" else "bits"
+        whole = self._pieces.whole(name, spec, scalar, path) if scalar else None
+        bits = self._pieces.inside(spec.bits or {}, scalar, path) if scalar and role == "bits" else ()
+        if role == "constant" and scalar and whole and len(whole.constants) == 1:
+            value, scalar, whole = scalar.integer.pack(whole.constants[0] & scalar.integer.mask), None, None
+        elif role == "constant" and scalar:
+            kind = "bits"
         return Part(
             name=name,
-            role=role,
+            role=kind,
+            bits=(whole,) if whole else bits,
+            derivation=self._derivation(spec, names, path) if role == "derived" else None,
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
@@ -126,13 +150,35 @@ class PartBuilder:
             self._report.error("bad-frame", path, f"{path[-1]} has no {key}", hint, of_key=True, absent=True)
 
     def constant(self, spec: PartSpec, path: Path) -> bytes:
-        """The bytes of a constant."""
+        """The bytes of a constant without a type."""
+        self.reject(spec, ("type", "byteorder"), "constant without const", path)
         if spec.value is not None and spec.text is not None:
             what = f"{path[-1]} has both value and text"
             self.fault("bad-frame", (*path, "text"), what, "remove one of them")
         if spec.value is None and spec.text is None:
             self._lacks("value", "add value: A5 A5", path)
         return spec.value or (spec.text or "\0").encode("ascii")
+
+    def _derivation(self, spec: PartSpec, names: Iterable[str], path: Path) -> Derivation:
+        match = _DERIVED.match(spec.equals or "")
+        order, name = list(names), path[-1]
+        if match is None:
+            what, hint = (
+                f"{shown(spec.equals)} does not name a part",
+                "write PART, ~PART, PART + N or PART - N",
+            )
+        elif match["part"] not in order:
+            hint = did_you_mean(match["part"], order, f"the parts are {listed(order)}")
+            what = f"unknown part {shown(match['part'])}"
+        elif order.index(match["part"]) >= order.index(str(name)):
+            what, hint = f"{match['part']} does not precede {name}", f"move {name} after it"
+        else:
+            return Derivation(
+                match["part"], bool(match["not"]), int((match["added"] or "0").replace(" ", ""))
+            )
+        self._report.error("unknown-part", (*path, "equals"), what, hint)
+        self._report.taint(path)
+        return Derivation(order[0])
 
     def payload_size(self, spec: PartSpec, path: Path) -> tuple[int, int]:
         """Minimum and maximum size of a payload."""
@@ -303,3 +349,11 @@ class PartBuilder:
             hint = "correct a parameter, most often init, refin or xorout"
             self._report.error("crc-parameters", (*path, "check"), what, hint)
         return found
+
+
+def _roles(specs: Mapping[str, PartSpec], path: Path) -> Iterator[tuple[str, str, Path]]:
+    """The roles of parts and of their bits: name, role, place."""
+    for name, spec in specs.items():
+        yield name, str(spec.told), (*path, name)
+        for inner, bits in (spec.bits or {}).items():
+            yield inner, bits.role or "constant", (*path, name, "bits", inner)

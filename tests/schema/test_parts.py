@@ -5,6 +5,9 @@ from __future__ import annotations
 import pytest
 
 from qlinkgen.model.frame import DelimitedFrame, Part
+from qlinkgen.plan import plan_of
+from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.reading import BadFrame
 from qlinkgen.schema.loader import loads
 
 SCHEMA = """\
@@ -71,3 +74,142 @@ def test_wrong_parts(written: dict[str, str], where: str, what: str) -> None:
     protocol, faults = loads(_text(written), "sample")
     assert protocol is None
     assert (f"{faults[0].line}:{faults[0].column}", faults[0].message) == (where, what)
+
+
+BITS = """\
+qlinkgen: 1
+protocol: {{name: sample, revision: "1", source: Made up}}
+byteorder: {order}
+frame:
+  parts:
+{parts}
+    data: {{role: payload, size: 0..16}}
+{after}
+bus: {bus}
+commands: {{go: {{{id}request: {{}}, response: {{value: u8}}, repeat: safe{more}}}}}
+"""
+
+
+def wires(*before: str, after: tuple[str, ...] = (), id_: str = "id: 3", address: bool = False) -> list[str]:
+    """The frames of a request, and of a response with the value 9, from and to node 5."""
+    text = BITS.format(
+        order="little",
+        parts="\n".join(f"    {part}" for part in before),
+        after="\n".join(f"    {part}" for part in after),
+        bus="{kind: master_slave, nodes: 1..7}" if address else "{kind: master_slave}",
+        id=f"{id_}, " if id_ else "",
+        more=", addressing: node" if address else "",
+    )
+    protocol, faults = loads(text, "sample")
+    assert protocol is not None, faults
+    codec = Codec(plan_of(protocol))
+    frames = [codec.encode("go.request", {}, 5), codec.encode("go.response", {"value": 9}, 5)]
+    for frame, direction in zip(frames, ("request", "response"), strict=True):
+        decoded = codec.decode(frame, direction)  # type: ignore[arg-type]
+        assert (decoded.message.name, decoded.address) == (f"go.{direction}", 5 if address else None)
+    return [frame.hex(" ") for frame in frames]
+
+
+def test_bits_with_roles() -> None:
+    head = (
+        "head: {type: u8, bits: {node: {at: 0..2, role: address}, code: {at: 4..6, role: message},"
+        " one: {at: 7, const: 1}}}"
+    )
+    assert wires(head, address=True) == ["b5", "b5 09"]
+
+
+def test_id_in_several_parts() -> None:
+    parts = ("start: B5 62", "class: {role: message, type: u8}", "number: {role: message, type: u16}")
+    assert wires(*parts, id_="id: {class: 6, number: 0x102}") == ["b5 62 06 02 01", "b5 62 06 02 01 09"]
+
+
+def test_direction() -> None:
+    way = "way: {role: direction, type: u8, values: {request: 0x3C, response: 0x3E}}"
+    assert wires(way, "code: {role: message, type: u8}") == ["3c 03", "3e 03 09"]
+    bits = "head: {type: u8, bits: {way: {at: 7, role: direction, values: {request: 1, response: 0}}}}"
+    assert wires(bits, id_="") == ["80", "00 09"]
+
+
+def test_no_message_id() -> None:
+    assert wires("start: 7E", id_="") == ["7e", "7e 09"]
+
+
+def test_numbers_as_constants() -> None:
+    assert wires("version: {type: u16, const: 0x0E}", id_="") == ["0e 00", "0e 00 09"]
+    assert wires("sync: {type: u8, const: [0xC8, 0xEA]}", id_="") == ["c8", "c8 09"]
+
+
+def test_derived_numbers() -> None:
+    length = ("start: 68", "length: {type: u8, counts: [data]}")
+    assert wires(*length, "again: {type: u8, equals: length}", id_="") == ["68 00 00", "68 01 01 09"]
+    code = "code: {role: message, type: u8}"
+    assert wires(code, after=("inverse: {type: u8, equals: ~code}",)) == ["03 fc", "03 09 fc"]
+    assert wires(code, after=("more: {type: u8, equals: code - 4}",)) == ["03 ff", "03 09 ff"]
+
+
+def test_id_and_address_after_the_payload() -> None:
+    after = ("code: {role: message, type: u8}", "node: {role: address, type: u40}")
+    expected = ["00 03 05 00 00 00 00", "01 09 03 05 00 00 00 00"]
+    assert wires("length: {type: u8, counts: [data]}", after=after, address=True) == expected
+
+
+@pytest.mark.parametrize(
+    ("wire", "kind"),
+    [("c8 09", ""), ("ea 09", ""), ("c9 09", "frame"), ("c8", "truncated"), ("c8 09 00", "length")],
+)
+def test_each_of_several_constants_is_accepted(wire: str, kind: str) -> None:
+    text = BITS.format(
+        order="big",
+        parts="    sync: {type: u8, const: [0xC8, 0xEA]}",
+        after="",
+        bus="{kind: master_slave}",
+        id="",
+        more="",
+    )
+    protocol, _ = loads(text, "sample")
+    assert protocol is not None
+    codec = Codec(plan_of(protocol))
+    if kind:
+        with pytest.raises(BadFrame) as caught:
+            codec.decode(bytes.fromhex(wire), "response")
+        assert caught.value.kind == kind
+    else:
+        assert codec.decode(bytes.fromhex(wire), "response").values == {"value": 9}
+
+
+@pytest.mark.parametrize(
+    ("part", "what"),
+    [
+        ("head: {type: u8, bits: {a: {at: 8, const: 1}}}", "a extends to bit 8"),
+        ("head: {type: u8, bits: {a: {at: 0..1, const: 1}, b: {at: 1, const: 1}}}", "b overlaps a"),
+        ("head: {type: u8, bits: {a: {at: 0..1, const: 4}}}", "4 does not fit 2 bits"),
+        ("head: {type: u8, bits: {a: 0}}", "'0' has the wrong type"),
+        ("head: {type: u8, bits: {a: {at: 0}}}", "a has neither a role nor a constant"),
+        ("head: {type: u8, bits: {a: {at: 0, role: message, const: 1}}}", "a has a role and a constant"),
+        ("way: {role: direction, type: u8}", "way has no values"),
+        (
+            "way: {role: direction, type: u8, values: {request: 1, response: 1}}",
+            "way is the same in both directions",
+        ),
+        ("way: {role: direction, type: u8, values: {request: 1, response: 256}}", "256 does not fit 8 bits"),
+        ("more: {type: u8, equals: missing}", "unknown part 'missing'"),
+        ("more: {type: u8, equals: later}", "later does not precede more"),
+        ("more: {type: u16, equals: code}", "more cannot equal code"),
+        ("more: {type: u8, equals: 3 + 4}", "'3 + 4' does not name a part"),
+        ("more: {role: message, type: u8}", "the id consists of code and more"),
+        ("more: {type: u8, const: 1, value: 01}", "'value' has no effect on a constant with a type here"),
+        ("start: {type: u8, value: 01}", "'type' has no effect on a constant without const here"),
+    ],
+)
+def test_wrong_pieces(part: str, what: str) -> None:
+    text = BITS.format(
+        order="big",
+        parts=f"    code: {{role: message, type: u8}}\n    {part}",
+        after="    later: {type: u8, counts: [data]}" if "later" in part else "",
+        bus="{kind: master_slave}",
+        id="id: 3, ",
+        more="",
+    )
+    protocol, faults = loads(text, "sample")
+    assert protocol is None
+    assert what in [fault.message for fault in faults]

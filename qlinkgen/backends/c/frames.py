@@ -83,7 +83,7 @@ class FrameSection:
     @property
     def needs_ids(self) -> bool:
         """Whether receiving a frame depends on message ids, which are then defined before it."""
-        by_message = self.view.bare or self.view.sized_by_message
+        by_message = self.view.checks_header or self.view.sized_by_message
         return by_message or isinstance(self.plan.frame.receiver, Marks | InStep)
 
     @property

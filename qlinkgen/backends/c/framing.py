@@ -14,7 +14,7 @@ from qlinkgen.plan.tree import MessagePlan
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """The address of a frame in C: its name, "" if there is none, and its type."""
+    """The address of a frame in C: its name, "" if there is none, and its bits."""
 
     name: str
     bits: int
@@ -151,5 +151,5 @@ def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
 
 def address_of(frame: FramePlan, name: str) -> Address:
     """The address of the frames of a protocol; one that shares a byte has the type of a byte."""
-    part = frame.envelope.address
-    return Address(name, part.integer.bits if part else 8)
+    found = frame.envelope.address
+    return Address(name, found[0].bits if found else 8)

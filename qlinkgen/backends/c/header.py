@@ -134,7 +134,7 @@ class Header:
         received = [(f"{names.upper}_{direction.upper()}", m) for direction, m in self._section.received()]
         texts = ["\n", *(self._id_constant(message) for message in self._kept)]
         unused = self._unused_arguments()
-        if view.bare:
+        if view.checks_header:
             header_checks = [Group(d, self._expected(messages)) for d, messages in received]
             limited = any(
                 each.address_allowed for _, messages in received for each in self._expected(messages)

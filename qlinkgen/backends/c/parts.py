@@ -15,16 +15,23 @@ from qlinkgen.model.naming import address_member
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.framing import (
     AddressPart,
+    AddressSlot,
+    Bits,
+    CellPart,
     CheckPart,
     ConstantPart,
+    ConstantSlot,
     Envelope,
+    EqualPart,
     FramePlan,
     IdPart,
+    IdSlot,
     LengthPart,
     MarkPart,
+    Numeric,
     Part,
     PayloadPart,
-    Rescan,
+    Slot,
 )
 from qlinkgen.plan.transparency import FrameStuffing
 
@@ -52,12 +59,12 @@ class Sender:
 
 def sender_of(frame: FramePlan) -> Sender:
     """The sender of a frame; names are "id" and that of the address, changed if taken."""
-    id_part, address_part = frame.envelope.id, frame.envelope.address
+    envelope = frame.envelope
     address = address_member(frame.address)
-    address_type = unsigned_type(address_part.integer.bits if address_part else 8)
+    address_type = unsigned_type(envelope.address[0].bits if envelope.address else 8)
     return Sender(
         address_member(frame.id_name) if address == "id" else "id",
-        unsigned_type(id_part.integer.bits if id_part else 8),
+        unsigned_type(sum(bits.bits for bits in envelope.id) or 8),
         address,
         address_type if address else "",
     )
@@ -123,13 +130,19 @@ class PartWriter:
 
     def put_header(self, place: str, sent: str) -> list[str]:
         """Statements that write the header; ``place`` is the body."""
-        return [line for part in self._front() for line in self._put(part, place, self._at(part), sent)]
+        return [line for part in self._front() for line in self._put(part, place, place, sent)]
 
-    def put_trailer(self, place: str) -> list[str]:
-        """Statements that write constants after the payload, which ends at ``place``."""
-        return [line for part in self.envelope.back for line in self._put(part, place, self._at(part), "")]
+    def put_trailer(self, place: str, header: str) -> list[str]:
+        """Statements that write parts after the payload, which ends at ``place``."""
+        return [line for part in self.envelope.back for line in self._put(part, place, header, "")]
 
-    def _put(self, part: Part, place: str, at: int, sent: str) -> list[str]:
+    @property
+    def reads_tail(self) -> bool:
+        """Whether message id or address follow the payload."""
+        return any(bits.part in self.envelope.back for bits in (*self.envelope.id, *self.envelope.address))
+
+    def _put(self, part: Part, place: str, header: str, sent: str) -> list[str]:
+        at = self._at(part)
         match part:
             case ConstantPart():
                 return [f"{place}[{at + index}] = {in_hex(byte)};" for index, byte in enumerate(part.data)]
@@ -140,10 +153,36 @@ class PartWriter:
                 return [self.layouts.put(part.integer, place, str(at), self.sender.id)]
             case AddressPart():
                 return [self.layouts.put(part.integer, place, str(at), self.sender.address)]
+            case CellPart():
+                return [self.layouts.put(part.integer, place, str(at), self._cell(part))]
+            case EqualPart():
+                source = place if part.of in self.envelope.back else header
+                return [
+                    self.layouts.put(part.integer, place, str(at), derived(part, self.get(part.of, source)))
+                ]
             case CheckPart() | PayloadPart() | MarkPart():
                 return []
             case _:
                 assert_never(part)
+
+    def _cell(self, part: CellPart) -> str:
+        """The integer of a part whose bits have several roles."""
+        kind = unsigned_type(part.integer.bits)
+        terms = [_shifted(self._slot(slot, kind), slot.shift, kind) for slot in part.slots]
+        return terms[0] if len(terms) == 1 else f"({kind})({' | '.join(terms)})"
+
+    def _slot(self, slot: Slot, kind: str) -> str:
+        match slot:
+            case IdSlot():
+                shifted = f"({self.sender.id} >> {slot.at})" if slot.at else self.sender.id
+            case AddressSlot():
+                shifted = self.sender.address
+            case ConstantSlot():
+                return f"({kind}){unsigned(slot.values[0], slot.bits, hexadecimal=True)}"
+            case _:
+                assert_never(slot)
+        mask = unsigned((1 << slot.bits) - 1, slot.bits, hexadecimal=True)
+        return f"({kind})({shifted} & {mask})"
 
     def put_check(self, place: str, value: str) -> list[str]:
         """Statements that write the check value; the payload ends at ``place``."""
@@ -152,10 +191,20 @@ class PartWriter:
 
     # From the wire
 
-    def get(self, part: LengthPart | IdPart | AddressPart | None, place: str = "body") -> str:
-        """The expression for a number in a body, 0 if the frame has none."""
-        if part is None:
-            return "0U"
+    def number(self, pieces: tuple[Bits, ...]) -> str:
+        """The message id or address in these pieces of a received frame, 0 if there are none."""
+        kind = unsigned_type(sum(each.bits for each in pieces) or 8)
+        if len(pieces) == 1 and pieces[0].whole:
+            return self.get(pieces[0].part)
+        terms = [_shifted(self._piece(each, kind), each.at, kind) for each in pieces]
+        return (f"({kind})({' | '.join(terms)})" if len(terms) > 1 else terms[0]) if terms else "0U"
+
+    def _piece(self, bits: Bits, kind: str) -> str:
+        return f"({kind}){self._taken(self.get(bits.part), bits, whole=bits.whole)}"
+
+    def get(self, part: Numeric, place: str = "") -> str:
+        """The expression for the integer of a part, in a body or after the payload."""
+        place = place or ("end" if part in self.envelope.back else "body")
         found, mask = self.layouts.get(part.integer, place, str(self._at(part))), part.integer.chunks[0].mask
         return found if part.size > 1 or mask == 0xFF else f"({found} & {in_hex(mask)})"
 
@@ -169,8 +218,6 @@ class PartWriter:
         ``counted`` bytes of the body have been received: any number, or one more in each pass.
         """
         reached = f"{counted} {'>=' if all_there else '=='} "
-        bare = isinstance(self.frame.receiver, Rescan) and self.frame.receiver.bare
-        before: set[type[Part]] = set()
         for part in self._front():
             end = self._at(part) + part.size
             match part:
@@ -182,10 +229,9 @@ class PartWriter:
                     yield f"if ({reached}{end}U) {{"
                     yield from (f"    {line}" for line in self._announced(part, all_there=all_there))
                     yield "}"
-                case IdPart() | AddressPart() if bare:
-                    before.add(type(part))
-                    yield from self._header_check(f"{reached}{end}U", before, directed)
-                case IdPart() | AddressPart() | CheckPart():
+                case IdPart() | AddressPart() | CellPart() | EqualPart():
+                    yield from self._number_checks(part, f"{reached}{end}U", directed)
+                case CheckPart():
                     pass
                 case PayloadPart() | MarkPart():
                     raise AssertionError(f"{part.name} is not a part of a header")
@@ -197,6 +243,12 @@ class PartWriter:
                 yield from (f"    {line}" for line in self.judge(check, "body", "body", "0U"))
             yield "}"
 
+    def _number_checks(self, part: Part, reached: str, directed: str) -> Iterator[str]:
+        for test in self._wrong(part):
+            yield from refusal(f"({reached}) && ({test})", f"{self.prefix.upper()}_ERROR_FRAME")
+        if self.frame.checks_header and self.envelope.identifies(part):
+            yield from self._header_check(reached, part, directed)
+
     def _announced(self, length: LengthPart, *, all_there: bool) -> Iterator[str]:
         if test := length_bounds(length, self.get(length)):
             yield from refusal(test, f"{self.prefix.upper()}_ERROR_LENGTH")
@@ -204,29 +256,70 @@ class PartWriter:
         if not all_there:
             yield f"total = payload + {self.head + self.envelope.trailer_size}U;"
 
-    def _header_check(self, reached: str, before: set[type[Part]], directed: str) -> Iterator[str]:
-        """Statements that check number and address as far as received."""
-        if IdPart not in before:
+    def _header_check(self, reached: str, part: Part, directed: str) -> Iterator[str]:
+        """Statements that check number and address as far as received with a part."""
+        envelope = self.envelope
+        if not envelope.known_at(part, envelope.id):
             return
-        found = self.get(self.envelope.id)
-        if self.envelope.address:
-            found += f", {self.get(self.envelope.address) if AddressPart in before else '0U'}"
+        found, located = self.number(envelope.id), envelope.known_at(part, envelope.address)
+        if envelope.address:
+            found += f", {self.number(envelope.address) if located else '0U'}"
         yield f"if ({reached}) {{"
         yield f"    status = {self.prefix}_header_check_({directed}{found});"
         wrong = f"!= {self.prefix.upper()}_OK"
-        if self.envelope.address and AddressPart not in before:
+        if not located:
             wrong = f"== {self.prefix.upper()}_ERROR_UNKNOWN"
         yield from (f"    {line}" for line in refusal(f"status {wrong}", "status"))
         yield "}"
 
     def wrong_tail(self, place: str) -> str:
-        """The condition for a wrong constant after the payload, which ends at ``place``."""
+        """The condition for a wrong constant or derived number after the payload, which ends at ``place``."""
         return any_of(
-            f"{place}[{self._at(part) + index}] != {in_hex(byte)}"
+            test
             for part in self.envelope.back
-            if isinstance(part, ConstantPart)
-            for index, byte in enumerate(part.data)
+            for test in (
+                (
+                    f"{place}[{self._at(part) + index}] != {in_hex(byte)}"
+                    for index, byte in enumerate(part.data)
+                )
+                if isinstance(part, ConstantPart)
+                else self._wrong(part)
+            )
         )
+
+    def _wrong(self, part: Part) -> Iterator[str]:
+        """Conditions that hold if a constant or a derived number in an integer is wrong."""
+        match part:
+            case CellPart():
+                for slot in part.constants:
+                    found = self._taken(self.get(part), slot, whole=slot.bits == part.integer.bits)
+                    tests = [
+                        f"{found} != {unsigned(each, slot.bits, hexadecimal=True)}" for each in slot.values
+                    ]
+                    yield " && ".join(f"({test})" for test in tests) if len(tests) > 1 else tests[0]
+            case EqualPart(inverted=True):
+                # In this form gcc has no objection to the promotion of a complement.
+                kind, every = (
+                    unsigned_type(part.integer.bits),
+                    unsigned(part.integer.mask, part.integer.bits, hexadecimal=True),
+                )
+                seen = self.get(part)
+                if part.added:
+                    less = unsigned(-part.added & part.integer.mask, part.integer.bits)
+                    seen = f"({kind})(({seen} + {less}) & {every})"
+                yield f"({seen} ^ {self.get(part.of)}) != {every}"
+            case EqualPart():
+                yield f"{self.get(part)} != {derived(part, self.get(part.of))}"
+            case _:
+                pass
+
+    @staticmethod
+    def _taken(found: str, bits: Bits | Slot, *, whole: bool) -> str:
+        """The bits of an integer."""
+        if whole:
+            return found
+        shifted = f"({found} >> {bits.shift})" if bits.shift else found
+        return f"({shifted} & {unsigned((1 << bits.bits) - 1, bits.bits, hexadecimal=True)})"
 
     def check_differs(self, place: str, value: str) -> str:
         """The condition for a received check value other than ``value``."""
@@ -344,6 +437,21 @@ class PartWriter:
         """Offset of a part in the body, or after the payload."""
         trailing = part in self.envelope.back
         return self.envelope.offset(part) - (self.envelope.header_size if trailing else len(self.lead))
+
+
+def derived(part: EqualPart, other: str) -> str:
+    """The value of a derived number."""
+    kind, mask = unsigned_type(part.integer.bits), part.integer.mask
+    every = unsigned(mask, part.integer.bits, hexadecimal=True)
+    value = f"({kind})({every} - {other})" if part.inverted else other
+    if not part.added:
+        return value
+    added = f"{value} + {unsigned(part.added & mask, part.integer.bits)}"
+    return f"({kind})(({added}) & {every})"
+
+
+def _shifted(value: str, shift: int, kind: str) -> str:
+    return f"({kind})({value} << {shift})" if shift else value
 
 
 def length_bounds(length: LengthPart, value: str) -> str:

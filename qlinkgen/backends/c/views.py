@@ -20,7 +20,8 @@ class FrameView:
     """The view of every frame, `f` in templates.
 
     Attributes:
-        bare: only message id and address distinguish a frame from noise.
+        bare: frames do not begin with a constant.
+        checks_header: message id and address in the header distinguish a frame from noise.
         sized_by_message: the end of a frame follows from its message.
         body_size: size of the buffer for decoding a frame.
         check_optional: only some messages have a check value.
@@ -40,6 +41,7 @@ class FrameView:
     pass_decode_direction: str
     check_name: str
     bare: bool
+    checks_header: bool
     sized_by_message: bool
     body_size: int
     check_optional: bool
@@ -67,6 +69,7 @@ def frame_view(
         pass_decode_direction="direction, " if directed else "",
         check_name="message_check" if ring else answered,
         bare=isinstance(receiver, Rescan) and receiver.bare,
+        checks_header=plan.frame.checks_header,
         sized_by_message=isinstance(receiver, Hunt | Rescan) and isinstance(plan.frame.end, ByMessage),
         body_size=body_size,
         check_optional=check_optional,
@@ -82,7 +85,7 @@ def _directed(plan: Plan) -> bool:
             return False
         case Rescan():
             by_length = isinstance(plan.frame.end, ByLength)
-            needed = receiver.bare or not receiver.verified or not by_length
+            needed = plan.frame.checks_header or not receiver.verified or not by_length
         case Marks():
             needed = True
         case _:
@@ -109,6 +112,8 @@ class PartsView:
         judged: without a check value, only valid contents confirm a frame.
         values: functions for check values, none if the only one is computed in passing.
         judges: statements that verify them.
+        identified_late: message id or address follow the payload.
+        unused: the parameter for the message id if frames have none, otherwise "".
     """
 
     late_insert: bool
@@ -125,11 +130,14 @@ class PartsView:
     check_differs: str
     values: list[ValueView]
     judges: list[str]
+    identified_late: bool
+    unused: str
 
     @property
     def reads_tail(self) -> bool:
-        """Whether bytes after the payload are checked."""
-        return bool(self.wrong_tail or self.check_differs or any("end[" in line for line in self.judges))
+        """Whether bytes after the payload are read."""
+        judged = any("end[" in line for line in self.judges)
+        return bool(self.wrong_tail or self.check_differs or self.identified_late or judged)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,12 +287,14 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
         overhead=envelope.overhead,
         max_frame=envelope.max_frame,
         index_type=unsigned_type(max(16, max_wire.bit_length())),
-        id_value=writer.get(envelope.id),
-        address_value=writer.get(envelope.address),
+        id_value=writer.number(envelope.id),
+        address_value=writer.number(envelope.address),
         wrong_tail=writer.wrong_tail("end"),
         check_differs=writer.check_differs("end", "value"),
         values=writer.values,
         judges=writer.judges("body", "end", f"payload + {writer.head}U"),
+        identified_late=writer.reads_tail,
+        unused="" if envelope.id else writer.sender.id,
     )
 
 
@@ -292,7 +302,7 @@ def _plain(writer: PartWriter, directed: str) -> PlainView:
     header = writer.envelope.header_size
     return PlainView(
         put_header=writer.put_header("wire", "sent"),
-        put_trailer=writer.put_trailer("end"),
+        put_trailer=writer.put_trailer("end", "wire"),
         put_check=writer.put_check("end", "value"),
         fills=writer.fills("wire", "end", f"{header}U + sent"),
         update_sent=writer.covered_loops("wire", "0", f"{header}U + sent"),
@@ -316,7 +326,7 @@ def _stuffed(writer: PartWriter, stuffing: FrameStuffing, directed: str) -> Stuf
         covers_body=writer.covers_body,
         check_from_end=writer.envelope.from_end(part) if part else 0,
         put_header=writer.put_header("head", "size"),
-        put_trailer=writer.put_trailer("trailer"),
+        put_trailer=writer.put_trailer("trailer", "head"),
         put_check=writer.put_check("trailer", "value"),
         fills=writer.fills("head", "trailer", f"{writer.head}U + size"),
         update_before=writer.lead_updates + ([] if writer.covers_body else sent),

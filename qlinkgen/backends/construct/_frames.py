@@ -7,7 +7,7 @@ Frames compute and check lengths, inserted bytes and check values.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import BinaryIO, NamedTuple
 
 from construct import (
@@ -145,6 +145,71 @@ class Address(NamedTuple):
     integer: Construct
 
 
+class IdBits(NamedTuple):
+    """Bits of an integer with a piece of the message id, from its bit ``at`` on."""
+
+    shift: int
+    bits: int
+    at: int
+
+    def value(self, number: int, address: int) -> int:
+        """The bits of a frame."""
+        return number >> self.at & (1 << self.bits) - 1
+
+
+class AddressBits(NamedTuple):
+    """Bits of an integer with the address."""
+
+    shift: int
+    bits: int
+
+    def value(self, number: int, address: int) -> int:
+        """The bits of a frame."""
+        return address
+
+
+class ConstantBits(NamedTuple):
+    """Bits of an integer with one of several values, the first of which is sent."""
+
+    shift: int
+    bits: int
+    values: Sequence[int]
+
+    def value(self, number: int, address: int) -> int:
+        """The bits of a frame."""
+        return self.values[0]
+
+
+class Cell(NamedTuple):
+    """An integer whose bits have several roles."""
+
+    name: str
+    integer: Construct
+    slots: Sequence[IdBits | AddressBits | ConstantBits]
+
+    def number(self, number: int, address: int) -> int:
+        """The integer for a message id and an address."""
+        whole = 0
+        for slot in self.slots:
+            whole |= slot.value(number, address) << slot.shift
+        return whole
+
+
+class Equal(NamedTuple):
+    """An integer derived from an earlier part: complemented if ``inverted``, plus ``added``."""
+
+    name: str
+    integer: Construct
+    of: str
+    bits: int
+    inverted: bool = False
+    added: int = 0
+
+    def number(self, other: int) -> int:
+        """The integer for a value of the other."""
+        return ((~other if self.inverted else other) + self.added) & (1 << self.bits) - 1
+
+
 class Mark(NamedTuple):
     """A byte with the marker bit, the address and the message id, or ``end`` in its place.
 
@@ -218,7 +283,7 @@ class Check(NamedTuple):
         )
 
 
-Part = Constant | Length | Id | Address | Mark | Payload | Check
+Part = Constant | Length | Id | Address | Cell | Equal | Mark | Payload | Check
 
 
 def _size(part: Part) -> int:
@@ -230,8 +295,24 @@ def _size(part: Part) -> int:
             return 1
         case Payload():
             return 0
-        case Length() | Id() | Address() | Check():
+        case Length() | Id() | Address() | Cell() | Equal() | Check():
             return int(part.integer.sizeof())
+
+
+def _pieces(
+    part: Part, whole: type, bits: type
+) -> Iterator[tuple[Id | Address | Cell, int, int, int]]:
+    """The pieces of a message id or an address in a part: the part, first bit, number of bits, place."""
+    match part:
+        case Id() | Address() if isinstance(part, whole):
+            yield part, 0, 8 * _size(part), 0
+        case Cell():
+            for slot in part.slots:
+                if isinstance(slot, bits):
+                    at = slot.at if isinstance(slot, IdBits) else 0
+                    yield part, slot.shift, slot.bits, at
+        case _:
+            pass
 
 
 class Stuffing(NamedTuple):
@@ -305,9 +386,9 @@ class Frame(Construct):
         """A frame around a payload, which is not checked; ``number`` replaces the message id."""
         stuffing, shown = self.stuffing, message.id if number is None else number
         sent = stuffing.add(payload) if stuffing and not stuffing.over else payload
-        cells = {
-            part.name: self._cell(part, shown, sent, address) for part in self.parts
-        }
+        cells: dict[str, bytes] = {}
+        for part in self.parts:
+            cells[part.name] = self._cell(part, shown, sent, address, cells)
         left = self.checks if message.checksum else []
         while left:  # a check value may cover others
             names = {part.name for part in left}
@@ -322,7 +403,14 @@ class Frame(Construct):
             cells |= dict.fromkeys(inner, b"") | {inner[0]: stuffing.add(data)}
         return b"".join(cells.values())
 
-    def _cell(self, part: Part, number: int, payload: bytes, address: int) -> bytes:
+    def _cell(
+        self,
+        part: Part,
+        number: int,
+        payload: bytes,
+        address: int,
+        before: Mapping[str, bytes],
+    ) -> bytes:
         match part:
             case Constant():
                 return part.data
@@ -332,12 +420,23 @@ class Frame(Construct):
                 return bytes(part.integer.build(number))
             case Address():
                 return bytes(part.integer.build(address))
+            case Cell():
+                return bytes(part.integer.build(part.number(number, address)))
+            case Equal():
+                return self._equal(part, before)
             case Mark():
                 return part.byte(number, address)
             case Payload():
                 return payload
             case Check():
                 return b""
+
+    def _equal(self, part: Equal, cells: Mapping[str, bytes]) -> bytes:
+        """The bytes of a derived part."""
+        source = next(each for each in self.parts if each.name == part.of)
+        assert isinstance(source, Length | Id | Address | Cell)
+        other = source.integer.parse(cells[part.of])
+        return bytes(part.integer.build(part.number(other)))
 
     def _build(
         self, obj: Values, stream: BinaryIO, context: Container, path: str
@@ -484,20 +583,23 @@ class DelimitedFrame(Frame):
         source = _Wire(wire, self.stuffing, hunt=self.hunt)
         cells: dict[str, bytes] = {}
         numbers: dict[type, int] = {}
+        self._identify(cells, numbers)
         for part in self.parts:
             if isinstance(part, Payload):
-                self._header(cells)
+                self._verify(cells)
                 cells[part.name] = self._sent(source, part, numbers)
             elif isinstance(part, Constant) and Payload not in numbers:
                 cells[part.name] = self._constant(source, part)
             else:
                 cells[part.name] = source.take(part, _size(part))
-                self._number(part, cells[part.name], numbers)
+                if Payload not in numbers:
+                    self._header(part, cells, numbers)
+        self._identify(cells, numbers)
         payload = self._plain(cells)
         source.end()
         return self._judged(cells, numbers[Id], payload, numbers.get(Address, 0))
 
-    def _header(self, cells: Mapping[str, bytes]) -> None:
+    def _verify(self, cells: Mapping[str, bytes]) -> None:
         """Verify check values of the header alone."""
         for check in self.checks:
             if {check.name, *check.over} <= cells.keys():
@@ -511,22 +613,58 @@ class DelimitedFrame(Frame):
                 raise FrameError("frame", f"{part.name} is not {part.data.hex()}")
         return part.data
 
-    def _number(self, part: Part, cell: bytes, numbers: dict[type, int]) -> None:
-        if not isinstance(part, Length | Id | Address):
-            return
-        number = numbers[type(part)] = part.integer.parse(cell)
+    def _header(
+        self, part: Part, cells: Mapping[str, bytes], numbers: dict[type, int]
+    ) -> None:
+        """Check a part of the header."""
         if isinstance(part, Length):
+            number = part.integer.parse(cells[part.name])
             if not part.least <= number <= part.most:
                 raise FrameError(
                     "length", f"{part.name} is {number}, not {part.least}..{part.most}"
                 )
-            numbers[Length] -= part.bias
-        elif self.bare and Id in numbers:
+            numbers[Length] = number - part.bias
+        self._refuse(part, cells)
+        known = len(numbers)
+        self._identify(cells, numbers)
+        if self.bare and len(numbers) > known and Id in numbers:
             message = self._known(numbers[Id])
             if Address in numbers and not _allowed(message, numbers[Address]):
                 raise FrameError(
                     "range", f"{message.name} cannot have address {numbers[Address]}"
                 )
+
+    def _identify(
+        self, cells: Mapping[str, bytes], numbers: dict[type, int]
+    ) -> None:
+        """Set message id and address if all of their parts are known."""
+        for kind, bits in ((Id, IdBits), (Address, AddressBits)):
+            pieces = [each for part in self.parts for each in _pieces(part, kind, bits)]
+            if all(part.name in cells for part, *_ in pieces) and (pieces or kind is Id):
+                numbers[kind] = sum(
+                    (part.integer.parse(cells[part.name]) >> shift & (1 << size) - 1) << at
+                    for part, shift, size, at in pieces
+                )
+
+    def _refuse(self, part: Part, cells: Mapping[str, bytes]) -> None:
+        """Check a constant, or a derived number."""
+        seen, wrong = cells[part.name], False
+        match part:
+            case Constant():
+                wrong = seen != part.data
+            case Cell():
+                number = part.integer.parse(seen)
+                wrong = any(
+                    number >> slot.shift & (1 << slot.bits) - 1 not in slot.values
+                    for slot in part.slots
+                    if isinstance(slot, ConstantBits)
+                )
+            case Equal():
+                wrong = seen != self._equal(part, cells)
+            case _:
+                pass
+        if wrong:
+            raise FrameError("frame", f"{part.name} is {seen.hex()}")
 
     def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
         numbers[Payload] = 0
@@ -541,11 +679,7 @@ class DelimitedFrame(Frame):
 
     def _plain(self, cells: Mapping[str, bytes]) -> bytes:
         for part in self.parts:
-            if isinstance(part, Constant) and cells[part.name] != part.data:
-                raise FrameError(
-                    "frame",
-                    f"{part.name} is {cells[part.name].hex()}, not {part.data.hex()}",
-                )
+            self._refuse(part, cells)
         payload = cells[self.payload.name]
         if self.stuffing and not self.stuffing.over:
             payload = self.stuffing.remove(payload)

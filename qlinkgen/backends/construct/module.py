@@ -12,12 +12,17 @@ from qlinkgen.model.integer import Integer
 from qlinkgen.model.naming import record_key
 from qlinkgen.plan.framing import (
     AddressPart,
+    AddressSlot,
+    CellPart,
     CheckPart,
     ConstantPart,
+    ConstantSlot,
     Envelope,
+    EqualPart,
     FramePlan,
     Hunt,
     IdPart,
+    IdSlot,
     InStep,
     LengthPart,
     MarkPart,
@@ -25,6 +30,7 @@ from qlinkgen.plan.framing import (
     Part,
     PayloadPart,
     Rescan,
+    Slot,
 )
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -151,6 +157,15 @@ def _part(part: Part, envelope: Envelope) -> Call:
             return Call("Id", (part.name, integer(part.integer)))
         case AddressPart():
             return Call("Address", (part.name, integer(part.integer)))
+        case CellPart():
+            return Call("Cell", (part.name, integer(part.integer), Sequence(tuple(map(_slot, part.slots)))))
+        case EqualPart():
+            settings: dict[str, Node] = {"inverted": True} if part.inverted else {}
+            settings |= {"added": part.added} if part.added else {}
+            bits = part.integer.bits
+            return Call(
+                "Equal", (part.name, integer(part.integer), part.of.name, bits), tuple(settings.items())
+            )
         case MarkPart():
             return _mark(part)
         case PayloadPart():
@@ -159,6 +174,18 @@ def _part(part: Part, envelope: Envelope) -> Call:
             return _check(part, envelope)
         case _:
             assert_never(part)
+
+
+def _slot(slot: Slot) -> Call:
+    match slot:
+        case IdSlot():
+            return Call("IdBits", (slot.shift, slot.bits, slot.at))
+        case AddressSlot():
+            return Call("AddressBits", (slot.shift, slot.bits))
+        case ConstantSlot():
+            return Call("ConstantBits", (slot.shift, slot.bits, slot.values))
+        case _:
+            assert_never(slot)
 
 
 def _mark(part: MarkPart) -> Call:

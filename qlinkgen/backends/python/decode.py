@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.backends.python import floats, integers, values
+from qlinkgen.backends.python import floats, integers, pieces, values
 from qlinkgen.backends.python.layout import WIDTH, indented, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
@@ -16,11 +16,15 @@ from qlinkgen.model.types import Enum, Flags, Float, Scalar
 from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.framing import (
     AddressPart,
+    AddressSlot,
+    CellPart,
     CheckPart,
     ConstantPart,
+    EqualPart,
     IdPart,
     LengthPart,
     MarkPart,
+    Numeric,
     Part,
     PayloadPart,
 )
@@ -82,6 +86,8 @@ class Decoder:
     constants: list[str] = field(default_factory=list)
     _rows: list[Row] = field(default_factory=list)
     _open: bool = False
+    #: Bytes after the payload that have been unpacked.
+    _trailed: int = 0
     _sizes: list[str] = field(default_factory=list)
     _slices: list[str] = field(default_factory=list)
     _values: list[str] = field(default_factory=list)
@@ -96,6 +102,11 @@ class Decoder:
             at += part.size
         for step in payload.steps:
             self._step(step)
+        at = payload.size
+        for part in self._needed_back():
+            self._part(part, at)
+            at += part.size
+            self._trailed += part.size
         taken = self._taken_rows()
         counted = [] if payload.fixed or self._tabled else self._counted()
         return [
@@ -132,10 +143,9 @@ class Decoder:
         test = f"len({place.data}) == {place.overhead}" if place.overhead else f"not {place.data}"
         lines: list[str] = []
         if place.envelope and (address := place.envelope.address):
-            raw = f"{address.name}_part"
-            at = place.envelope.offset(address) - place.skipped
-            lines = [f"{raw} = {integers.read(address.integer, place.data, lambda more: str(at + more))}"]
-            lines += self._address_check(address, raw, _INDENT + 4)
+            raw = f"{address[0].part.name}_part"
+            lines = [f"{raw} = {pieces.number(place.envelope, address, place.data, place.skipped)}"]
+            lines += self._address_check(address[0].part, raw, _INDENT + 4)
             chosen = [f"{place.address}={raw}", *chosen]
         elif place.address and self.message.allowed is not None:
             # The caller sets the real address.
@@ -148,20 +158,38 @@ class Decoder:
     def _part(self, part: Part, at: Size) -> None:
         match part:
             case AddressPart():
-                number = self._get(part.integer, f"{part.name}_part", at)
-                self._put_together(part.integer, number)
-                self._values += self._address_check(part, number, _INDENT)
-                self._values.append(f"message.{self.place.address} = {number}")
+                self._address(part, at)
+            case CellPart() if any(isinstance(slot, AddressSlot) for slot in part.slots):
+                self._address(part, at)
             case LengthPart() if self.place.unique:
                 # The receiver relies on this comparison of length and size.
                 number = self._size(part.integer, f"{part.name}_part", at)
                 self._sizes += [f"if {number} != {self._length(part)}:", self._bad_layout]
-            case LengthPart() | IdPart() | ConstantPart() | CheckPart():
+            case LengthPart() | IdPart() | ConstantPart() | CellPart() | EqualPart() | CheckPart():
                 self._row(at).codes.append(f"{part.size}x")
             case MarkPart() | PayloadPart():
                 raise AssertionError(f"{part.name} is not read by a message's class")
             case _:
                 assert_never(part)
+
+    def _address(self, part: AddressPart | CellPart, at: Size) -> None:
+        local = f"{part.name}_part"
+        number = self._get(part.integer, local, at)
+        self._put_together(part.integer, number)
+        for slot in part.slots if isinstance(part, CellPart) else ():
+            if isinstance(slot, AddressSlot) and slot.bits < part.integer.bits:
+                shifted = f"{number} >> {slot.shift}" if slot.shift else number
+                self._values.append(f"{local} = {shifted} & 0x{(1 << slot.bits) - 1:X}")
+                number = local
+        self._values += self._address_check(part, number, _INDENT)
+        self._values.append(f"message.{self.place.address} = {number}")
+
+    def _needed_back(self) -> Sequence[Part]:
+        """Parts after the payload up to the address."""
+        envelope = self.place.envelope
+        back = envelope.back if envelope else ()
+        found = [back.index(bits.part) for bits in envelope.address if bits.part in back] if envelope else []
+        return back[: max(found) + 1] if found else ()
 
     def _length(self, part: LengthPart) -> str:
         if self.message.payload.fixed:
@@ -169,13 +197,16 @@ class Decoder:
         beyond = self.place.overhead - part.bias
         return f"len({self.place.data}) - {beyond}" if beyond else f"len({self.place.data})"
 
-    def _address_check(self, part: AddressPart, number: str, indent: int) -> list[str]:
+    def _address_check(self, part: Numeric, number: str, indent: int) -> list[str]:
         place = self.place
         assert place.envelope is not None
         if self.message.allowed is None:
             return []
         frame = f"_PREAMBLE + {place.data}" if place.unique else place.data
-        seen = ["cls", f'"{part.name}"', number, str(place.envelope.offset(part)), frame]
+        trails = part in place.envelope.back
+        offset = -place.envelope.from_end(part) if trails else place.envelope.offset(part)
+        name = part.name if isinstance(part, AddressPart) else place.address
+        seen = ["cls", f'"{name}"', number, str(offset), frame]
         test = f"if {integers.broken(self.message.allowed, number)}:"
         return [test, *indented(wrapped(f"raise {self.place.use('illegal')}(", seen, ")", indent + 4))]
 
@@ -256,7 +287,7 @@ class Decoder:
     def _whole(self, name: str, row: Row) -> list[str]:
         """Unpack everything at once; the struct, or the table of structs, also checks the size."""
         place, run = self.place, self._tabled
-        trailer = [f"{place.trailer}x"] if place.trailer else []
+        trailer = [f"{place.trailer - self._trailed}x"] if place.trailer > self._trailed else []
         text = place.prefix + format_of([*row.codes, *trailer])
         if run is None:
             self.constants.append(f'{name} = {place.use("Struct")}("{text}").unpack')

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from qlinkgen.backends.python import floats, integers
+from qlinkgen.backends.python import floats, integers, pieces
 from qlinkgen.backends.python.layout import (
     literal,
     wrapped,
@@ -18,13 +18,20 @@ from qlinkgen.model.types import Float, Scalar
 from qlinkgen.plan.expr import Condition, Within
 from qlinkgen.plan.framing import (
     AddressPart,
+    AddressSlot,
+    CellPart,
     CheckPart,
     ConstantPart,
+    ConstantSlot,
+    EqualPart,
     IdPart,
+    IdSlot,
     LengthPart,
     MarkPart,
+    Numeric,
     Part,
     PayloadPart,
+    Slot,
 )
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -133,20 +140,59 @@ class Encoder:
             case CheckPart():
                 self._add(f"{part.size}x")
             case LengthPart():
-                number = integers.size_text(self.message.payload.size + part.bias)
+                number = self._part_number(part)
                 plain = integers.letter(part.integer, self.place.byteorder)
                 self._integer(part.integer, number if plain else f"({number})")
             case IdPart():
                 self._integer(part.integer, self.number)
             case AddressPart():
-                number = f"self.{self.place.address}"
-                if self.message.allowed is not None:
-                    self._require(number, self.message.allowed)
-                self._integer(part.integer, number)
+                self._integer(part.integer, self._addressed())
+            case CellPart() | EqualPart():
+                self._lines.append(f"{part.name}_part = {self._part_number(part)}")
+                self._integer(part.integer, f"{part.name}_part")
             case MarkPart() | PayloadPart():
                 raise AssertionError(f"{part.name} is not packed by a message's class")
             case _:
                 assert_never(part)
+
+    def _addressed(self) -> str:
+        """The address, which must be legal."""
+        number = f"self.{self.place.address}"
+        if self.message.allowed is not None:
+            self._require(number, self.message.allowed)
+        return number
+
+    def _part_number(self, part: Numeric) -> str:
+        """The integer of a part."""
+        match part:
+            case LengthPart():
+                return integers.size_text(self.message.payload.size + part.bias)
+            case IdPart():
+                return self.number
+            case AddressPart():
+                return f"self.{self.place.address}"
+            case CellPart():
+                return " | ".join(map(self._slot, part.slots))
+            case EqualPart(of=CellPart()):
+                return pieces.derived(part, f"{part.of.name}_part")
+            case EqualPart():
+                return pieces.derived(part, self._part_number(part.of))
+            case _:
+                assert_never(part)
+
+    def _slot(self, slot: Slot) -> str:
+        """The bits of a slot in place."""
+        match slot:
+            case IdSlot():
+                shifted = f"{self.number} >> {slot.at}" if slot.at else self.number
+                bits = f"({shifted} & 0x{(1 << slot.bits) - 1:X})"
+            case AddressSlot():
+                bits = self._addressed()
+            case ConstantSlot():
+                bits = f"0x{slot.values[0]:02X}"
+            case _:
+                assert_never(slot)
+        return f"{bits} << {slot.shift}" if slot.shift else bits
 
     # Steps
 

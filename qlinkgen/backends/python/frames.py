@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
-from qlinkgen.backends.python import integers
+from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import class_name
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
@@ -18,9 +18,11 @@ from qlinkgen.plan.framing import (
     AddressPart,
     ByLength,
     ByMark,
+    CellPart,
     CheckPart,
     ConstantPart,
     Envelope,
+    EqualPart,
     Hunt,
     IdPart,
     InStep,
@@ -76,14 +78,16 @@ class AddressView:
     Attributes:
         name: attribute of the messages.
         parameter: name of the parameter of ``from_bytes``.
-        bytes: expression for the bytes of ``number``, "" if the address shares a byte.
+        bytes: expression for the bytes of the part with ``number``, "" if the address shares a marked byte.
         default: the default address.
+        limit: the greatest address, "" if the bytes hold no greater one.
     """
 
     name: str
     parameter: str
     bytes: str
     default: int
+    limit: str = ""
 
 
 @dataclass(frozen=True)
@@ -196,13 +200,14 @@ class PartsView:
     max_frame: int
     max_payload: int
     blank_header: str
-    id_start: int
+    blank_trailer: str
+    id_start: str
     id_of: str
     address_of: str
     bare: bool
     verified: bool
     head_checks: Sequence[HeadCheck]
-    tail_constants: Sequence[tuple[str, str]]
+    tail_tests: Sequence[str]
 
     template = "delimited"
 
@@ -356,40 +361,47 @@ def _check_bytes(check: Check, number: str = "crc") -> str:
     """Expression for the wire bytes of a check value."""
     if check.regular:
         return f'{number}.to_bytes({check.size}, "{check.regular}")'
-    pieces = [integers.group_out(number, chunk) for chunk in check.value.chunks]
-    return f"bytes(({', '.join(pieces)}{',' if len(pieces) == 1 else ''}))"
+    groups = [integers.group_out(number, chunk) for chunk in check.value.chunks]
+    return f"bytes(({', '.join(groups)}{',' if len(groups) == 1 else ''}))"
 
 
 def _address_view(plan: Plan) -> AddressView | None:
     if not plan.frame.address:
         return None
-    part = plan.frame.envelope.address
     nodes = plan.protocol.bus.nodes
+    bits = next(iter(plan.frame.envelope.address), None)
+    placed = f"(number << {bits.shift})" if bits and bits.shift else "number"
     return AddressView(
         name=address_attribute(plan.frame.address),
         parameter=address_argument(plan.frame.address),
-        bytes=integers.to_bytes(part.integer, "number") if part else "",
+        bytes=integers.to_bytes(bits.part.integer, placed) if bits else "",
         default=nodes[0] if nodes else 0,
+        limit=f"0x{bits.mask:X}" if bits and not bits.whole else "",
     )
 
 
 def _blank_header(envelope: Envelope, start: int, address: AddressView | None) -> str:
     """A header for decoding a payload; only its address is used."""
-    part = envelope.address
+    return _blank(envelope, envelope.front, address, start) or "bytes(0)"
+
+
+def _blank(envelope: Envelope, parts: Sequence[Part], address: AddressView | None, start: int = 0) -> str:
+    """Zeros for adjacent parts from an offset on, with the address in its place."""
+    size = sum(part.size for part in parts) - start
+    part = next((bits.part for bits in envelope.address if bits.part in parts), None)
     if part is None or address is None:
-        return f"bytes({envelope.header_size - start})"
-    before = envelope.offset(part) - start
-    after = envelope.header_size - start - before - part.size
-    pieces = [f"bytes({before})"] if before else []
-    pieces.append(f"_address(cls, {address.parameter})")
-    return " + ".join([*pieces, f"bytes({after})"] if after else pieces)
+        return f"bytes({size})"
+    before = sum(each.size for each in parts[: parts.index(part)]) - start
+    after = size - before - part.size
+    terms = [f"bytes({before})"] if before else []
+    terms.append(f"_address(cls, {address.parameter})")
+    return " + ".join([*terms, f"bytes({after})"] if after else terms)
 
 
 def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> UniqueView:
     envelope = plan.frame.envelope
     length, number, check = envelope.length, envelope.id, envelope.check
     assert length is not None
-    assert number is not None
     assert check is not None
     letter = _check_letter(check.check, plan.protocol.byteorder)
     end = envelope.offset(length) + 1
@@ -411,7 +423,7 @@ def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> Uni
         payload_of_body=slice_of(
             "body", str(envelope.header_size - len(envelope.preamble)), str(-envelope.trailer_size)
         ),
-        id_at=envelope.offset(number),
+        id_at=envelope.offset(number[0].part),
         blank_header=_blank_header(envelope, end, address),
         trailer=envelope.trailer_size,
         whole_sizes=sizes if letter else (),
@@ -451,8 +463,7 @@ def wrap_lines(view: UniqueView, fixed: int | None) -> list[str]:
 
 def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
     envelope = plan.frame.envelope
-    number, address = envelope.id, _address_view(plan)
-    assert number is not None
+    address = _address_view(plan)
     length = _length_view(plan, envelope)
     checks, filling = _all_placed(envelope)
     last = envelope.parts[-1]
@@ -471,23 +482,40 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         max_frame=envelope.max_frame,
         max_payload=envelope.payload.most,
         blank_header=_blank_header(envelope, 0, address),
-        id_start=envelope.offset(number),
-        id_of=_number_at(envelope, number),
-        address_of=_number_at(envelope, envelope.address) if envelope.address else "",
+        blank_trailer=_blank(envelope, envelope.back, address) if _trails(envelope) else "bytes(_TRAILER)",
+        id_start=_id_start(envelope),
+        id_of=pieces.number(envelope, envelope.id, "head"),
+        address_of=pieces.number(envelope, envelope.address, "head") if _leads(envelope) else "",
         bare=receiver.bare,
         verified=receiver.verified,
         head_checks=list(_head_checks(plan, envelope, bare=receiver.bare)),
-        tail_constants=[
-            (str(-envelope.from_end(part)), literal(part.data))
-            for part in envelope.back
-            if isinstance(part, ConstantPart)
-        ],
+        tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
     )
 
 
-def _number_at(envelope: Envelope, part: LengthPart | IdPart | AddressPart, source: str = "head") -> str:
-    start = envelope.offset(part)
-    return integers.read(part.integer, source, lambda more: str(start + more))
+def _trails(envelope: Envelope) -> bool:
+    """Whether the address follows the payload."""
+    return any(bits.part in envelope.back for bits in envelope.address)
+
+
+def _leads(envelope: Envelope) -> bool:
+    """Whether the address precedes the payload."""
+    return bool(envelope.address) and not _trails(envelope)
+
+
+def _id_start(envelope: Envelope) -> str:
+    """The offset of the message number, for error texts."""
+    if not envelope.id:
+        return "0"
+    part = envelope.id[0].part
+    return str(envelope.offset(part)) if part in envelope.front else f"len(frame) - {envelope.from_end(part)}"
+
+
+def _tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
+    """Conditions that hold if a part after the payload is wrong."""
+    if isinstance(part, ConstantPart):
+        yield f"not frame[{-envelope.from_end(part)}:].startswith({literal(part.data)})"
+    yield from pieces.wrong(envelope, part, "frame")
 
 
 def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
@@ -501,7 +529,7 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
         most=part.most,
         start=start,
         end=start + part.size,
-        value=_number_at(envelope, part),
+        value=pieces.read(envelope, part, "head"),
         bytes=integers.to_bytes(part.integer, "number"),
     )
 
@@ -536,19 +564,25 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                 place = f"_take(buf, start, {end})[1]" if whole else f"start + {end}"
                 bounds = "_MIN_LENGTH <= _length(head) <= _MAX_LENGTH"
                 yield HeadCheck(f"len(head) >= {end} and not {bounds}", f'"length", {place}, b""')
-            case IdPart() | AddressPart() if bare:
-                needed = [each for each in (envelope.id, envelope.address) if each is not None]
-                known = all(envelope.offset(each) < end for each in needed)
-                if isinstance(part, IdPart):
-                    yield HeadCheck(f"len(head) >= {end} and _number(head) not in known", no_frame, "number")
-                if known and envelope.address is not None:
-                    yield HeadCheck(f"len(head) >= {end} and not _allowed(head, known)", no_frame, "address")
-            case IdPart() | AddressPart() | CheckPart():
+            case IdPart() | AddressPart() | CellPart() | EqualPart():
+                for test in pieces.wrong(envelope, part, "head"):
+                    yield HeadCheck(f"len(head) >= {end} and {test}", no_frame, "constant")
+                if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
+                    yield from _bare_checks(envelope, part, f"len(head) >= {end} and", no_frame)
+            case CheckPart():
                 pass
             case MarkPart() | PayloadPart():
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
+
+
+def _bare_checks(envelope: Envelope, part: Part, reached: str, no_frame: str) -> Iterator[HeadCheck]:
+    """The checks of message number and address, as far as known after a part."""
+    if any(bits.part is part for bits in envelope.id) or not envelope.id:
+        yield HeadCheck(f"{reached} _number(head) not in known", no_frame, "number")
+    if envelope.address and envelope.known_at(part, envelope.address):
+        yield HeadCheck(f"{reached} not _allowed(head, known)", no_frame, "address")
 
 
 def _placed(envelope: Envelope, part: CheckPart, mark: str) -> PlacedCheck:

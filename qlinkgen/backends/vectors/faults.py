@@ -20,13 +20,20 @@ from qlinkgen.plan.content import Raw, count_items, pack, pack_items, unpack_ite
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.framing import (
     AddressPart,
+    AddressSlot,
+    CellPart,
     CheckPart,
     ConstantPart,
+    ConstantSlot,
+    EqualPart,
     IdPart,
+    IdSlot,
     LengthPart,
     MarkPart,
+    Numeric,
     Part,
     PayloadPart,
+    Slot,
 )
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -126,9 +133,9 @@ class _Frame:
     def changes(self, *, first: bool) -> Iterator[tuple[str, str, bytes]]:
         """All changes to try: name of the part, error, frame."""
         for part in self._envelope.parts:
-            if first or not isinstance(part, ConstantPart | LengthPart | IdPart):
+            if first or not isinstance(part, ConstantPart | LengthPart | IdPart | CellPart | EqualPart):
                 for what, cells in self._changed(part):
-                    yield part.name, what, self._joined({**self._cells, **cells})
+                    yield part.name, what, self._joined(self._derived({**self._cells, **cells}, part))
         yield from self._misplaced()
         wire = self._good.wire
         for size in _cuts(len(wire)) if first else (len(wire) - 1,):
@@ -138,6 +145,14 @@ class _Frame:
 
     def _made(self, payload: bytes) -> dict[str, bytes]:
         return self._codec.cells(self._message, self._codec.sent(payload), self._good.address or 0)
+
+    def _derived(self, cells: dict[str, bytes], changed: Part) -> Mapping[str, bytes]:
+        """The parts, those that are derived from others computed again."""
+        for part in self._envelope.parts:
+            if isinstance(part, EqualPart) and part is not changed:
+                number = part.of.integer.unpack(cells[part.of.name])
+                cells[part.name] = part.integer.pack(part.value(number))
+        return cells
 
     def _joined(self, cells: Mapping[str, bytes]) -> bytes:
         return self._codec.join(self._message, cells, self._good.request)
@@ -151,7 +166,7 @@ class _Frame:
             case ConstantPart():
                 data = part.data[:-1] + bytes((part.data[-1] ^ 1,))
                 yield f"{name} is {data.hex()}", {name: data}
-            case LengthPart() | IdPart() | AddressPart():
+            case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
                 for number in self._numbers(part):
                     yield f"{name} is {number}", {name: part.integer.pack(number)}
             case MarkPart():
@@ -163,7 +178,7 @@ class _Frame:
             case _:
                 assert_never(part)
 
-    def _numbers(self, part: LengthPart | IdPart | AddressPart) -> Iterable[int]:
+    def _numbers(self, part: Numeric) -> Iterable[int]:
         most = part.integer.maximum
         match part:
             case LengthPart():
@@ -174,8 +189,30 @@ class _Frame:
                 return self._unused(most)
             case AddressPart():
                 return _outside(self._message.allowed, 0, most)
+            case CellPart():
+                return [number for slot in part.slots for number in self._slot_numbers(part, slot)]
+            case EqualPart():
+                return (part.integer.unpack(self._cells[part.name]) ^ 1,)
             case _:
                 assert_never(part)
+
+    def _slot_numbers(self, part: CellPart, slot: Slot) -> Iterator[int]:
+        """Numbers of a part with other bits in a slot."""
+        now, mask = part.integer.unpack(self._cells[part.name]), (1 << slot.bits) - 1
+        wrong: Iterable[int]
+        match slot:
+            case ConstantSlot():
+                wrong = itertools.islice((bits for bits in range(mask + 1) if bits not in slot.values), 1)
+            case IdSlot():
+                known = self._codec.plan.known(self._codec.plan.direction_of(self._message))
+                rest = self._message.id & ~(mask << slot.at)
+                unused = (bits for bits in range(mask + 1) if rest | bits << slot.at not in known)
+                wrong = itertools.islice(unused, 1)
+            case AddressSlot():
+                wrong = _outside(self._message.allowed, 0, mask)
+            case _:
+                assert_never(slot)
+        yield from (now & ~(mask << slot.shift) | bits << slot.shift for bits in wrong)
 
     def _unused(self, most: int) -> Iterable[int]:
         """An unused message number, if there is one."""

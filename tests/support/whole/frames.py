@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
 
 Doc = dict[str, Any]
@@ -43,14 +44,40 @@ class Shape:
     word: int = 0
     #: The checksum of a marked frame lists its messages.
     only: bool = False
+    #: Name and bits of the pieces of the message id, if there is not just one.
+    pieces: list[tuple[str, int]] = field(default_factory=list)
+    #: A part states the direction, so every message needs one.
+    directed: bool = False
+
+    def id(self, number: int) -> int | Doc:
+        """A number as the id of a message; of several pieces the first is the most significant."""
+        given = dict[str, int]()
+        for name, bits in reversed(self.pieces):
+            given[name] = number & (1 << bits) - 1
+            number >>= bits
+        return given if len(given) > 1 else next(iter(given.values()), number)
+
+    def number(self, given: int | Doc) -> int:
+        """The number of an id."""
+        if isinstance(given, int):
+            return given
+        number = 0
+        for name, bits in self.pieces:
+            number = number << bits | given[name]
+        return number
 
 
 def choose(rng: random.Random, words: _Words) -> Shape:
     """A frame of any kind."""
-    kind = rng.choices(("hunted", "parts", "marked", "packet"), (16, 66, 10, 8))[0]
+    kind = rng.choices(("hunted", "parts", "mixed", "marked", "packet"), (16, 40, 26, 10, 8))[0]
     if kind == "marked":
         return _marked(rng)
-    shape = _packet(rng) if kind == "packet" else _Parts(rng, words).make(hunted=kind == "hunted")
+    if kind == "packet":
+        shape = _packet(rng)
+    elif kind == "mixed":
+        shape = _Parts(rng, words).mixed()
+    else:
+        shape = _Parts(rng, words).make(hunted=kind == "hunted")
     for key in ("parts", "packet"):
         parts: Doc = shape.frame.get(key, {})
         for name, spec in parts.items():
@@ -60,7 +87,7 @@ def choose(rng: random.Random, words: _Words) -> Shape:
 
 def _shorter(rng: random.Random, spec: Doc) -> object:
     """A part in one of its notations."""
-    if spec["role"] in ("message", "address", "payload") or rng.random() < 0.3:
+    if spec.get("role") not in ("constant", "length", "checksum") or rng.random() < 0.3:
         return spec
     rest = {key: value for key, value in spec.items() if key != "role"}
     if spec["role"] != "constant":
@@ -154,6 +181,31 @@ class _Parts:
         if stuffing:
             frame["stuffing"] = stuffing
         return self._shape(frame, names, stuffing, strict=strict)
+
+    def mixed(self) -> Shape:
+        """A frame with parts of several roles, some of them after the payload."""
+        lead, mixture = self._lead(), Mixture(self.rng)
+        names = {"lead": self._add("start", {"role": "constant", "value": lead})} if lead else {}
+        mixture.draw()
+        self.parts |= mixture.front
+        names["payload"] = self._add("data", {"role": "payload"})
+        self.parts |= mixture.back
+        self.taken |= {*self.parts, mixture.address}
+        if mixture.length:
+            names["length"] = mixture.length
+            self.parts[mixture.length]["counts"] = [names["payload"]]
+        self._checked(names, whole=False)
+        if "length" in names:
+            self._counts(names, hunted=False, every=False)
+        frame: Doc = {"parts": self.parts}
+        stuffing = self._stuffing(names, lead, hunted=False, strict=False)
+        if stuffing:
+            frame["stuffing"] = stuffing
+        shape = self._shape(frame, {**names, "message": names["payload"]}, stuffing, strict=False)
+        shape.pieces, shape.directed = mixture.pieces, mixture.directed
+        shape.id_bits = sum(bits for _, bits in mixture.pieces)
+        shape.address_bits, shape.address_name = mixture.address_bits, mixture.address
+        return shape
 
     def _lead(self) -> str:
         return self.rng.choice(_LEADS) if self._chance(0.75) else ""
@@ -274,7 +326,7 @@ class _Parts:
             frame,
             least,
             most,
-            int(parts[names["message"]]["type"][1:]),
+            int(parts[names["message"]].get("type", "u0")[1:]),
             rng.choices(("master_slave", "ring", "host"), (8, 1, 1))[0],
             "length" in names,
             int(address["type"][1:]) if address else 0,
@@ -299,9 +351,9 @@ class _Parts:
 
 
 def _size(part: Doc) -> int:
-    if part["role"] == "payload":
+    if part.get("role") == "payload":
         return 0
-    if part["role"] == "constant":
+    if "value" in part:
         return len(bytes.fromhex(part["value"]))
     return len(part["sent"]) if "sent" in part else int(part["type"][1:]) // 8
 

@@ -124,16 +124,26 @@ class _Maker:
         kinds = rng.choices(("both", "commands", "messages", "undirected"), (5, 3, 1, 1))[0]
         if shape.kind == "packet":
             kinds = rng.choice(("both", "commands"))
+        elif shape.directed and kinds == "undirected":
+            kinds = "messages"
         found: Doc = {}
         taken: set[str] = set(maker.taken)
         if rng.random() < 0.3:
             found["attributes"] = {"level": {"doc": self.words.text(), "values": ["user", "service"]}}
-        found["commands"] = {}
+        if shape.id_bits == 0:
+            return found | self._only(shape, maker, bus, taken, attributes="attributes" in found)
+        return found | self._several(shape, maker, bus, taken, kinds, attributes="attributes" in found)
+
+    def _several(
+        self, shape: Shape, maker: FieldMaker, bus: Doc, taken: set[str], kinds: str, *, attributes: bool
+    ) -> Doc:
+        rng = self.rng
+        found: Doc = {"commands": {}}
         free = (1 << shape.id_bits) - (shape.end_id >= 0)
         if kinds in ("both", "commands"):
             for _ in range(rng.randint(1, min(4, free - 1))):
                 name = self.words.name(taken)
-                found["commands"][name] = self._command(shape, maker, bus, attributes="attributes" in found)
+                found["commands"][name] = self._command(shape, maker, bus, attributes=attributes)
         found["messages"] = {}
         if kinds != "commands":
             for _ in range(rng.randint(1, min(3, free - len(found["commands"])))):
@@ -145,9 +155,16 @@ class _Maker:
             self._answers(shape, maker, found)
         return {key: value for key, value in found.items() if value or key == "commands"}
 
+    def _only(self, shape: Shape, maker: FieldMaker, bus: Doc, taken: set[str], *, attributes: bool) -> Doc:
+        """The traffic of a frame without a message id: one message for each direction."""
+        name = self.words.name(taken)
+        if self.rng.random() < 0.7:
+            return {"commands": {name: self._command(shape, maker, bus, attributes=attributes)}}
+        return {"commands": {}, "messages": {name: self._message(shape, maker, "messages")}}
+
     def _command(self, shape: Shape, maker: FieldMaker, bus: Doc, *, attributes: bool) -> Doc:
         rng = self.rng
-        command: Doc = {"id": self._id(shape)}
+        command: Doc = self._identified(shape)
         addressing = "node"
         if shape.address_bits:
             most = (
@@ -179,26 +196,27 @@ class _Maker:
         used |= {("response", number) for number in self._ids}
         answered = {name: spec for name, spec in found["commands"].items() if spec["response"] != "none"}
         for spec in answered.values():
-            number = self._answer_id(shape, [spec["id"]], used, relative=rng.random() < 0.5)
+            asked = [shape.number(spec["id"])]
+            number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None and rng.random() < 0.4:
                 spec["response"] = {"id": number, "fields": spec["response"]}
         taken = {*found["commands"], *found["messages"], "request", "response"}
         if answered and rng.random() < 0.7:
             relative = rng.random() < 0.6
-            number = self._answer_id(
-                shape, [each["id"] for each in answered.values()], used, relative=relative
-            )
+            asked = [shape.number(each["id"]) for each in answered.values()]
+            number = self._answer_id(shape, asked, used, relative=relative)
             if number is not None:
                 found["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
         if answered and rng.random() < 0.5:
             spec = rng.choice(list(answered.values()))
-            number = self._answer_id(shape, [spec["id"]], used, relative=rng.random() < 0.5)
+            asked = [shape.number(spec["id"])]
+            number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None:
                 spec["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
 
     def _answer_id(
         self, shape: Shape, asked: list[int], used: set[tuple[str, int]], *, relative: bool
-    ) -> int | str | None:
+    ) -> int | Doc | str | None:
         """A number for the answers to requests that no other message has."""
         top = (1 << shape.id_bits) - 1
         for _ in range(20):
@@ -207,10 +225,12 @@ class _Maker:
             taken = {("response", each) for each in numbers}
             if not taken & used and all(0 <= each <= top and each != shape.end_id for each in numbers):
                 used |= taken
-                return f"request.id {'-' if number < 0 else '+'} {abs(number):#x}" if relative else number
+                if not relative:
+                    return shape.id(number)
+                return f"request.id {'-' if number < 0 else '+'} {abs(number):#x}"
         return None
 
-    def _reply(self, shape: Shape, maker: FieldMaker, number: int | str) -> Doc:
+    def _reply(self, shape: Shape, maker: FieldMaker, number: int | Doc | str) -> Doc:
         rng = self.rng
         fields = maker.fields(Room.of(shape))
         reply: Doc = {"id": number, "fields": fields}
@@ -234,8 +254,10 @@ class _Maker:
         return maker.fields(Room.of(shape), echoes)
 
     def _message(self, shape: Shape, maker: FieldMaker, kinds: str) -> Doc:
-        message: Doc = {"id": self._id(shape)}
+        message: Doc = self._identified(shape)
         direction = "request" if shape.kind == "packet" else self.rng.choice(("request", "response", None))
+        if shape.directed:
+            direction = direction or "request"
         if direction and kinds != "undirected":
             message["direction"] = direction
         return self._described(message | {"fields": maker.fields(Room.of(shape))})
@@ -246,6 +268,12 @@ class _Maker:
         if self.rng.random() < 0.4:
             spec["section"] = "user's guide" if self.hostile else "7.10"
         return spec
+
+    def _identified(self, shape: Shape) -> Doc:
+        """The id of a message, if the frame has one; of several pieces the first is the most significant."""
+        if shape.id_bits == 0:
+            return {}
+        return {"id": shape.id(self._id(shape))}
 
     def _id(self, shape: Shape) -> int:
         """A unique number, often the stuffed byte or a bound."""

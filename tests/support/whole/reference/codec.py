@@ -42,7 +42,12 @@ class Reference:
         parts = {**shape.get("parts", {}), **shape.get("packet", {})}
         sizes = [spec["size"] for spec in map(part_doc, parts.values()) if spec["role"] == "payload"]
         most = whole_span(sizes[0] if sizes else shape["marked"]["payload"])[1]
-        addressed = [name for name, spec in parts.items() if part_doc(spec)["role"] == "address"]
+        addressed = [
+            inner or name
+            for name, spec in parts.items()
+            for inner, role, *_ in document.bits_of(spec)
+            if role == "address"
+        ]
         self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None
         self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
         self.by_name = {message.name: message for message in self.messages}

@@ -281,7 +281,15 @@ def part_doc(given: object) -> Doc:
     if not isinstance(given, dict):
         pairs = isinstance(given, int) or re.fullmatch("([0-9A-F]{2} ?)+", str(given))
         given = {"value" if pairs else "type": given}
-    told = {"value": "constant", "text": "constant", "counts": "length", "algorithm": "checksum"}
+    told = {
+        "bits": "bits",
+        "equals": "derived",
+        "const": "constant",
+        "value": "constant",
+        "text": "constant",
+        "counts": "length",
+        "algorithm": "checksum",
+    }
     return {"role": next((role for key, role in told.items() if key in given), "value"), **given}
 
 
@@ -473,6 +481,33 @@ def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
     return replace(slot, kind=replace(kind, high=max(1, most)))
 
 
+def bits_of(spec: Doc) -> Iterator[tuple[str, str, int, int, Doc]]:
+    """What the bits of a part hold: name ("" for all bits), role, lowest bit, number of bits, mapping."""
+    spec = part_doc(spec)
+    if spec["role"] in ("message", "address", "direction", "constant") and "type" in spec:
+        yield "", spec["role"], 0, int(spec["type"][1:]), spec
+    for name, inner in spec.get("bits", {}).items():
+        first, last = whole_span(inner["at"])
+        yield name, inner.get("role", "constant"), first, last + 1 - first, inner
+
+
+def numbered(document: Doc, given: Any, direction: Direction) -> int:
+    """The number of a message: the direction, then the pieces of its id."""
+    number = 0
+    parts = document["frame"].get("parts", {})
+    if not parts:
+        return int(given)
+    pieces = [(name, each) for name, spec in parts.items() for each in bits_of(spec)]
+    for wanted in ("direction", "message"):
+        for part, (inner, role, _, bits, spec) in pieces:
+            if role == wanted:
+                name = inner or part
+                values = spec.get("values", {}).get(direction) if role == "direction" else given
+                value = values[name] if isinstance(values, dict) else values
+                number = number << bits | value
+    return number
+
+
 def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
     """All messages of a file, in order."""
     found: list[Message] = []
@@ -486,7 +521,7 @@ def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, .
         found.append(
             Message(
                 name,
-                spec["id"],
+                numbered(document, spec.get("id"), spec.get("direction", "message")),
                 spec.get("direction", "message"),
                 fields.build(spec["fields"]),
                 (nodes,) if nodes else (),
@@ -506,9 +541,11 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
             _addresses(spec.get("addressing", "node"), direction, document) if addressed else ((), 0)
         )
         empty = direction == "request" and spec.get("empty_request") == "defaults"
-        number, written = spec["id"], spec[direction]
+        number, written = spec.get("id"), spec[direction]
         if direction == "response":
-            number, written = _number(written.get("id", "request.id"), number), written["fields"]
+            number, written = _number(document, written.get("id"), number), written["fields"]
+        else:
+            number = numbered(document, number, direction)
         slots = fields.build(written)
         yield Message(
             f"{name}.{direction}",
@@ -538,12 +575,12 @@ def _long(given: Any) -> Doc:
     return dict(given) if is_long else {"fields": given}
 
 
-def _number(given: Any, asked: int) -> int:
-    """The number of an answer."""
-    if not str(given).startswith("request"):
-        return int(given)
-    offset = str(given).replace(" ", "").removeprefix("request.id")
-    return asked + int(offset or "0", 0)
+def _number(document: Doc, given: Any, asked: Any) -> int:
+    """The number of an answer; `given` is None if it is that of the request."""
+    if given is not None and not str(given).startswith("request"):
+        return numbered(document, given, "response")
+    offset = str(given or "").replace(" ", "").removeprefix("request.id")
+    return numbered(document, asked, "response") + int(offset or "0", 0)
 
 
 def _replies(
@@ -555,12 +592,12 @@ def _replies(
     if spec["response"] == "none":
         return
     for key, reply in (*common.items(), *own.items()):
-        shared = key in common and isinstance(reply.get("id"), int)
+        shared = key in common and isinstance(reply.get("id"), int | dict)
         full = key if shared else f"{name}.{key}"
         if full in known:
             continue
         nodes = (_nodes(document),) if addressed else ()
-        number = _number(reply.get("id", "request.id"), spec["id"])
+        number = _number(document, reply.get("id"), spec.get("id"))
         slots = fields.build(reply["fields"])
         checked = _checked(document, key if shared else name)
         default = nodes[0][0] if nodes else 0

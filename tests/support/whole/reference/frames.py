@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from tests.support.whole.reference.document import (
     Number,
     Records,
     Run,
+    bits_of,
     byte_pieces,
     octets,
     part_doc,
@@ -51,6 +53,21 @@ class Part:
     spec: Doc
     constant: bytes = b""
     pieces: tuple[tuple[int, int], ...] = ()
+    #: Role, lowest bit and number of bits of what its integer holds, and their mapping.
+    bits: tuple[tuple[str, int, int, Doc], ...] = ()
+
+    @property
+    def mask(self) -> int:
+        """All its bits."""
+        return (1 << 8 * self.size) - 1
+
+    def accepts(self, raw: int) -> bool:
+        """Whether the constants in its bits are legal."""
+        return all(
+            raw >> shift & (1 << bits) - 1 in _several(spec["const"])
+            for role, shift, bits, spec in self.bits
+            if role == "constant"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +98,7 @@ class Stuffing:
 def part_of(name: str, spec: object, order: str) -> Part:
     """A part from its mapping."""
     spec = part_doc(spec)
-    if spec["role"] == "constant":
+    if spec["role"] == "constant" and "type" not in spec:
         constant = spec["text"].encode("ascii") if "text" in spec else octets(spec["value"])
         return Part(name, "constant", len(constant), spec, constant)
     if spec["role"] == "payload":
@@ -89,7 +106,16 @@ def part_of(name: str, spec: object, order: str) -> Part:
     pieces = byte_pieces(int(spec["type"][1:]) // 8, spec.get("byteorder", order))
     if "sent" in spec:
         pieces = tuple((first, last + 1 - first) for first, last in map(whole_span, spec["sent"]))
-    return Part(name, spec["role"], len(pieces), spec, pieces=pieces)
+    bits = tuple((role, shift, size, inner) for _, role, shift, size, inner in bits_of(spec))
+    if spec["role"] == "constant" and len(_several(spec["const"])) == 1:
+        data = put(pieces, _several(spec["const"])[0])
+        return Part(name, "constant", len(data), spec, data)
+    role = "bits" if spec["role"] in ("constant", "direction", "message", "address") else spec["role"]
+    return Part(name, role, len(pieces), spec, pieces=pieces, bits=bits)
+
+
+def _several(given: Any) -> list[int]:
+    return given if isinstance(given, list) else [given]
 
 
 class Frame:
@@ -133,7 +159,15 @@ class Frame:
             roles.count("constant") > 1
             or roles.count("checksum") != 1
             or roles[-1] != "checksum"
-            or self.by_role["message"].size != 1
+            or "derived" in roles
+        ):
+            return False
+        # Message number and address are whole parts.
+        alone = [part.bits[0] for part in self.parts if len(part.bits) == 1 and "at" not in part.bits[0][3]]
+        kinds = sorted((role, bits if role == "message" else 0) for role, _, bits, _ in alone)
+        if len(alone) < roles.count("bits") or kinds not in (
+            [("message", 8)],
+            [("address", 0), ("message", 8)],
         ):
             return False
         check = self.parts[-1]
@@ -156,16 +190,41 @@ class Frame:
         if self.stuffing and self.stuffing.payload_alone:
             payload = self.stuffing.stuff(payload)
         cut: dict[str, bytes] = {}
-        numbers = {"length": self.bias + len(payload), "message": number, "address": address}
+        left = sum(bits for _, _, bits, _ in self.id_bits())
+        rest = {}
+        for name, shift, bits, _ in self.id_bits():
+            left -= bits
+            rest[name, shift] = number >> left & (1 << bits) - 1
         for part in self.parts:
-            if part.role in numbers:
-                cut[part.name] = put(part.pieces, numbers[part.role])
+            if part.role == "length":
+                cut[part.name] = put(part.pieces, self.bias + len(payload))
+            elif part.role == "bits":
+                raw = 0
+                for role, shift, _, spec in part.bits:
+                    fixed = {"address": address, "constant": _several(spec.get("const"))[0]}
+                    raw |= (rest[part.name, shift] if role not in fixed else fixed[role]) << shift
+                cut[part.name] = put(part.pieces, raw)
+            elif part.role == "derived":
+                cut[part.name] = put(part.pieces, self.derived(part, cut))
             else:
                 cut[part.name] = payload if part.role == "payload" else part.constant
         for _ in self.checks:  # so often that those which cover others become right
             for check in self.checks:
                 cut[check.name] = put(check.pieces, self.check_value(check, cut))
         return self._stuffed(cut)
+
+    def id_bits(self) -> list[tuple[str, int, int, str]]:
+        """The pieces of the message number, the most significant first: part, lowest bit, bits, role."""
+        found = [(part.name, shift, bits, role) for part in self.parts for role, shift, bits, _ in part.bits]
+        return [each for wanted in ("direction", "message") for each in found if each[3] == wanted]
+
+    def derived(self, part: Part, cut: Mapping[str, bytes]) -> int:
+        """The value of a part that follows from an earlier one."""
+        found = re.fullmatch(r"(~?) ?(\w+)( [+-] \d+)?", part.spec["equals"])
+        assert found
+        source = next(each for each in self.parts if each.name == found[2])
+        raw = get(source.pieces, cut[source.name])
+        return (~raw if found[1] else raw) + int((found[3] or "0").replace(" ", "")) & part.mask
 
     def _stuffed(self, cut: Mapping[str, bytes]) -> bytes:
         wire, run = b"", b""
@@ -194,13 +253,39 @@ class Frame:
         return any(cut[each.name] != put(each.pieces, self.check_value(each, cut)) for each in checks)
 
     def bad_constant(self, cut: Mapping[str, bytes]) -> bool:
-        """Whether a constant is wrong."""
-        return any(part.role == "constant" and cut[part.name] != part.constant for part in self.parts)
+        """Whether a constant or a derived number is wrong."""
+        return any(self.wrong(part, cut) for part in self.parts)
+
+    def wrong(self, part: Part, cut: Mapping[str, bytes]) -> bool:
+        """Whether a part is a wrong constant, has one in its bits, or is wrongly derived."""
+        if part.role == "constant":
+            return cut[part.name] != part.constant
+        if part.role == "derived":
+            return get(part.pieces, cut[part.name]) != self.derived(part, cut)
+        return part.role == "bits" and not part.accepts(get(part.pieces, cut[part.name]))
 
     def number(self, role: str, cut: Mapping[str, bytes]) -> int | None:
-        """The integer of a part; None if the frame has none, or its bytes are missing."""
-        part = self.by_role.get(role)
-        return get(part.pieces, cut[part.name]) if part and part.name in cut else None
+        """The length, message number or address; None if the frame has none, or bytes are missing."""
+        if role == "length":
+            part = self.by_role.get(role)
+            return get(part.pieces, cut[part.name]) if part and part.name in cut else None
+        found = (
+            self.id_bits()
+            if role == "message"
+            else [
+                (part.name, shift, bits, "")
+                for part in self.parts
+                for kind, shift, bits, _ in part.bits
+                if kind == role
+            ]
+        )
+        if any(name not in cut for name, *_ in found) or (role == "address" and not found):
+            return None
+        number = 0
+        for name, shift, bits, _ in found:
+            part = next(each for each in self.parts if each.name == name)
+            number = number << bits | get(part.pieces, cut[name]) >> shift & (1 << bits) - 1
+        return number
 
 
 def _stuffing(spec: Any) -> Stuffing | None:
@@ -301,7 +386,9 @@ class Splitter:
             announced = (frame.number("length", cut) or 0) - frame.bias
             if not frame.least <= announced <= frame.most_sent:
                 raise Refused("length", cursor.at)
-        if frame.bare and part.role in ("message", "address"):
+        if part.role in ("bits", "derived") and frame.wrong(part, cut):
+            raise Refused("frame", cursor.at, told=False)
+        if frame.bare and any(role != "constant" for role, *_ in part.bits):
             number, address = frame.number("message", cut), frame.number("address", cut)
             if number is None:
                 return

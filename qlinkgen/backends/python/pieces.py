@@ -1,0 +1,59 @@
+"""Message numbers and addresses in the bits of parts, as expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from qlinkgen.backends.python import integers
+from qlinkgen.plan.framing import Bits, CellPart, Envelope, EqualPart, Numeric, Part
+
+
+def number(envelope: Envelope, pieces: tuple[Bits, ...], source: str, skipped: int = 0) -> str:
+    """The number or address in these pieces of a frame without its first bytes; "0" without pieces."""
+    terms = [
+        _piece(bits, read(envelope, bits.part, source, skipped), alone=len(pieces) == 1) for bits in pieces
+    ]
+    return " | ".join(terms) or "0"
+
+
+def _piece(bits: Bits, whole: str, *, alone: bool) -> str:
+    if not bits.whole:
+        whole = f"{whole} >> {bits.shift} & 0x{bits.mask:X}" if bits.shift else f"{whole} & 0x{bits.mask:X}"
+        whole = whole if alone else f"({whole})"
+    return f"{whole} << {bits.at}" if bits.at else whole
+
+
+def read(envelope: Envelope, part: Numeric, source: str, skipped: int = 0) -> str:
+    """The integer of a part of a frame, or of its header if the part precedes the payload."""
+    if part in envelope.front:
+        start = envelope.offset(part) - skipped
+        return integers.read(part.integer, source, lambda more: str(start + more))
+    start = -envelope.from_end(part)
+    return integers.read(part.integer, source, lambda more: str(start + more) if start + more else "")
+
+
+def wrong(envelope: Envelope, part: Part, source: str) -> Iterator[str]:
+    """Conditions that hold if a constant or a derived number in an integer is wrong."""
+    match part:
+        case CellPart():
+            for slot in part.constants:
+                seen = read(envelope, part, source)
+                if slot.bits < part.integer.bits:
+                    shifted = f"{seen} >> {slot.shift}" if slot.shift else seen
+                    seen = f"{shifted} & 0x{(1 << slot.bits) - 1:X}"
+                right = ", ".join(f"0x{value:02X}" for value in slot.values)
+                yield f"{seen} not in ({right})" if len(slot.values) > 1 else f"{seen} != {right}"
+        case EqualPart():
+            yield f"{read(envelope, part, source)} != {derived(part, read(envelope, part.of, source))}"
+        case _:
+            pass
+
+
+def derived(part: EqualPart, other: str) -> str:
+    """The value of a derived number."""
+    if not part.inverted and not part.added:
+        return other
+    primary = other if other.isidentifier() or other.endswith("]") or other.isdecimal() else f"({other})"
+    value = f"~{primary}" if part.inverted else primary
+    value += f" {'+' if part.added > 0 else '-'} {abs(part.added)}" if part.added else ""
+    return f"({value if part.inverted and not part.added else f'({value})'} & 0x{part.integer.mask:X})"

@@ -1,0 +1,195 @@
+"""Second pass, pieces: the roles of the bits of a part, and the message id that they make up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from qlinkgen.model.frame import DelimitedFrame, Frame, Part, PartBits
+from qlinkgen.model.message import Direction
+from qlinkgen.model.types import Scalar
+from qlinkgen.schema.file_model import PartBitSpec, PartSpec
+from qlinkgen.schema.notation import StatedId
+from qlinkgen.schema.report import Reporter, listed
+from qlinkgen.schema.source import Path
+
+#: Maximum number of bits of a message id.
+MAX_ID_BITS = 64
+
+
+class PieceBuilder:
+    """Builds the bits of parts."""
+
+    def __init__(self, report: Reporter) -> None:
+        """``report`` collects the errors."""
+        self._report = report
+
+    def whole(self, name: str, spec: PartSpec, scalar: Scalar, path: Path) -> PartBits | None:
+        """All bits of a part with one role; None for a role that needs no bits."""
+        match spec.told:
+            case "message" | "address" | "direction" as role:
+                directions = self._directions(spec, scalar.bits, path) if role == "direction" else {}
+                return PartBits(name=name, role=role, shift=0, bits=scalar.bits, directions=directions)
+            case "constant":
+                constants = self._constants(spec, scalar.bits, path)
+                return PartBits(name=name, role="constant", shift=0, bits=scalar.bits, constants=constants)
+            case _:
+                return None
+
+    def inside(self, specs: Mapping[str, PartBitSpec], container: Scalar, path: Path) -> tuple[PartBits, ...]:
+        """The bits of an integer with several roles."""
+        found: list[PartBits] = []
+        for name, spec in specs.items():
+            place = (*path, "bits", name)
+            last = spec.at[1]
+            if last >= container.bits:
+                what = f"{name} extends to bit {last}"
+                self._fault("bits-do-not-fit", place, what, f"use bits 0..{container.bits - 1}")
+                continue
+            bits = self._inside(name, spec, place)
+            if other := next((each.name for each in found if each.mask & bits.mask), None):
+                self._fault("bits-overlap", place, f"{name} overlaps {other}", "use different bits")
+            found.append(bits)
+        return tuple(found)
+
+    def _inside(self, name: str, spec: PartBitSpec, path: Path) -> PartBits:
+        first, last = spec.at
+        width, role = last + 1 - first, spec.role or ("constant" if spec.const else None)
+        if role is None or (spec.role and spec.const):
+            what = f"{name} has {'a role and a constant' if spec.role else 'neither a role nor a constant'}"
+            self._fault("bad-frame", path, what, "use role: message, address or direction, or const: NUMBER")
+        if spec.values is not None and role != "direction":
+            self._fault("not-applicable", (*path, "values"), "'values' has no effect here", "remove it")
+        return PartBits(
+            name=name,
+            role=role or "constant",
+            shift=first,
+            bits=width,
+            constants=self._constants(spec, width, path) if role == "constant" else (),
+            directions=self._directions(spec, width, path) if role == "direction" else {},
+            doc=spec.doc,
+        )
+
+    def _constants(self, spec: PartSpec | PartBitSpec, bits: int, path: Path) -> tuple[int, ...]:
+        for number in spec.const or ():
+            self._check_fits(number, bits, (*path, "const"))
+        return tuple(dict.fromkeys(spec.const or (0,)))
+
+    def _directions(self, spec: PartSpec | PartBitSpec, bits: int, path: Path) -> Mapping[str, int]:
+        values = spec.values
+        if values is None:
+            if not self._report.touched((*path, "values")):
+                hint = "add values: {request: 0, response: 1}"
+                what = f"{path[-1]} has no values"
+                self._report.error("bad-frame", path, what, hint, of_key=True, absent=True)
+            return {"request": 0, "response": 0}
+        for direction, number in values.items():
+            self._check_fits(number, bits, (*path, "values", direction))
+        if len(set(values.values())) < len(values):
+            what = f"{path[-1]} is the same in both directions"
+            self._fault("bad-frame", (*path, "values"), what, "use different values")
+        return {str(direction): number for direction, number in values.items()}
+
+    def _check_fits(self, number: int, bits: int, path: Path) -> None:
+        if number >> bits:
+            what = f"{number} does not fit {bits} bits"
+            self._report.error("value-does-not-fit", path, what, f"use 0..{(1 << bits) - 1}")
+
+    def _fault(self, rule: str, path: Path, what: str, hint: str) -> None:
+        self._report.error(rule, path, what, hint, of_key=True)
+
+
+def placed(parts: tuple[Part, ...]) -> tuple[Part, ...]:
+    """The parts, the pieces of the message id in their places: the direction first, then in wire order."""
+    pieces = [bits for part in parts for bits in part.bits if bits.role in ("direction", "message")]
+    pieces.sort(key=lambda each: each.role != "direction")
+    places, at = dict[str, int](), 0
+    for each in reversed(pieces):
+        places[each.name] = at
+        at += each.bits
+    return tuple(
+        replace(part, bits=tuple(replace(bits, at=places.get(bits.name, 0)) for bits in part.bits))
+        for part in parts
+    )
+
+
+class IdBuilder:
+    """Composes the ids of messages from the numbers in a file."""
+
+    def __init__(self, report: Reporter, frame: Frame | None) -> None:
+        """``frame`` is None if it could not be built."""
+        self._report = report
+        self._frame = frame
+        pieces = frame.id_bits if isinstance(frame, DelimitedFrame) else ()
+        self._direction = next((each for each in pieces if each.role == "direction"), None)
+        self._pieces = [each for each in pieces if each.role == "message"]
+
+    def number(self, stated: StatedId, direction: Direction, path: Path, whose: str = "") -> int:
+        """The id of a message, stated at a path; ``whose`` is its name if it is not that of its command."""
+        number = self._stated(stated, path, f" of {whose}" if whose else "")
+        if self._direction is None:
+            return number
+        if direction == "message":
+            what = f"{path[-2]} has no direction, which its frame states"
+            hint = "add direction: request or direction: response"
+            self._report.error("bad-frame", path[:-1], what, hint, of_key=True, needs=(path[:-1], ("frame",)))
+            direction = "request"
+        return number | self._direction.directions[direction] << self._direction.at
+
+    def _stated(self, stated: StatedId, path: Path, whose: str) -> int:
+        given = stated.given
+        if not isinstance(self._frame, DelimitedFrame):
+            return (given if isinstance(given, int) else self._missing(path)) + stated.added
+        names = [each.name for each in self._pieces]
+        if not names:
+            if given is not None or stated.added:
+                hint = "remove it, or add a part with role: message"
+                self._wrong(path, "the frame has no message id", hint)
+            return 0
+        if given is None:
+            return self._missing(path)
+        if isinstance(given, int):
+            if len(names) > 1:
+                hint = f"write {{{', '.join(f'{name}: NUMBER' for name in names)}}}"
+                self._wrong(path, f"the id consists of {listed(names)}", hint)
+                return 0
+            given = {names[0]: given}
+        return self._added(self._composed(given, names, path), stated.added, path, whose)
+
+    def _composed(self, given: Mapping[str, int], names: list[str], path: Path) -> int:
+        if set(given) != set(names):
+            hint = f"give {listed(names)}, and nothing else"
+            self._wrong(path, f"the id consists of {listed(names)}", hint)
+            return 0
+        for piece in self._pieces if len(names) > 1 else ():
+            value = given[piece.name]
+            if value >> piece.bits:
+                what, hint = (
+                    f"{piece.name} {value:#x} does not fit the frame",
+                    f"use 0..{(1 << piece.bits) - 1:#x}",
+                )
+                self._wrong(path, what, hint, "id-does-not-fit")
+        return sum(given[piece.name] << piece.at for piece in self._pieces)
+
+    def _added(self, number: int, added: int, path: Path, whose: str) -> int:
+        most = (1 << sum(piece.bits for piece in self._pieces)) - 1
+        if not 0 <= number + added <= most:
+            what = f"id {number + added:#x}{whose} does not fit the frame"
+            self._wrong(path, what, f"use 0..{most:#x}", "id-does-not-fit")
+        return number + added
+
+    def _missing(self, path: Path) -> int:
+        if self._frame is not None and not self._report.touched(path):
+            self._report.error(
+                "missing-key",
+                path[:-1],
+                "key 'id' is missing",
+                "add id: its number in the frame",
+                of_key=True,
+                absent=True,
+            )
+        self._report.taint(path)
+        return 0
+
+    def _wrong(self, path: Path, what: str, hint: str, rule: str = "bad-frame") -> None:
+        self._report.error(rule, path, what, hint, needs=(path, ("frame",)))
