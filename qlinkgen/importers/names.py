@@ -10,19 +10,24 @@ from qlinkgen.importers.notes import Notes
 
 #: The longest name of a schema; a number may follow that tells two names apart.
 _MOST = 40
-_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+_HUMP = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z0-9])(?=[A-Z][a-z])")
 _OTHER = re.compile(r"[^a-z0-9]+")
 _BUILT_IN = re.compile(r"[uif]\d+|bool|bytes|text|u?int|u?fixed\d+")
 
 
 def schema_name(raw: str, fallback: str = "unnamed") -> str:
     """The name of a schema nearest to a name: ``MotorStatus`` is ``motor_status``."""
-    plain = unicodedata.normalize("NFKD", raw[: 4 * _MOST]).encode("ascii", "ignore").decode()
-    words = _OTHER.sub("_", _HUMP.sub("_", plain).lower()).strip("_")
+    words = _words(raw)
     if not words:
         return fallback
     name = words if words[0].isalpha() else f"{fallback[0]}{words}"
     return name[:_MOST].rstrip("_")
+
+
+def _words(raw: str) -> str:
+    """A name in lower case with underscores, of any length."""
+    plain = unicodedata.normalize("NFKD", raw[: 10 * _MOST]).encode("ascii", "ignore").decode()
+    return _OTHER.sub("_", _HUMP.sub("_", plain).lower()).strip("_")
 
 
 class Names:
@@ -41,8 +46,14 @@ class Names:
         self._types = types
         self._taken = set(taken)
 
-    def take(self, raw: str, line: int) -> str:
-        """The name for a name of the input, with a number if another one has it."""
+    def take(self, raw: str, line: int, notes: Notes | None = None) -> str:
+        """The name for a name of the input, with a number if another one has it.
+
+        Args:
+            raw: The name of the input.
+            line: Its line.
+            notes: Those of the file in which it is, if that is another one.
+        """
         wanted = schema_name(raw, self._what.split()[-1])
         if self._types and _BUILT_IN.fullmatch(wanted):
             wanted = f"{wanted}_type"
@@ -51,19 +62,19 @@ class Names:
             number += 1
             name = f"{wanted[: _MOST - len(str(number)) - 1].rstrip('_')}_{number}"
         if name != wanted:
-            self._notes.add(line, f"{self._what} '{raw[:60]}' is called {name}: {wanted} is taken")
+            (notes or self._notes).add(line, f"{self._what} '{raw[:60]}' is called {name}: {wanted} is taken")
         self._taken.add(name)
         return name
 
 
 def without_prefix(raw: Sequence[str]) -> list[str]:
     """Names of constants without the words that all of them begin with."""
-    words = [schema_name(each).split("_") for each in raw]
+    words = [_words(each).split("_") for each in raw]
     if len(words) < 2:
         return list(raw)
     shared = 0
     while all(len(each) > shared + 1 for each in words) and len({each[shared] for each in words}) == 1:
         shared += 1
-    while shared and not all(each[shared][0].isalpha() for each in words):
+    while shared and not all(each[shared][:1].isalpha() for each in words):
         shared -= 1
     return ["_".join(each[shared:]) for each in words]

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from openpyxl import Workbook
 
-from qlinkgen.importers.table import KEYS, Options, cells, read_csv, read_xlsx
+from qlinkgen.importers import cells
+from qlinkgen.importers.table import KEYS, Options, read_csv, read_xlsx
 from qlinkgen.importers.table.kinds import kind
 from tests.importers.conftest import Import, Imported, refused, survives
 

@@ -125,6 +125,8 @@ def test_places_of_items() -> None:
     [
         ("MotorStatus", "motor_status"),
         ("HTTPCode2", "http_code2"),
+        ("MAP_3D", "map_3d"),
+        ("Axis2Speed", "axis2_speed"),
         ("motor-status (rpm)", "motor_status_rpm"),
         ("Überdruck", "uberdruck"),
         ("2nd", "n2nd"),

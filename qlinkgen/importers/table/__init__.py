@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from qlinkgen.importers import cells
 from qlinkgen.importers.document import Command, Document, Field, Item, Message, Value, hexadecimal
 from qlinkgen.importers.frames import assumed
 from qlinkgen.importers.names import Names, schema_name
 from qlinkgen.importers.notes import Notes
-from qlinkgen.importers.table import cells
 from qlinkgen.importers.table.columns import KEYS, Record, Table, table
 from qlinkgen.importers.table.csv_file import csv_rows
 from qlinkgen.importers.table.enums import Enums

@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from qlinkgen.importers import cells
 from qlinkgen.importers.document import Field, Value
 from qlinkgen.importers.names import Names
 from qlinkgen.importers.notes import Notes
-from qlinkgen.importers.table import cells
 from qlinkgen.importers.table.columns import Record
 from qlinkgen.importers.table.enums import Enums
 from qlinkgen.importers.table.kinds import Kind, kind

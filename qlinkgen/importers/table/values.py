@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
+from qlinkgen.importers import cells
 from qlinkgen.importers.document import Notation, Value
 from qlinkgen.importers.notes import Notes
-from qlinkgen.importers.table import cells
 from qlinkgen.importers.table.columns import Record
 from qlinkgen.importers.table.enums import Enums
 from qlinkgen.importers.table.kinds import Kind
