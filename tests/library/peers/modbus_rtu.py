@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from pymodbus.framer import FramerRTU
+from pymodbus.framer import FramerBase, FramerRTU
 from pymodbus.pdu import DecodePDU, ModbusPDU
 from pymodbus.pdu import bit_message as bits
 from pymodbus.pdu import other_message as other
@@ -101,7 +101,8 @@ _GIVEN: Mapping[str, Callable[[Any], Any]] = {
 UNKNOWN: frozenset[str] = frozenset()
 
 
-def build(record: Record) -> bytes | None:
+def pdu_of(record: Record) -> ModbusPDU | None:
+    """The object of pymodbus."""
     name, fields = record["message"], record["fields"]
     pdu: ModbusPDU
     if name.endswith(".exception"):
@@ -122,7 +123,7 @@ def build(record: Record) -> bytes | None:
             return None
         pdu = kind(**given)
     pdu.dev_id = record["node"]
-    return FramerRTU(DecodePDU(is_server=True)).buildFrame(pdu)
+    return pdu
 
 
 def _given(name: str, field: str, value: Any) -> Any:
@@ -131,8 +132,8 @@ def _given(name: str, field: str, value: Any) -> Any:
     return _GIVEN[name](value) if field == "value" else value
 
 
-def read(wire: bytes, direction: Direction) -> Record | None:
-    _, pdu = FramerRTU(DecodePDU(is_server=direction == "request")).handleFrame(wire, 0, 0)
+def record_of(pdu: ModbusPDU | None) -> Record | None:
+    """What an object of pymodbus says."""
     if isinstance(pdu, ExceptionResponse):
         command = next(each for each, number in _FUNCTIONS.items() if number | 0x80 == pdu.function_code)
         code = dict(enumerate(_CODES)).get(pdu.exception_code) or pdu.exception_code
@@ -147,3 +148,17 @@ def read(wire: bytes, direction: Direction) -> Record | None:
             del fields["value"]  # any number but 0xFF00 is off
     fields.pop("status", None)  # likewise
     return {"message": name, "node": pdu.dev_id, "fields": fields}
+
+
+def framer(kind: type[FramerBase], direction: Direction) -> FramerBase:
+    """What reads and builds frames of a direction."""
+    return kind(DecodePDU(is_server=direction == "request"))
+
+
+def build(record: Record) -> bytes | None:
+    pdu = pdu_of(record)
+    return None if pdu is None else framer(FramerRTU, "request").buildFrame(pdu)
+
+
+def read(wire: bytes, direction: Direction) -> Record | None:
+    return record_of(framer(FramerRTU, direction).handleFrame(wire, 0, 0)[1])
