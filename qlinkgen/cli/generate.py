@@ -141,6 +141,11 @@ def _mismatches(protocols: Mapping[str, Protocol]) -> list[str]:
 def _inputs(protocols: Mapping[str, Protocol], targets: Sequence[str]) -> list[Path]:
     """Return the files that the outputs depend on: the schemas, and the vectors in a kit."""
     files = [find_schema(schema) for schema in protocols]
+    files += [
+        file.parent / each.includes
+        for file, each in zip(files, protocols.values(), strict=True)
+        if each.includes
+    ]
     if "conformance" in targets:
         files += [hand_vectors.file_of(each) for schema, each in protocols.items() if ships(schema)]
     return [file for file in files if file.is_file()]

@@ -69,7 +69,7 @@ def _files(schema: str) -> list[Path]:
 
 def _is_schema(file: Path) -> bool:
     """Whether a file has the key of a schema, or cannot be read, which is reported later."""
-    from qlinkgen.schema.loader import read_regular  # noqa: PLC0415  # pydantic is slow to import
+    from qlinkgen.schema.reading import read_regular  # noqa: PLC0415  # pydantic is slow to import
 
     try:
         return bool(_MARK.search(read_regular(file)))

@@ -39,6 +39,8 @@ class Protocol:
     #: False after `without_texts`.
     texts: bool = True
     examples: tuple[Example, ...] = ()
+    #: The schema that it includes, relative to its own, "" for none.
+    includes: str = ""
 
     def without_texts(self) -> Protocol:
         """The protocol without free text, so that generated code contains only names and numbers.

@@ -565,6 +565,10 @@ class SchemaFile(_Mapping):
 
     qlinkgen: Literal[1] = Field(description="Version of the file format")
     protocol: ProtocolSpec = Field(description="Name and source of the protocol")
+    include: str | None = Field(
+        default=None,
+        description="Schema beside or below this file, whose types, commands and messages it has too",
+    )
     byteorder: Order = Field(default="big", description="Default byte order of integers")
     groups: GroupSpec | None = Field(
         default=None, description="Default groups of integers that are not sent in whole bytes"

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
-import os
-import stat
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -18,15 +15,15 @@ from qlinkgen.schema.echoes import check_echoes
 from qlinkgen.schema.examples import build_examples
 from qlinkgen.schema.fields import FieldBuilder
 from qlinkgen.schema.frames import FrameBuilder, payload_bounds
+from qlinkgen.schema.including import include
 from qlinkgen.schema.messages import MessageBuilder
 from qlinkgen.schema.names import check_names
+from qlinkgen.schema.reading import read_regular, reason_of
 from qlinkgen.schema.report import Reporter, did_you_mean
 from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
-
-_KINDS = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
 
 
 def shipped() -> tuple[str, ...]:
@@ -84,7 +81,8 @@ def loads(text: str, file: str, *, crc: str | None = None) -> tuple[Protocol | N
         report.at(fault.rule, fault.position, fault.message, fault.hint)
     if any(fault.rule == "yaml-syntax" for fault in source.faults):
         return None, report.faults
-    protocol = _build(source.data, report, text, FilePath(file).name, crc)
+    texts = (text, *include(source, report))
+    protocol = _build(source.data, report, "".join(texts), FilePath(file).name, crc)
     return protocol if not report.failed else None, report.faults
 
 
@@ -92,25 +90,9 @@ def _load(path: FilePath, crc: str | None) -> tuple[Protocol | None, list[Fault]
     try:
         text = read_regular(path)
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        what = f"cannot read it: {reason}"
+        what = f"cannot read it: {reason_of(error)}"
         return None, [Fault(str(path), 1, 1, "file-unreadable", what, "check the path")]
     return loads(text, str(path), crc=crc)
-
-
-def read_regular(path: FilePath) -> str:
-    """Return the text of a file. Raises OSError, also for files that are not regular and may be endless."""
-    # Otherwise opening a FIFO waits for a writer.
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    try:
-        mode = os.fstat(descriptor).st_mode
-        if not stat.S_ISREG(mode):
-            kind = _KINDS.get(stat.S_IFMT(mode), "a device")
-            raise OSError(errno.EINVAL, f"it is {kind}, not a file", str(path))
-        with os.fdopen(descriptor, encoding="utf-8", closefd=False) as file:
-            return file.read()
-    finally:
-        os.close(descriptor)
 
 
 def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | None) -> Protocol | None:
@@ -149,6 +131,7 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
         messages=tuple(commands.messages),
         schema_hash=hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()[:12],
         schema_file=file_name,
+        includes=file.include or "",
     )
     # With another checksum the bytes of the document are wrong.
     examples = build_examples(file, protocol, report) if crc is None else ()

@@ -58,11 +58,15 @@ class Reporter:
         """Report a fault at a position, even in a tainted node."""
         severity = RULES[rule].severity
         place = (position.line, position.column)
-        fault = Fault(self.file, *place, rule, _one_line(message), _one_line(hint), severity)
+        fault = Fault(position.file or self.file, *place, rule, _one_line(message), _one_line(hint), severity)
         if fault not in self._known:
             self._known.add(fault)
             self.faults.append(fault)
             self.failed |= severity == "error"
+
+    def included(self, path: Path) -> bool:
+        """Whether a node is in another file."""
+        return bool(self.source.position(path, of_key=True).file)
 
     def taint(self, path: Path) -> None:
         """Suppress later errors derived from this path or from nodes inside it."""

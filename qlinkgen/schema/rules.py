@@ -274,6 +274,12 @@ _ALL = (
         "Otherwise there is nothing to generate.",
     ),
     Rule(
+        "bad-include",
+        "An included file is a schema beside or below the including one, and includes no other.",
+        "Its enums, flags, types, attributes, replies, commands and messages are taken over; what the file "
+        "has under the same names replaces them, key by key.",
+    ),
+    Rule(
         "wrong-example",
         "The bytes of an example are a frame of its message, with the values given.",
         "An example is a frame of the source document, so it shows whether the description is right. Values "

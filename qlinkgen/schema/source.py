@@ -41,10 +41,11 @@ _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """A position in the file; line and column count from 1."""
+    """A position; line and column count from 1, and the file is "" unless it was included."""
 
     line: int
     column: int
+    file: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ class TypeBuilder:
         """Warn of unused types."""
         for group in _GROUPS:
             for name in getattr(self._file, group):
-                if name not in self._scalars.used:
+                if name not in self._scalars.used and not self._report.included((group, name)):
                     hint = "remove it, or use it as the type of a field"
                     needs = (("commands",), ("messages",), ("types",), ("defaults",))
                     what = f"'{name}' is not used"

@@ -46,6 +46,16 @@ def test_outputs_and_schemas(qlinkgen: Run, tmp_path: Path, out: Path, thermo: P
     assert "schemas/trio.yaml\n" in dep.read_text()
 
 
+def test_an_included_schema(qlinkgen: Run, tmp_path: Path, out: Path, thermo: Path) -> None:
+    dep, parts, outer = tmp_path / "outer.d", tmp_path / "parts", tmp_path / "outer.yaml"
+    parts.mkdir()
+    before, commands, after = thermo.read_text("utf-8").partition("commands:\n")
+    (parts / "commands.yaml").write_text(commands + after, "utf-8")
+    outer.write_text(f"{before}include: parts/commands.yaml\n", "utf-8")
+    assert qlinkgen("generate", outer, "--target", "c", "-o", out, "--depfile", dep).code == 0
+    assert dep.read_text() == f"{out}/c/thermo.h: \\\n {outer} \\\n {parts}/commands.yaml\n"
+
+
 def test_a_kit_depends_on_the_vectors_too(qlinkgen: Run, tmp_path: Path, out: Path) -> None:
     dep = tmp_path / "trio.d"
     qlinkgen("generate", "trio", "--target", "conformance", "-o", out, "--depfile", dep)
