@@ -204,6 +204,25 @@ class IllegalCommand(BadReply):
     """The device rejected the command as unknown."""
 
 
+class Refused(LinkError):
+    """The device refused the request, as the schema describes it.
+
+    Attributes:
+        reason: the fields of its reply as text.
+        reply: its decoded reply, of a class of the generated module.
+        request: the request that it refused.
+    """
+
+    def __init__(
+        self, message: str, *, reason: str = "", reply: object = None, request: object = None,
+        **particulars: Unpack[Particulars],
+    ) -> None:  # fmt: skip
+        super().__init__(message, **particulars)
+        self.reason = reason
+        self.reply = reply
+        self.request = request
+
+
 class CommandError(LinkError):
     """The device rejected the command in its present state; it had no effect.
 

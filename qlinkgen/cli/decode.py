@@ -22,8 +22,9 @@ from qlinkgen.cli.hex_text import HexError, HexReader
 from qlinkgen.cli.streams import Bad, Event, Stream, open_stream
 from qlinkgen.link.codec import Fault, Message
 from qlinkgen.model.message import Direction
-from qlinkgen.model.naming import address_attribute, record_key
+from qlinkgen.model.naming import address_attribute, attribute, record_key
 from qlinkgen.model.protocol import Protocol
+from qlinkgen.model.transaction import Means, Reply
 from qlinkgen.model.values import Json
 from qlinkgen.plan.framing import frame_plan
 
@@ -166,7 +167,15 @@ def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
     if name and message.addresses:
         record[record_key(name)] = getattr(found, address_attribute(name))
     record["fields"] = fields(message, found)
+    reply = protocol.replies.get(message.name)
+    if reply is not None and means(reply, found) == "refused":
+        record["refused"] = True
     return record
+
+
+def means(reply: Reply, found: Message) -> Means:
+    """Return what a received reply means."""
+    return reply.means_by(int(getattr(found, attribute(reply.switch)))) if reply.switch else reply.means
 
 
 def error_record(bad: Fault) -> dict[str, Json]:

@@ -6,7 +6,7 @@ from decimal import Decimal
 
 from qlinkgen.model.fields import Record, Records
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.transaction import Allowance, Command
+from qlinkgen.model.transaction import Allowance, Command, Reply
 from qlinkgen.model.values import default_of, to_json
 from qlinkgen.plan.describe import number_text, span_text
 
@@ -49,6 +49,19 @@ def time_text(allowance: Allowance) -> str:
     if allowance.seconds:
         parts.append(f"{number_text(float(allowance.seconds * 1000))} ms")
     return " + ".join(parts)
+
+
+def means_text(reply: Reply) -> str:
+    """Return what a reply means: ``refused; code busy: again after 20 ms``."""
+    times = {"again": f" after {time_text(reply.after)}" if time_text(reply.after) else "", "pending": ""}
+    if reply.within is not None:
+        times["pending"] = f" within {time_text(reply.within)}"
+    cases = [
+        f"{case.name or span_text(case.first, case.last)}: {case.means}{times.get(case.means, '')}"
+        for case in reply.cases
+    ]
+    chosen = f"; {reply.switch} {', '.join(cases)}" if cases else ""
+    return f"{reply.means}{times.get(reply.means, '')}{chosen}"
 
 
 def repeat_text(command: Command) -> str:

@@ -115,11 +115,11 @@ class _Record:
 
 
 def _record(protocol: Protocol, given: Mapping[str, Json]) -> _Record:
-    known = {"message", "fields", "node", "address", record_key(protocol.address_name or "")}
+    known = {"message", "fields", "refused", "node", "address", record_key(protocol.address_name or "")}
     message, fields = given.get("message"), given.get("fields")
     if not (isinstance(message, str) and isinstance(fields, Mapping) and set(given) <= known):
         return _Record(given)
-    addresses = [given[name] for name in given if name not in ("message", "fields")]
+    addresses = [given[name] for name in given if name not in ("message", "fields", "refused")]
     return _Record(fields, message, _one(tuple(map(str, addresses))) if addresses else None)
 
 

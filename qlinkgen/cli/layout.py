@@ -83,6 +83,8 @@ def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
         answer = f"answered within {within}" if within else "answered"
         answered = answer if command.response else "never answered"
         lines.append(f"{answered}; repeat: {describe.repeat_text(command)}")
+    if reply := plan.protocol.replies.get(message.name):
+        lines.append(f"means {describe.means_text(reply)}")
     if payload.empty_is_default:
         lines.append("an empty payload means every field at its default")
     if message.section:

@@ -106,8 +106,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     leaves after --seconds, as soon as it forwards nothing. Delivery of the message is not confirmed. For
     mc1231a, --axis sends set_1 or set_2 first; without it, the current axis is used.
 
-    Exit code 1 if the response is missing or wrong, if the chip set refuses, or if the port is missing,
-    busy or lost; 2 if the request is invalid, and nothing was sent.
+    Exit code 1 if the response is missing or wrong, if the node refuses (its reply is printed), or if the
+    port is missing, busy or lost; 2 if the request is invalid, and nothing was sent.
 
     \b
     qlinkgen send /dev/ttyUSB0 qlink motor_position --node 3

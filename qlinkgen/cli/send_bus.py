@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import ModuleType
+from typing import cast
 
 import click
 
@@ -12,7 +13,7 @@ from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import warn
 from qlinkgen.cli.decode import message_record
 from qlinkgen.cli.wire_options import Line, echo_mode, open_line, speed
-from qlinkgen.errors import LinkError
+from qlinkgen.errors import LinkError, Refused
 from qlinkgen.link.codec import Framed
 from qlinkgen.link.events import Event, Stray
 from qlinkgen.link.master import MasterEngine
@@ -45,7 +46,11 @@ def send_on_bus(
             return
         timing = timing_of(codec, opened, slack=slack, attempts=attempts)
         engine = MasterEngine(codec, timing, echo=echo_mode(protocol, echo), accepts=accepts)
-        reply = _transact(protocol, BlockingMaster(engine, opened), request)
+        try:
+            reply = _transact(protocol, BlockingMaster(engine, opened), request)
+        except Refused as refusal:
+            click.echo(jsonlines.line(message_record(protocol, cast("Framed", refusal.reply))))
+            raise
     if reply.response is not None:
         click.echo(jsonlines.line(message_record(protocol, reply.response)))
 
@@ -58,10 +63,10 @@ def _tell(port: Port, frame: bytes, bits_per_byte: int) -> None:
 
 
 def check_request(protocol: Protocol, message: Message) -> None:
-    """Refuse the response of a command. Messages outside commands may be sent by any node."""
+    """Refuse the answers of a command. Messages outside commands may be sent by any node."""
     command = protocol.command_of(message)
-    if command is not None and message is command.response:
-        raise Failure(f"{message.name} is a response; send its request, {message.command}")
+    if command is not None and message is not command.request:
+        raise Failure(f"{message.name} is a response; send its request, {command.name}")
 
 
 def _transact(protocol: Protocol, master: BlockingMaster, request: Framed) -> Reply:

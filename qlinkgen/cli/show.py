@@ -47,7 +47,7 @@ def _messages(protocol: Protocol, name: str) -> list[Message]:
     command = next((each for each in protocol.commands if each.name == name), None)
     if command is None:
         return [find_message(protocol, name)]
-    return [message for message in (command.request, command.response) if message]
+    return list(command.messages)
 
 
 def _protocol(plan: Plan) -> None:
@@ -57,6 +57,7 @@ def _protocol(plan: Plan) -> None:
     _frame(plan)
     _bus(protocol)
     _commands(plan)
+    _replies(plan)
     _loose_messages(plan)
     _named(protocol)
 
@@ -126,9 +127,26 @@ def _attribute(value: str | int | bool) -> str:
 
 
 def _note(command: Command) -> str:
-    messages = [message for message in (command.request, command.response) if message]
+    messages = command.messages
     weak = not command.confirmed or any(not message.confirmed for message in messages)
     return UNCONFIRMED if weak or any(not field.confirmed for m in messages for field in m.fields) else ""
+
+
+def _replies(plan: Plan) -> None:
+    """Print the answers other than responses."""
+    table = Table(["id", "reply", "payload", "on the wire", "means", "section", "note"], "Other answers")
+    for name, reply in plan.protocol.replies.items():
+        message = reply.message
+        table.add(
+            id_text(plan.frame, message.id),
+            name,
+            span_text(message.min_size, message.max_size),
+            plan.message(name).wire_size,
+            describe.means_text(reply),
+            message.section,
+            "" if message.confirmed else UNCONFIRMED,
+        )
+    table.show()
 
 
 def _loose_messages(plan: Plan) -> None:

@@ -13,7 +13,7 @@ from qlinkgen.link.health import HealthPolicy
 from qlinkgen.link.master import MasterEngine
 from qlinkgen.link.monitor import Monitor
 from qlinkgen.link.procedure import Ask, Pause, Procedure, Tell
-from qlinkgen.link.slave import Node, SlaveEngine
+from qlinkgen.link.slave import Node, Refusal, SlaveEngine
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Reply
 
@@ -28,6 +28,7 @@ __all__ = [
     "Node",
     "Pause",
     "Procedure",
+    "Refusal",
     "Reply",
     "SlaveEngine",
     "Tell",

@@ -14,16 +14,18 @@ class Attempts:
         tries: largest number of transmissions.
         started: time of the call.
         sent_at: time of the last transmission.
+        patient_until: deadline set by the first pending reply to the last transmission, 0 without one.
         wrong: kind and bytes of each reply that was not the answer.
     """
 
-    __slots__ = ("number", "sent_at", "started", "tries", "wrong")
+    __slots__ = ("number", "patient_until", "sent_at", "started", "tries", "wrong")
 
     def __init__(self) -> None:
         self.number = 0
         self.tries = 0
         self.started = 0.0
         self.sent_at = 0.0
+        self.patient_until = 0.0
         self.wrong: list[tuple[str, bytes]] = []
 
     def begin(self, tries: int, now: float) -> None:

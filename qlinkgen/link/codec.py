@@ -81,6 +81,25 @@ class Bus(Protocol):
     bits_per_byte: int
 
 
+class OtherReply(Protocol):
+    """An answer other than the response, of a generated module."""
+
+    means: str
+    cases: tuple[tuple[int, int, str], ...]
+    within: tuple[float, float] | None
+    after: tuple[float, float]
+    echoes: tuple[str, ...]
+
+    @property
+    def message(self) -> type[Framed]:
+        """Class of the message."""
+        ...
+
+    def meaning(self, reply: Any, /) -> str:  # Any: a message of the class
+        """What a reply means: refused, again, pending or done."""
+        ...
+
+
 class Command(Protocol):
     """A transaction of a generated module."""
 
@@ -99,6 +118,11 @@ class Command(Protocol):
     @property
     def response(self) -> type[Message] | None:
         """Class of the response, None for a command without a response."""
+        ...
+
+    @property
+    def replies(self) -> Mapping[Any, OtherReply]:  # Any: classes of messages
+        """Answers other than the response, by class."""
         ...
 
 
@@ -179,11 +203,29 @@ def address_getter(codec: Codec) -> Callable[[Message], int | None]:
     return attrgetter(name) if name else lambda _message: None
 
 
+def text_of(message: Message) -> str:
+    """Return the fields of a message as text; a single field without its name, no fields as the message."""
+    values = {name: getattr(message, name) for name in message.FIELDS}
+    texts = {name: getattr(value, "name", "") or repr(value) for name, value in values.items()}
+    if len(texts) == 1:
+        return str(*texts.values()).lower()
+    return ", ".join(f"{name} {text.lower()}" for name, text in texts.items()) or message.NAME
+
+
+def meanings(reply: OtherReply) -> set[str]:
+    """Everything that a reply can mean."""
+    return {reply.means, *(means for _, _, means in reply.cases)}
+
+
 def answers(command: Command, request: Message, response: Message) -> bool:
-    """Whether a response has the right class for a request and equal echoed fields."""
-    return type(response) is command.response and all(
-        getattr(response, name) == getattr(request, name) for name in command.echoes
-    )
+    """Whether an answer has a right class for a request and equal echoed fields."""
+    if type(response) is command.response:
+        echoes = command.echoes
+    elif reply := command.replies.get(type(response)):
+        echoes = reply.echoes
+    else:
+        return False
+    return all(getattr(response, name) == getattr(request, name) for name in echoes)
 
 
 def addresses_that_answer(command: Command, request: Message, bus: Bus) -> Sequence[int | None]:

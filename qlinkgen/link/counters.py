@@ -14,6 +14,7 @@ class LinkCounters:
         answers: answered requests.
         timeouts: attempts not answered in time.
         failures: failed transactions.
+        refusals: answers that refused a request.
         refused: transactions not sent because the node is offline.
         damaged: damaged frames, by kind.
         strays: valid frames that did not answer the pending request.
@@ -26,7 +27,7 @@ class LinkCounters:
 
     __slots__ = (
         "answers", "collisions", "damaged", "failures", "late", "missing_echoes", "partial_echoes",
-        "refused", "repeats", "requests", "skipped", "strays", "timeouts",
+        "refusals", "refused", "repeats", "requests", "skipped", "strays", "timeouts",
     )  # fmt: skip
 
     def __init__(self) -> None:
@@ -35,6 +36,7 @@ class LinkCounters:
         self.answers = 0
         self.timeouts = 0
         self.failures = 0
+        self.refusals = 0
         self.refused = 0
         self.damaged: dict[str, int] = {}
         self.strays = 0

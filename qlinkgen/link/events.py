@@ -63,6 +63,19 @@ class Refused(NamedTuple):
     request: Message
 
 
+class OtherAnswer(NamedTuple):
+    """A reply other than the response was received."""
+
+    at: float
+    node: int | None
+    request: Message
+    reply: Message
+    #: refused: the call fails; again: the request is sent once more, if an attempt is left; pending: the
+    #: answer follows later; done: it is the answer.
+    means: str
+    attempt: int
+
+
 class Stray(NamedTuple):
     """A valid frame that does not answer the pending request."""
 
@@ -112,6 +125,6 @@ class HealthChanged(NamedTuple):
 
 #: The last three are events of host ports only.
 Event = (
-    Sent | Answered | TimedOut | Failed | Refused | Stray | Damaged | EchoFound | EchoBroken | HealthChanged
-    | OutOfStep | Filled | InStep
+    Sent | Answered | OtherAnswer | TimedOut | Failed | Refused | Stray | Damaged | EchoFound | EchoBroken
+    | HealthChanged | OutOfStep | Filled | InStep
 )  # fmt: skip

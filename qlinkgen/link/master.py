@@ -21,8 +21,9 @@ from collections import deque
 from collections.abc import Mapping
 
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
+from qlinkgen.errors import Refused as RequestRefused
 from qlinkgen.link.attempts import Attempts
-from qlinkgen.link.codec import Codec, Fault, Framed, address_getter, is_message
+from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, is_message, text_of
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.echo import PROBE, EchoCanceller, EchoMode, EchoProbe
 from qlinkgen.link.events import (
@@ -34,6 +35,7 @@ from qlinkgen.link.events import (
     Event,
     Failed,
     HealthChanged,
+    OtherAnswer,
     Refused,
     Sent,
     Stray,
@@ -53,9 +55,9 @@ EARLY = 0.9
 
 IDLE, PROBING, WAITING = MasterState.IDLE, MasterState.PROBING, MasterState.WAITING
 
-(_START, _START_PROBE, _PROBED, _SENT, _UNANSWERED, _ANSWERED, _REPEAT, _FAIL, _ABORT) = (
-    Moves(MASTER_MOVES, event) for event in MasterEvent
-)
+(
+    _START, _START_PROBE, _PROBED, _SENT, _UNANSWERED, _ANSWERED, _AGAIN, _PENDING, _REPEAT, _FAIL, _ABORT,
+) = (Moves(MASTER_MOVES, event) for event in MasterEvent)  # fmt: skip
 
 
 class MasterEngine:
@@ -106,6 +108,7 @@ class MasterEngine:
         self._pending: Pending  #: set by `start`
         #: The previous request, whose answer may still arrive.
         self._earlier: Pending | None = None
+        self._wanted: int | None = None  #: attempts, as given by the caller
         #: A missing answer is not a failure of the node.
         self._trial = False
         self._earliest = 0.0
@@ -162,6 +165,7 @@ class MasterEngine:
         self._pending = Pending(request, command, node, frame, count, to_all)
         self._attempts.begin(tries, now)
         self._trial = trial
+        self._wanted = attempts
         if self.health and not trial and command.response is not None:  # otherwise it does not wait
             self._look_at_health(now)
         self._received = b""
@@ -231,6 +235,7 @@ class MasterEngine:
         Raises:
             NoReply: no reply was received.
             BadReply: only corrupt or wrong replies were received.
+            Refused: the device refused the request, as the schema describes it.
             Collision: the echo of the request was changed.
         """
         outcome, self._outcome = self._outcome, None
@@ -261,6 +266,7 @@ class MasterEngine:
         frame, count, command = pending.frame, pending.count, pending.command
         attempts.number = number = attempts.number + 1
         attempts.sent_at = now
+        attempts.patient_until = 0.0
         count.requests += 1
         if number > 1:
             count.repeats += 1
@@ -316,10 +322,59 @@ class MasterEngine:
             and self._pending.answered_by(event, self._address(event))
         ):
             self._succeed(event, now)
-        elif is_message(event):
-            self._stray(event, now)
-        else:
+        elif not is_message(event):
             self._damaged(event, now)
+        elif not (self._state is WAITING and now >= self._earliest and self._other_reply(event, now)):
+            self._stray(event, now)
+
+    def _other_reply(self, message: Framed, now: float) -> bool:
+        """Handle an answer other than the response; return whether it is one."""
+        pending, attempts = self._pending, self._attempts
+        reply = pending.replied_by(message, self._address(message))
+        if reply is None:
+            return False
+        means = reply.meaning(message)
+        event = OtherAnswer(now, pending.node, pending.request, message, means, attempts.number)
+        self.events.append(event)
+        if means == "done":
+            self._succeed(message, now)
+        elif means == "pending":
+            self._wait_on(reply, now)
+        else:
+            self._answered(message, now)
+            if means == "again" and attempts.number < (self._wanted or self.timing.attempts):
+                self._state = _AGAIN[self._state]
+                self._line.free_at = max(self._line.free_at, now + self.timing.pause(reply))
+                self._line.await_quiet(now)
+            else:
+                self._refused(message, now)
+        return True
+
+    def _wait_on(self, reply: OtherReply, now: float) -> None:
+        """Extend the deadline, once: a node cannot hold the line for ever by promising an answer."""
+        attempts = self._attempts
+        self._state = _PENDING[self._state]
+        if not attempts.patient_until:
+            attempts.patient_until = now + self.timing.patience(self._pending.command.definition, reply)
+            self._deadline = max(self._deadline, attempts.patient_until)
+
+    def _refused(self, message: Framed, now: float) -> None:
+        pending, attempts = self._pending, self._attempts
+        self._state = _ANSWERED[self._state]
+        pending.count.refusals += 1
+        elapsed, reason = now - attempts.started, text_of(message)
+        node = "" if pending.node is None else f" by node {pending.node}"
+        self._outcome = RequestRefused(
+            f"{pending.request.NAME}: refused{node}: {reason}; {elapsed * 1e3:.1f} ms",
+            reason=reason,
+            reply=message,
+            request=pending.request,
+            node=pending.node,
+            attempts=attempts.number,
+            elapsed=elapsed,
+            received=self.codec.encode(message)[-64:],
+        )
+        self.events.append(Failed(now, pending.node, pending.request, self._outcome))
 
     def _is_own(self, event: Framed | Fault) -> bool:
         return self._echo.is_own(self.codec.encode(event) if is_message(event) else event.raw)
@@ -347,25 +402,30 @@ class MasterEngine:
     # The end of a transaction -------------------------------------------------------------------------------
 
     def _succeed(self, response: Framed, now: float) -> None:
-        pending, attempts, count = self._pending, self._attempts, self._pending.count
+        pending, attempts = self._pending, self._attempts
         self._state = _ANSWERED[self._state]
         self._outcome = reply = attempts.reply(response, now)
+        self._answered(response, now)
+        if self.verbose:
+            event = Answered(now, pending.node, pending.request, response, reply.attempts, reply.elapsed)
+            self.events.append(event)
+
+    def _answered(self, answer: Framed, now: float) -> None:
+        """Note that the node has answered, in whatever way."""
+        pending, count = self._pending, self._pending.count
         count.answers += 1
         if self._echo.broken:
             count.partial_echoes += 1
             self.events.append(self._broken_echo)
             self._echo.forget()
-        if attempts.number > 1:
+        if self._attempts.number > 1:
             self._line.distrust(now)  # the answer to an earlier attempt may still arrive
-        if self._paced and self.codec.encode(response)[-1:] != self._received[-1:]:
+        if self._paced and self.codec.encode(answer)[-1:] != self._received[-1:]:
             self._line.free_at = (
                 now + self._byte_time
             )  # the byte inserted after the last byte of the checksum
         if self.health.answered(pending.node):
             self._tell_health(now)
-        if self.verbose:
-            event = Answered(now, pending.node, pending.request, response, reply.attempts, reply.elapsed)
-            self.events.append(event)
 
     def _timed_out(self, now: float) -> None:
         pending, attempts, echo = self._pending, self._attempts, self._echo

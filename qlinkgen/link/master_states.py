@@ -22,7 +22,9 @@ class MasterEvent(StrEnum):
     PROBED = "probed"  #: the probe was received, or was not in time
     SENT = "sent"  #: the request is sent
     UNANSWERED = "sent without a response"  #: the request is sent, and nothing answers it
-    ANSWERED = "answered"  #: the answer was received
+    ANSWERED = "answered"  #: the answer was received, perhaps a refusal
+    AGAIN = "again"  #: a reply asks for the request once more
+    PENDING = "pending"  #: a reply announces the answer
     REPEAT = "repeat"  #: the deadline passed with attempts left
     FAIL = "fail"  #: the deadline of the last attempt passed, or the line did not become quiet in time
     ABORT = "abort"  #: the caller gives up
@@ -42,6 +44,8 @@ MASTER_MOVES = {
     (_S.GUARD, _E.FAIL): _S.IDLE,
     (_S.GUARD, _E.ABORT): _S.IDLE,
     (_S.WAITING, _E.ANSWERED): _S.IDLE,
+    (_S.WAITING, _E.AGAIN): _S.GUARD,
+    (_S.WAITING, _E.PENDING): _S.WAITING,
     (_S.WAITING, _E.REPEAT): _S.GUARD,
     (_S.WAITING, _E.FAIL): _S.IDLE,
     (_S.WAITING, _E.ABORT): _S.IDLE,

@@ -172,7 +172,8 @@ class Monitor:
     def _fits(self, pending: _Pending, response: Framed) -> bool:
         if not answers(pending.command, pending.request, response):
             return False
-        if accepts := self._accepts.get(pending.command.name):
+        accepts = self._accepts.get(pending.command.name)
+        if accepts and type(response) is pending.command.response:
             return accepts(pending.request, response)
         return address_of(response) in addresses_that_answer(
             pending.command, pending.request, self._codec.BUS
@@ -182,7 +183,11 @@ class Monitor:
         if pending.answered:
             self.heard.append(Stray(now, response, late=True))
             return
-        pending.answered = pending.reported = True
+        reply = pending.command.replies.get(type(response))
+        if reply is not None and reply.meaning(response) == "pending":
+            pending.deadline = max(pending.deadline, now + self._timing.patience(pending.command, reply))
+        else:
+            pending.answered = pending.reported = True
         delay = now - pending.at
         self.heard.append(Replied(now, pending.request, response, delay, late, self._codec.encode(response)))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from qlinkgen.link.codec import Framed
+from qlinkgen.link.codec import Framed, OtherReply
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.transaction import CommandTiming
 
@@ -53,9 +53,19 @@ class Pending:
             return command.accepts(request, response)
         return node == self.node or (self.to_all and command.answers_broadcast)
 
+    def replied_by(self, message: Framed, node: int | None) -> OtherReply | None:
+        """Return the reply other than the response that a message from a node is; None if it is not one."""
+        reply = self.command.replies.get(type(message))
+        if reply is None or not self._from_asked(node):
+            return None
+        same = all(getattr(message, name) == getattr(self.request, name) for name in reply.echoes)
+        return reply if same else None
+
+    def _from_asked(self, node: int | None) -> bool:
+        return node == self.node or (self.to_all and self.command.answers_broadcast)
+
     def may_be_answered_by(self, message: Framed, node: int | None) -> bool:
         """Whether a message from a node has the class and address of an answer, to any attempt."""
         command = self.command
-        return type(message) is command.response and (
-            node == self.node or (self.to_all and command.answers_broadcast)
-        )
+        known = type(message) is command.response or type(message) in command.replies
+        return known and self._from_asked(node)

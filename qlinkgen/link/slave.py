@@ -20,6 +20,18 @@ class Node(Protocol):
         ...
 
 
+class Refusal(Exception):  # the outcome of a request, not an error of the program
+    """Raised by a handler to answer with another reply than the response.
+
+    Attributes:
+        reply: message of a reply of the command, as the schema describes it.
+    """
+
+    def __init__(self, reply: Message) -> None:
+        super().__init__(reply)
+        self.reply = reply
+
+
 class SlaveCounters:
     """Counts of a slave.
 
@@ -48,7 +60,11 @@ class SlaveCounters:
 
 
 class SlaveEngine:
-    """Decodes the requests to a node, and encodes its responses.
+    """Decodes the requests to a node, and encodes its answers.
+
+    A handler returns the answer: the response, or another reply of the schema, which it may raise in a
+    `Refusal` instead. An answer that takes longer is given to `answer` later; until then the handler returns
+    None, or a reply that means pending.
 
     Attributes:
         node: the behaviour of the node.
@@ -98,6 +114,7 @@ class SlaveEngine:
         self._last = b""
         self._answer = b""
         self._due = 0.0
+        self._request: Framed | None = None  #: the last one for this node
 
     def receive(self, data: bytes, now: float) -> None:
         """Process bytes received from the line."""
@@ -120,19 +137,34 @@ class SlaveEngine:
         address = address_of(request)
         if address is not None and address == self._broadcast:
             self.counters.broadcasts += 1
-            response = self.node.handle(request, now)
+            response = self._handled(request, now)
             if not self._answering[type(request)]:
                 return
         elif address is None or address == self.node.number:
             self.counters.requests += 1
-            response = self.node.handle(request, now)
+            response = self._handled(request, now)
         else:
             self.counters.foreign += 1
             return
+        self._request = request
         if response is not None:
             self._answer = self._encode(response)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
+
+    def _handled(self, request: Framed, now: float) -> Message | None:
+        try:
+            return self.node.handle(request, now)
+        except Refusal as refusal:
+            return refusal.reply
+
+    def answer(self, request: Framed, response: Message, now: float) -> None:
+        """Send the answer to a request that its handler did not answer; too late after another request."""
+        if request is self._request:
+            self._answer = self._encode(response)
+            self._due = max(self._due, now)
+        else:
+            self.counters.replaced += 1
 
     def bytes_to_send(self, now: float) -> bytes:
         """Return the answer if it is due."""

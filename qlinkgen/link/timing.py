@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from qlinkgen.link.codec import Command, Module
+from qlinkgen.link.codec import Command, Module, OtherReply, meanings
 from qlinkgen.link.echo import PROBE
 
 #: Byte times after which a line counts as quiet; also Q.link's response time.
@@ -69,8 +69,7 @@ class Timing:
         commands = codec.COMMANDS.values()
         if not commands:
             raise ValueError("the schema has no commands, so it has no deadlines")
-        messages = (message for command in commands for message in (command.request, command.response))
-        longest = max(message.MAX_WIRE_SIZE for message in messages if message is not None)
+        longest = max(max(each.request.MAX_WIRE_SIZE, _longest_answer(each)) for each in commands)
         plain = cls(speed, codec.BUS.bits_per_byte, host_slack, longest, paced, attempts)
         return replace(plain, longest_allowance=max(map(plain.allowance, commands)))
 
@@ -95,8 +94,22 @@ class Timing:
         if command.response is None:
             return 0.0
         sent = command.request.MAX_WIRE_SIZE if request_size is None else request_size
-        size = sent + command.response.MAX_WIRE_SIZE
+        size = sent + _longest_answer(command)
         return self.on_wire(size) + self.allowance(command) + self.host_slack
+
+    def patience(self, command: Command, reply: OtherReply) -> float:
+        """Return the time from a pending reply to the answer."""
+        if reply.within is None or command.response is None:
+            return self.deadline(command, 0)
+        byte_times, seconds = reply.within
+        return self.on_wire(_longest_answer(command)) + self._time(byte_times, seconds) + self.host_slack
+
+    def pause(self, reply: OtherReply) -> float:
+        """Return the time until a request is sent again, if a reply asks for it."""
+        return self._time(*reply.after)
+
+    def _time(self, byte_times: float, seconds: float) -> float:
+        return byte_times * self.byte_time + seconds
 
     @property
     def quiet(self) -> float:
@@ -126,7 +139,20 @@ class Timing:
         given_up = self.on_wire(2 * self.longest_frame) + self.longest_allowance + self.host_slack
         search = self.quiet_limit + self.on_wire(len(PROBE)) + self.quiet
         attempt = self.quiet_limit + self.deadline(command)
-        return max(given_up, search) + self.attempts_of(command, attempts) * attempt
+        tries = self.attempts_of(command, attempts)
+        for reply in command.replies.values():
+            if "again" in meanings(reply):
+                tries = self.attempts if attempts is None else attempts
+                attempt += self.pause(reply)
+            if "pending" in meanings(reply):
+                attempt += self.patience(command, reply)
+        return max(given_up, search) + tries * attempt
+
+
+def _longest_answer(command: Command) -> int:
+    """Return the size of the longest answer on the wire, 0 without one."""
+    answers = (command.response, *(reply.message for reply in command.replies.values()))
+    return max((answer.MAX_WIRE_SIZE for answer in answers if answer is not None), default=0)
 
 
 def check_attempts(attempts: int) -> int:

@@ -48,8 +48,8 @@ class CommandTiming:
     """Response and deadlines of a command, computed once instead of for each transaction."""
 
     __slots__ = (
-        "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "response",
-        "tries",
+        "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "replies",
+        "response", "tries",
     )  # fmt: skip
 
     def __init__(self, command: Command, timing: Timing, accepts: Accepts | None) -> None:
@@ -57,6 +57,7 @@ class CommandTiming:
         self.response = command.response
         self.accepts = accepts
         self.echoes = command.echoes
+        self.replies = command.replies
         self.answers_broadcast = command.addressing == "answered_broadcast"
         self.allowance = timing.gap(command)
         self.answer_time = timing.deadline(command, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import assert_never
@@ -92,7 +93,7 @@ class Protocol:
         """The transaction of a message, None if it has none."""
         return next((command for command in self.commands if message in command.messages), None)
 
-    def reply_of(self, message: Message) -> Reply | None:
-        """The reply that a message is, None for requests, responses and messages without a command."""
-        replies = (reply for command in self.commands for reply in command.replies)
-        return next((reply for reply in replies if reply.message is message), None)
+    @cached_property
+    def replies(self) -> Mapping[str, Reply]:
+        """Answers other than responses, by the full name of their message."""
+        return {reply.message.name: reply for command in self.commands for reply in command.replies}

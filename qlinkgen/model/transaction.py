@@ -45,6 +45,8 @@ class Case:
     first: int
     last: int
     means: Means
+    #: Name of the value, "" if it is written as a number.
+    name: str = ""
 
 
 @dataclass(frozen=True, slots=True)

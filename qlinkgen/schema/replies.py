@@ -149,7 +149,8 @@ class ReplyBuilder:
         for key, means in spec.cases.items():
             raw = self._raw(key, number, (*path, "cases", str(key)))
             if raw is not None:
-                yield Case(*raw, means)
+                first, last, name = raw
+                yield Case(first, last, means, name)
 
     def _switch(self, name: str, message: Message, path: Path) -> Scalar | None:
         known = {value.name: value.type for value in message.values}
@@ -165,12 +166,12 @@ class ReplyBuilder:
             return None
         return kind if isinstance(kind, Scalar) else None
 
-    def _raw(self, key: str | int, number: Scalar, path: Path) -> tuple[int, int] | None:
-        """The raw values of a case."""
+    def _raw(self, key: str | int, number: Scalar, path: Path) -> tuple[int, int, str] | None:
+        """The first and last raw value of a case, and its name."""
         named = number.meaning.members if isinstance(number.meaning, Enum) else ()
         members = {member.name: member.value for member in named}
         if key in members:
-            return members[str(key)], members[str(key)]
+            return members[str(key)], members[str(key)], str(key)
         try:
             first, last = whole_range(key)
         except ValueError:
@@ -183,7 +184,7 @@ class ReplyBuilder:
             hint = f"use {number.minimum}..{number.maximum}"
             self._report.error(_RULE, path, what, hint, of_key=True)
             return None
-        return first, last
+        return first, last, ""
 
 
 def _allowance(time: Duration) -> Allowance:

@@ -159,10 +159,11 @@ def test_a_refusal_of_the_schema_is_shown(qlinkgen: Run) -> None:
         request = ("read_input_registers", "--node", "7", "start=1")
         result = qlinkgen("send", path, file, *request, "--attempts", "1", "--slack", "0.3")
     assert result.code == 1
-    assert (
-        '"read_input_registers.exception", "address": 7, "fields": {"code": "illegal_data_address"}'
-        in result.err
+    assert result.out == (
+        '{"message": "read_input_registers.exception", "address": 7, '
+        '"fields": {"code": "illegal_data_address"}, "refused": true}\n'
     )
+    assert "refused by node 7: illegal_data_address" in result.err
 
 
 def test_a_port_that_goes_away(qlinkgen: Run, silent: PtyPort) -> None:

@@ -662,12 +662,59 @@ class Marking:
         self.most = most
 
 
+class OtherReply:
+    """An answer other than the response of a command.
+
+    Attributes:
+        message: class of the message.
+        means: refused, again, pending or done, unless a case says otherwise.
+        switch: field that decides, "" if nothing does.
+        cases: first and last number of the field, and what they mean.
+        within: byte times and seconds from the first pending reply to the answer, None: as for the response.
+        after: byte times and seconds until the request is sent again.
+        echoes: fields that repeat the field of the same name in the request.
+    """
+
+    __slots__ = ("after", "cases", "echoes", "means", "message", "switch", "within")
+
+    def __init__(
+        self,
+        message: MessageClass,
+        means: str = "refused",
+        *,
+        switch: str = "",
+        cases: tuple[tuple[int, int, str], ...] = (),
+        within: tuple[float, float] | None = None,
+        after: tuple[float, float] = (0, 0),
+        echoes: tuple[str, ...] = (),
+    ) -> None:
+        self.message = message
+        self.means = means
+        self.switch = switch
+        self.cases = cases
+        self.within = within
+        self.after = after
+        self.echoes = echoes
+
+    def meaning(self, reply: Any) -> str:  # Any: a message of the class
+        """What a reply means; the first case that has its number counts."""
+        if self.switch:
+            number = int(getattr(reply, self.switch))
+            for first, last, means in self.cases:
+                if first <= number <= last:
+                    return means
+        return self.means
+
+    def __repr__(self) -> str:
+        return f"OtherReply({self.message.__name__}, {self.means!r})"
+
+
 class Command:
     """A transaction: request, response, timing and repetition.
 
     Attributes:
         name: name in the schema.
-        id: number of request and response in the frame.
+        id: number of the request in the frame; that of each message is in its class.
         request: class of the request.
         response: class of the response, None if it is not answered.
         addressing: node, broadcast, either, answered_broadcast or none.
@@ -676,6 +723,7 @@ class Command:
         repeat_safe: whether the request may be repeated after a missing response.
         repeat_counter: field that distinguishes a repeat from a new request, "" if there is none.
         echoes: fields of the response that repeat the field of the same name in the request.
+        replies: answers other than the response, by class.
         in_flight: maximum number of outstanding requests.
         section: section of the source document.
         confirmed: False if the source is weak: check it on the device.
@@ -684,7 +732,7 @@ class Command:
 
     __slots__ = (
         "addressing", "attributes", "confirmed", "echoes", "id", "in_flight", "name", "repeat_counter",
-        "repeat_safe", "request", "response", "response_byte_times", "response_seconds", "section",
+        "repeat_safe", "replies", "request", "response", "response_byte_times", "response_seconds", "section",
     )  # fmt: skip
 
     def __init__(
@@ -700,6 +748,7 @@ class Command:
         repeat_safe: bool = False,
         repeat_counter: str = "",
         echoes: tuple[str, ...] = (),
+        replies: tuple[OtherReply, ...] = (),
         in_flight: int = 1,
         section: str = "",
         confirmed: bool = True,
@@ -715,6 +764,8 @@ class Command:
         self.repeat_safe = repeat_safe
         self.repeat_counter = repeat_counter
         self.echoes = echoes
+        by_class = {each.message: each for each in replies}
+        self.replies: Mapping[MessageClass, OtherReply] = by_class
         self.in_flight = in_flight
         self.section = section
         self.confirmed = confirmed

@@ -89,6 +89,9 @@ class Transaction:
     command: Command
     request: MessagePlan
     response: MessagePlan | None
+    #: Answers other than the response; `done` are those that a call returns.
+    others: tuple[MessagePlan, ...] = ()
+    done: tuple[MessagePlan, ...] = ()
 
     @classmethod
     def of(cls, plan: Plan, command: Command) -> Transaction | None:
@@ -97,7 +100,10 @@ class Transaction:
         if command.response is None:
             return cls(command, request, None)
         response = plan.by_name.get(command.response.name)
-        return cls(command, request, response) if response else None
+        kept = [each for each in command.replies if each.message.name in plan.by_name]
+        others = tuple(plan.by_name[each.message.name] for each in kept)
+        done = tuple(plan.by_name[each.message.name] for each in kept if "done" in each.meanings)
+        return cls(command, request, response, others, done) if response else None
 
     @property
     def name(self) -> str:
@@ -117,6 +123,7 @@ class BusView:
     callers: Sequence[Caller]
     handlers: Sequence[Method]
     nodes: str
+    others: bool
 
 
 class BusModule:
@@ -155,6 +162,7 @@ class BusModule:
             callers=callers,
             handlers=handlers,
             nodes=f", {self._nodes()}" if self._nodes() else "",
+            others=any(each.done for each in self._transactions),
         )
         template = templates().get_template("templates/bus.j2")
         return fitted(template.render(vars(view)).rstrip("\n") + "\n")
@@ -183,12 +191,17 @@ class BusModule:
         names = (attribute(each.name) for each in transaction.request.payload.settable)
         return [f"{name}={name}" for name in names]
 
-    def _answer(self, transaction: Transaction, *, surely: bool = False) -> str:
-        """Return type of a method."""
+    def _answer(self, transaction: Transaction, more: Sequence[MessagePlan], *, surely: bool = False) -> str:
+        """Return type of a method; ``more`` are answers besides the response."""
         if transaction.response is None:
             return "None"
-        name = self._class(transaction.response)
-        return name if surely else f"{name} | None"
+        names = [self._class(each) for each in (transaction.response, *more)]
+        return " | ".join(names if surely else [*names, "None"])
+
+    def _asked(self, transaction: Transaction) -> str:
+        """The classes of the answers that a call returns, as arguments."""
+        assert transaction.response is not None
+        return ", ".join(self._class(each) for each in (transaction.response, *transaction.done))
 
     def _callers(self, *, host: bool) -> list[Caller]:
         found = []
@@ -212,7 +225,7 @@ class BusModule:
     def _method(self, call: Transaction, *, asynchronous: bool, node: bool) -> Method:
         command = call.command
         address = "" if node or command.addressing in ("broadcast", "none") else self._place.address
-        answer = self._answer(call, surely=node or command.addressing != "either")
+        answer = self._answer(call, call.done, surely=node or command.addressing != "either")
         head = self._head(call, address, answer, asynchronous=asynchronous)
         entry = f"{address}: Address of the node, {self._nodes()}{self._all(command)}." if address else ""
         doc = _summary(command) if asynchronous else [*_summary(command), *self._arguments(call, entry)]
@@ -234,7 +247,7 @@ class BusModule:
         )
         if call.response is None:
             return [*request, f"{wait}self.tell(_request)"]
-        ask = f"return {wait}self.ask(_request, {self._class(call.response)})"
+        ask = f"return {wait}self.ask(_request, {self._asked(call)})"
         if call.command.addressing != "either" or node:
             return [*request, ask]
         return [
@@ -295,7 +308,7 @@ class BusModule:
         return _make_caller(name, doc, methods, asynchronous=asynchronous, one=one, axis=axis)
 
     def _host_method(self, call: Transaction, axis: str, *, asynchronous: bool) -> Method:
-        head = self._head(call, axis, self._answer(call, surely=True), asynchronous=asynchronous)
+        head = self._head(call, axis, self._answer(call, (), surely=True), asynchronous=asynchronous)
         doc = [*_summary(call.command), *_attributes(call.command)]
         if not asynchronous:
             entry = f"{axis}: Axis to act on, from 1." if axis else ""
@@ -315,12 +328,15 @@ class BusModule:
     def _handler(self, call: Transaction) -> Method:
         command = call.command
         arguments = ["self", f"request: {self._class(call.request)}", "now: float"]
-        head = wrapped(f"def {call.name}(", arguments, f") -> {self._answer(call)}:", 4)
+        head = wrapped(f"def {call.name}(", arguments, f") -> {self._answer(call, call.others)}:", 4)
         doc = _summary(command)
         if command.echoes:
             doc += ["", f"The response repeats {' and '.join(command.echoes)} of the request."]
         if command.response and command.addressing == "either":
             doc += ["", "Return None for a broadcast, which is not answered."]
+        if call.others:
+            names = " or ".join(self._class(each) for each in call.others)
+            doc += ["", *textwrap.wrap(f"Return {names} to answer in another way.", WIDTH - 8)]
         return Method(head, python_text.docstring(doc), [])
 
 

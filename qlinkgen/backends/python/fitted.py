@@ -125,7 +125,8 @@ def _nodes(tokens: Sequence[TokenInfo]) -> list[Node]:
             inside = stack[-1]
             blank = token.start != end and bool(inside)
             if token.string in _CLOSING:
-                group = Group(token.string, blank, display=blank or not inside)
+                keyword = bool(inside) and inside[-1].flat == "="  # of an argument: no blank follows it
+                group = Group(token.string, blank, display=blank or keyword or not inside)
                 inside.append(group)
                 stack.append(group.nodes)
             else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -11,7 +11,7 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python.layout import WIDTH, in_hex, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.transaction import Bus, Command
+from qlinkgen.model.transaction import Allowance, Bus, Command, Reply
 from qlinkgen.model.types import Enum, Flags, NamedValue
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -92,6 +92,9 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     if within.seconds:
         arguments.append(f"response_seconds={_number(within.seconds)}")
     arguments += _repetition(command)
+    replies = [_reply(each, kept[each.message.name]) for each in command.replies if each.message.name in kept]
+    if replies:
+        arguments.append(f"replies={_tuple(replies)}")
     if command.in_flight != 1:
         arguments.append(f"in_flight={command.in_flight}")
     if command.section:
@@ -106,14 +109,40 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     return wrapped(f'"{command.name}": Command(', arguments, "),", 4)
 
 
+def _reply(reply: Reply, planned: MessagePlan) -> str:
+    """The call that creates a reply."""
+    arguments = [class_name(planned), f'"{reply.means}"']
+    if reply.switch:
+        cases = [f'({case.first}, {case.last}, "{case.means}")' for case in reply.cases]
+        arguments += [f'switch="{attribute(reply.switch)}"', f"cases={_tuple(cases)}"]
+    if reply.within is not None:
+        arguments.append(f"within={_time(reply.within)}")
+    if reply.after != Allowance():
+        arguments.append(f"after={_time(reply.after)}")
+    if reply.echoes:
+        arguments.append(f"echoes={_tuple([_quoted(attribute(name)) for name in reply.echoes])}")
+    return f"OtherReply({', '.join(arguments)})"
+
+
+def _time(time: Allowance) -> str:
+    return f"({_number(time.byte_times)}, {_number(time.seconds)})"
+
+
+def _quoted(name: str) -> str:
+    return f'"{name}"'
+
+
+def _tuple(items: Sequence[str]) -> str:
+    return f"({', '.join(items)}{',' if len(items) == 1 else ''})"
+
+
 def _repetition(command: Command) -> list[str]:
     """Arguments on repetition and echoes."""
-    names = [f'"{attribute(name)}"' for name in command.echoes]
-    echoes = f"{names[0]}," if len(names) == 1 else ", ".join(names)
+    names = [_quoted(attribute(name)) for name in command.echoes]
     facts = {
         "repeat_safe=True": command.repeat.safe,
         f'repeat_counter="{attribute(command.repeat.counter)}"': command.repeat.counter,
-        f"echoes=({echoes})" if names else "": names,
+        f"echoes={_tuple(names)}" if names else "": names,
     }
     return [argument for argument, given in facts.items() if given]
 
