@@ -450,7 +450,8 @@ class Message(Construct):
             raise RangeError(f"{field.name} is missing", path=path)
         if field.subcon.packed:
             number = known.get(of, 0)
-            return number if field.subcon.number(cell) == field.subcon.told(number) else -1
+            told = field.subcon.number(cell) == field.subcon.told(number)
+            return number if told else -1
         number, rest = divmod(field.subcon.number(cell), field.subcon.step)
         if rest:
             raise RangeError(
