@@ -96,7 +96,7 @@ def _write_out(data: Any, hint: Any) -> Any:
 
 def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
     """Keys of a mapping with the annotations of their values."""
-    model = _first(hint, _is_model, through_dicts=False)
+    model = _model_of(data, hint)
     if model is not None:
         hints = typing.get_type_hints(model, include_extras=True)
         yield from ((key, hints[key]) for key in data if key in hints)
@@ -104,6 +104,13 @@ def _members(data: Mapping[str, Any], hint: Any) -> Iterator[tuple[str, Any]]:
     table = _first(hint, _is_table)
     if table is not None:
         yield from ((key, typing.get_args(table)[1]) for key in data)
+
+
+def _model_of(data: Mapping[str, Any], hint: Any) -> Any:
+    """The class of a mapping; None for a table of names, which may be its short form."""
+    model = _first(hint, _is_model, through_dicts=False)
+    short = any(map(_is_table, _parts(hint))) and not _is_table(hint)
+    return None if short and model is not None and not data.keys() <= model.model_fields.keys() else model
 
 
 def _first(hint: Any, wanted: Any, *, through_dicts: bool = True) -> Any:
@@ -142,7 +149,7 @@ def _slots(data: Any, hint: Any, path: tuple[str | int, ...], kind: Kind) -> Ite
         if any(map(_is_text, _parts(hint))):
             yield from (Slot((*path, index), kind) for index in range(len(data)))
     elif isinstance(data, dict):
-        model = _first(hint, _is_model, through_dicts=False)
+        model = _model_of(data, hint)
         members = dict(_members(data, hint))
         if model is not None:
             texts = typing.get_type_hints(model, include_extras=True)

@@ -18,7 +18,7 @@ AUDITED = Path(__file__).with_name("audited.py")
 #: Modules of the standard library that qlinkgen does not need; they print, or open a browser.
 NAMES = ("antigravity", "this", "__hello__", "turtledemo")
 FRAMES = {
-    "delimited": "a5a50e01030000000700000000000000000000400c",
+    "delimited": "a5a50e0103010000000700000000000000000000400c",
     "marked": "9205007a6290",
     "packet": "10000a",
 }
