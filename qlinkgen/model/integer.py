@@ -88,6 +88,8 @@ class Integer:
     bits: int
     signed: bool
     chunks: tuple[Chunk, ...]
+    #: Binary-coded decimal: each four bits are a digit.
+    bcd: bool = False
 
     @property
     def size(self) -> int:
@@ -102,6 +104,8 @@ class Integer:
     @property
     def maximum(self) -> int:
         """Maximum value that the bits can hold."""
+        if self.bcd:
+            return int("9" * (self.bits // 4))
         return (1 << (self.bits - self.signed)) - 1
 
     @property
@@ -122,16 +126,21 @@ class Integer:
         """The wire bytes of a value. Raises ValueError if it does not fit."""
         if not self.minimum <= value <= self.maximum:
             raise ValueError(f"{value} does not fit {self.bits} bits")
-        return pack_chunks(value, self.chunks)
+        return pack_chunks(int(str(value), 16) if self.bcd else value, self.chunks)
 
     def unpack(self, data: bytes) -> int:
-        """The value in its wire bytes; unused bits are ignored, see `stray`."""
-        return self.signed_value(unpack_chunks(data, self.chunks))
+        """The value in its wire bytes; unused bits and digits above 9 are not refused, see `stray`."""
+        pattern = unpack_chunks(data, self.chunks)
+        if self.bcd:
+            return sum((pattern >> 4 * place & 0xF) * 10**place for place in range(self.bits // 4))
+        return self.signed_value(pattern)
 
     def signed_value(self, bits: int) -> int:
         """The value of a bit pattern: two's complement if the integer is signed."""
         return bits - (1 << self.bits) if self.signed and bits >> (self.bits - 1) else bits
 
     def stray(self, data: bytes) -> bool:
-        """Whether unused bits are set, so that the bytes are invalid."""
+        """Whether unused bits are set, or a digit is above 9, so that the bytes are invalid."""
+        if self.bcd:
+            return not data.hex().isdecimal()
         return any(byte & ~chunk.mask for byte, chunk in zip(data, self.chunks, strict=True))

@@ -173,6 +173,8 @@ class Scalar:
     bits: int
     signed: bool = False
     chunks: tuple[Chunk, ...]
+    #: Binary-coded decimal.
+    bcd: bool = False
     minimum: int
     maximum: int
     default: int = 0
@@ -191,7 +193,7 @@ class Scalar:
     @cached_property
     def integer(self) -> Integer:
         """Its wire layout."""
-        return Integer(self.bits, self.signed, self.chunks)
+        return Integer(self.bits, self.signed, self.chunks, self.bcd)
 
     @property
     def byteorder(self) -> ByteOrder | None:

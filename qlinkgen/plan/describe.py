@@ -195,7 +195,7 @@ def _scalar_text(scalar: Scalar) -> str:
 
 def integer_text(integer: Integer) -> str:
     """``u8``, ``i32 little``, ``u14 in groups: bits 7-13 0-6``."""
-    base = f"{'i' if integer.signed else 'u'}{integer.bits}"
+    base = f"{'i' if integer.signed else 'u'}{integer.bits}{' bcd' if integer.bcd else ''}"
     if integer.size <= 1:
         return base
     if integer.byteorder:

@@ -24,10 +24,12 @@ _NUMBER_KEYS = (
     "counts",
     "bits",
     "packed",
+    "as",
 )
 _WHOLE_KEYS = ("const", "reserved", "counts", "bits")
 _CONTAINER_KEYS = (
     "packed",
+    "as",
     "scale",
     "offset",
     "range",

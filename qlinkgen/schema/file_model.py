@@ -139,6 +139,9 @@ class FieldSpec(Fact):
     parts: list[WholeRange] | None = Field(
         default=None, description="Bit ranges in wire order; each begins a new byte"
     )
+    as_: Literal["bcd"] | None = Field(
+        default=None, alias="as", description="Form of the number: bcd, two decimal digits a byte"
+    )
     packed: Literal["least", "most"] | None = Field(
         default=None, description="An array of bits in a row: which bits of a byte its first item has"
     )

@@ -35,12 +35,18 @@ class Location:
     def reject(self, spec: BaseModel, keys: Iterable[str], what: str, hint: str = "remove it") -> None:
         """Report the given keys that do not apply to ``what``."""
         for key in keys:
-            if getattr(spec, key) not in (None, False, ""):
+            if getattr(spec, "as_" if key == "as" else key) not in (None, False, ""):
                 self.key_fault("not-applicable", key, f"'{key}' has no effect on {what}", hint)
 
     def inner(self, *keys: str, written: Iterable[str] = ()) -> Location:
         """The location of a nested node."""
         return Location(self.report, (*self.path, *keys), frozenset(written))
+
+    @staticmethod
+    def written_in(spec: BaseModel) -> frozenset[str]:
+        """The keys that a mapping of the file has."""
+        fields = type(spec).model_fields
+        return frozenset(fields[name].alias or name for name in spec.model_fields_set)
 
     def place(self, key: str) -> Path:
         """The path of a key, or of the field if the key is inherited."""

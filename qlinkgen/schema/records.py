@@ -50,7 +50,7 @@ class RecordBuilder:
         self, spec: FieldSpec, text: TypeText, payload_max: int, location: Location
     ) -> Record | Records | None:
         """The type of a field that holds one record or several."""
-        location.reject(spec, (key for key in spec.model_fields_set if key not in _KEYS), "a record")
+        location.reject(spec, sorted(Location.written_in(spec) - {*_KEYS}), "a record")
         if text.base in self._open:
             what = f"record '{text.base}' contains itself"
             location.fault("recursive-type", "type", what, "use another type")

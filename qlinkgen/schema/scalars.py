@@ -136,9 +136,11 @@ class ScalarBuilder:
         chunks = self._chunks(spec, plain.bits, base, location)
         if chunks is None:
             return None
+        bcd = spec.as_ == "bcd" and self._check_decimal(spec, plain, base, location)
         low, high = (0, 1) if plain.meaning == "bool" else integer_range(plain.bits, signed=plain.signed)
+        high = int("9" * (plain.bits // 4)) if bcd else high
         scalar = Scalar(
-            bits=plain.bits, signed=plain.signed, chunks=chunks, minimum=low, maximum=high,
+            bits=plain.bits, signed=plain.signed, chunks=chunks, bcd=bcd, minimum=low, maximum=high,
             scaling=plain.scaling, meaning=plain.meaning, unit=spec.unit or "",
         )  # fmt: skip
         _check_keys(spec, plain, location)
@@ -150,6 +152,16 @@ class ScalarBuilder:
         if spec.reserved:
             return replace(scalar, role=Reserved())
         return scalar if spec.const is None else replace(scalar, role=Constant())
+
+    def _check_decimal(self, spec: FieldSpec, plain: Plain, base: str, location: Location) -> bool:
+        """Whether the number can be in binary-coded decimal."""
+        if plain.meaning is not None or plain.scaling is not None or plain.signed:
+            location.reject(spec, ("as",), base, "use an unsigned integer")
+            return False
+        if spec.counts is not None or spec.groups or self._file.groups:
+            location.reject(spec, ("as",), "a count" if spec.counts else "groups of bits")
+            return False
+        return spec.packed is None
 
     def _in_a_row(
         self, spec: FieldSpec, bits: int, base: str, location: Location
@@ -164,7 +176,7 @@ class ScalarBuilder:
         if self._file.groups is not None:
             what = f"bits in a row cannot be sent in groups of {self._file.groups.bits} bits"
             location.fault("bad-width", "packed", what, "remove it")
-        location.reject(spec, ("byteorder", "groups", "parts"), "bits in a row")
+        location.reject(spec, ("byteorder", "groups", "parts", "as"), "bits in a row")
         return ()
 
     def _chunks(self, spec: FieldSpec, bits: int, base: str, location: Location) -> tuple[Chunk, ...] | None:

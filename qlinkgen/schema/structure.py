@@ -199,4 +199,4 @@ def _mapping_type(annotation: object) -> object:
 
 def _keys_at(path: Path) -> list[str]:
     model = _model_at(path)
-    return list(model.model_fields) if model else []
+    return [field.alias or name for name, field in model.model_fields.items()] if model else []

@@ -89,7 +89,7 @@ class TypeBuilder:
 
         ``seen`` are the named types being built, to detect recursion.
         """
-        location = Location(self._report, path, frozenset(spec.model_fields_set))
+        location = Location(self._report, path, Location.written_in(spec))
         resolved = self._resolve(spec, location, seen)
         kind = self._build(*resolved, location) if resolved else None
         if kind is None:
@@ -189,7 +189,7 @@ class TypeBuilder:
 
 def _item(spec: FieldSpec, base: str, location: Location) -> FieldSpec:
     """The keys of the items of an array, with the default of their named type."""
-    keys = ["byteorder", "groups", "parts", "scale", "offset", "unit", "range", "raw_range", "packed"]
+    keys = ["byteorder", "groups", "parts", "scale", "offset", "unit", "range", "raw_range", "packed", "as_"]
     keys += ["default"] if "default" not in location.written and not isinstance(spec.default, list) else []
     return FieldSpec(type=base).model_copy(update={key: getattr(spec, key) for key in keys})
 

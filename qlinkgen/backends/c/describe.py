@@ -95,7 +95,7 @@ def _length(length: Length) -> str:
 
 
 def _integer(integer: Integer) -> str:
-    return f"{'i' if integer.signed else 'u'}{integer.bits}"
+    return f"{'i' if integer.signed else 'u'}{integer.bits}{' bcd' if integer.bcd else ''}"
 
 
 def _order(integer: Integer) -> str:
@@ -129,7 +129,7 @@ def _facts(scalar: Scalar) -> list[str]:
         )
     elif scalar.unit:
         facts.append(f"in {scalar.unit}")
-    if not scalar.full_range and scalar.meaning != "bool":
+    if (not scalar.full_range and scalar.meaning != "bool") or scalar.bcd:
         facts.append(f"{scalar.minimum}..{scalar.maximum}")
     match scalar.meaning:
         case Enum() | Flags():

@@ -32,6 +32,8 @@ class Layouts:
     _names: dict[tuple[int, Chunks], str] = field(default_factory=dict)
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
+    #: Numbers in binary-coded decimal that are read, written or checked: width of the C type, and the order.
+    _decimals: set[tuple[str, int, str]] = field(default_factory=set)
     #: Rows of bits that are read or written: the width of the C type of an item, and the order.
     _rows: set[tuple[str, int, BitOrder]] = field(default_factory=set)
     #: Widths of the C types that need sign extension.
@@ -39,6 +41,8 @@ class Layouts:
 
     def put(self, integer: AnyInteger, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
+        if integer.bcd:
+            return f"{self._decimal('put', integer)}({pointer(place, index)}, {integer.size}U, {value});"
         if integer.size == 1:
             if integer.signed and integer.bits < 8:  # clear the sign extension
                 value = f"(uint8_t)({value} & {unsigned(integer.chunks[0].mask, 8, hexadecimal=True)})"
@@ -47,12 +51,15 @@ class Layouts:
 
     def get(self, integer: AnyInteger, place: str, index: str) -> str:
         """An expression for the unsigned value at a place whose unused bits are known to be zero."""
+        if integer.bcd:
+            return f"{self._decimal('get', integer)}({pointer(place, index)}, {integer.size}U)"
         if integer.size == 1:
             return f"{place}[{index}]"
         return f"{self._call('get', integer)}({pointer(place, index)})"
 
     def peek(self, integer: AnyInteger, place: str, index: str) -> str:
         """An expression for the unsigned value at a place, unused bits masked out."""
+        assert not integer.bcd
         value, mask = self.get(integer, place, index), integer.chunks[0].mask
         if integer.size > 1 or mask == 0xFF:
             return value
@@ -60,6 +67,9 @@ class Layouts:
 
     def unused_bits(self, integer: AnyInteger, place: str, index: str) -> str | None:
         """A condition that holds where unused bits are set, None if all bits are used."""
+        if integer.bcd:
+            self._decimals.add(("check", 8, ""))
+            return f"!{self.prefix}_is_bcd_({pointer(place, index)}, {integer.size}U)"
         if all(chunk.bits == 8 for chunk in integer.chunks):
             return None
         if integer.size == 1:
@@ -68,6 +78,51 @@ class Layouts:
             )
         self._partial.add((integer.bits, integer.chunks))
         return f"{self._call('unused_bits', integer)}({pointer(place, index)})"
+
+    def _decimal(self, verb: str, integer: AnyInteger) -> str:
+        width, order = storage(integer.bits), "be" if integer.byteorder == "big" else "le"
+        self._decimals.add((verb, width, order))
+        return f"{self.prefix}_{verb}_bcd{width}_{order}_"
+
+    def _decimal_helpers(self) -> list[Helper]:
+        found = []
+        for verb, width, order in sorted(self._decimals):
+            kind, name = f"uint{width}_t", f"{self.prefix}_{verb}_bcd{width}_{order}_"
+            up, down = "size_t index = 0U; index < size; ++index", "size_t index = size; index > 0U; --index"
+            if verb == "check":
+                head = f"static inline bool {self.prefix}_is_bcd_(const uint8_t *from, size_t size)"
+                body = [
+                    f"for ({up}) {{",
+                    "    if (((from[index] >> 4) > 9U) || ((from[index] & 0x0FU) > 9U)) {",
+                    "        return false;",
+                    "    }",
+                    "}",
+                    "return true;",
+                ]
+            elif verb == "put":
+                head = f"static inline void {name}(uint8_t *to, size_t size, {kind} value)"
+                at = "index - 1U" if order == "be" else "index"
+                body = [
+                    f"for ({down if order == 'be' else up}) {{",
+                    f"    to[{at}] = (uint8_t)((((value / 10U) % 10U) << 4) | (value % 10U));",
+                    f"    value = ({kind})(value / 100U);",
+                    "}",
+                ]
+            else:
+                head = f"static inline {kind} {name}(const uint8_t *from, size_t size)"
+                at = "index" if order == "be" else "index - 1U"
+                body = [
+                    f"{kind} value = 0U;",
+                    f"for ({up if order == 'be' else down}) {{",
+                    f"    const uint8_t tens = (uint8_t)(from[{at}] >> 4);",
+                    f"    const uint8_t ones = (uint8_t)(from[{at}] & 0x0FU);",
+                    f"    value = ({kind})((value * 100U) + (({kind})tens * 10U) + ones);",
+                    "}",
+                    "return value;",
+                ]
+            lines = [head, "{", *(f"    {line}" for line in body), "}"]
+            found.append(Helper("Binary-coded decimal, two digits a byte", tuple(lines)))
+        return found
 
     def get_row(self, item: Integer, order: BitOrder, start: str, index: str) -> str:
         """An expression for the unsigned value of an item in a row of bits."""
@@ -125,7 +180,7 @@ class Layouts:
     def helpers(self) -> list[Helper]:
         """The functions of all layouts in use."""
         whole = [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
-        return [*whole, *self._row_helpers()]
+        return [*whole, *self._decimal_helpers(), *self._row_helpers()]
 
     def _call(self, verb: str, integer: AnyInteger) -> str:
         key = (integer.bits, integer.chunks)

@@ -32,13 +32,13 @@ _PACKAGE_DOC = '''\
 _SUPPORT = {
     "_fields": "ArrayField BitFields Bits Boolean BytesField Clear Count Groups Member Message OpenFlags "
     "Ranged Scaled TextField like",
-    "_packed": "PackedField",
+    "_packed": "BcdInteger PackedField",
     "_frames": "CRC Address AddressBits Cell Check Constant ConstantBits DelimitedFrame Equal Fletcher Id "
     "IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
     "_frecords": "Record",
 }
-#: Copied only if a tree uses it.
-_OPTIONAL = {"_frecords": "Record", "_packed": "PackedField"}
+#: Copied only if a tree uses them.
+_OPTIONAL = ("_frecords", "_packed")
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
 }
@@ -50,7 +50,7 @@ def generate(protocol: Protocol, options: Options) -> Outputs:
     text = "".join([_head(protocol), _imports(everything), *map(printed, everything)])
     folder = importlib.resources.files(__name__)
     names = {name for each in everything for name in used(each.node)}
-    copied_modules = [each for each in _SUPPORT if each not in _OPTIONAL or _OPTIONAL[each] in names]
+    copied_modules = [each for each in _SUPPORT if each not in _OPTIONAL or names & {*_SUPPORT[each].split()}]
     shared = {name: folder.joinpath(f"{name}.py").read_text("utf-8") for name in copied_modules}
     shared["__init__"] = _PACKAGE_DOC
     beside = {f"{FOLDER}/{name}.py": copied(f"{name}.py", each) for name, each in shared.items()}

@@ -1,4 +1,4 @@
-"""Arrays of a few bits in a row: a class that only some protocols need.
+"""Decimal digits, and arrays of a few bits in a row: classes that only some protocols need.
 
 Copied next to the modules that need it, unchanged.
 """
@@ -7,9 +7,44 @@ from __future__ import annotations
 
 from typing import BinaryIO
 
-from construct import Construct, Container, stream_read_entire, stream_write
+from construct import (
+    Construct,
+    Container,
+    IntegerError,
+    ValidationError,
+    stream_read,
+    stream_read_entire,
+    stream_write,
+)
 
 from ._fields import ArrayField, Row
+
+
+class BcdInteger(Construct):
+    """An integer of two decimal digits a byte; ``swapped``: the least significant ones come first."""
+
+    def __init__(self, size: int, *, swapped: bool = False) -> None:
+        super().__init__()
+        self.size = size
+        self.step = -1 if swapped else 1
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> int:
+        digits = stream_read(stream, self.size, path)[:: self.step].hex()
+        if not digits.isdecimal():
+            raise ValidationError(f"{digits} has digits above 9", path=path)
+        return int(digits)
+
+    def _build(
+        self, obj: object, stream: BinaryIO, context: Container, path: str
+    ) -> object:
+        if not isinstance(obj, int) or not 0 <= obj < 100**self.size:
+            raise IntegerError(f"{obj!r} does not have {2 * self.size} digits", path=path)
+        data = bytes.fromhex(f"{obj:0{2 * self.size}d}")[:: self.step]
+        stream_write(stream, data, self.size, path)
+        return obj
+
+    def _sizeof(self, context: Container, path: str) -> int:
+        return self.size
 
 
 class PackedField(ArrayField):

@@ -44,6 +44,9 @@ _UNCONFIRMED = "NOT CONFIRMED by a second source."
 def integer(kind: Integer, *, signed: bool | None = None) -> Node:
     """The construct of an integer, Groups if construct does not provide one."""
     signed = kind.signed if signed is None else signed
+    if kind.bcd:
+        swapped = (("swapped", True),) if kind.byteorder == "little" and kind.size > 1 else ()
+        return Call("BcdInteger", (kind.size,), swapped)
     if kind.byteorder is None:
         pairs = tuple((chunk.shift, chunk.bits) for chunk in kind.chunks)
         return Call("Groups", pairs, (("signed", True),) if signed else ())

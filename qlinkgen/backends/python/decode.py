@@ -232,6 +232,11 @@ class Decoder:
         taken = integers.get(integer, local, self.place.byteorder)
         if not taken.terms:
             return
+        if integer.bcd:
+            self._values.append(f"{local} = {integers.digits(integer, local)}")
+            self._refuse(f"not {local}.isdecimal()", name, local, offset)
+            self._values.append(f"{local} = int({local})")
+            return
         self._refuse_stray(taken, name, offset)
         self._values.append(f"{local} = {' | '.join(taken.terms)}")
         if integer.byteorder is None and integer.signed:
@@ -566,6 +571,8 @@ class Decoder:
         else:
             self._slice(step, raw)
         places = f"for index in range(0, len({raw}), {size})"
+        if item.bcd:
+            self._refuse(f"{raw} and not {raw}.hex().isdecimal()", step.name, raw, _offset(step))
         if item.byteorder is not None:
             number = integers.from_bytes(item, f"{raw}[index : index + {size}]")
         else:

@@ -34,7 +34,12 @@ class Get:
 def letter(integer: Integer, byteorder: ByteOrder) -> str:
     """The format letter, "" if struct has none for this integer in this byte order."""
     known = _LETTERS.get(integer.size, "")
-    if not known or integer.byteorder is None or (integer.size > 1 and integer.byteorder != byteorder):
+    if (
+        not known
+        or integer.bcd
+        or integer.byteorder is None
+        or (integer.size > 1 and integer.byteorder != byteorder)
+    ):
         return ""
     return known.lower() if integer.signed else known
 
@@ -50,11 +55,21 @@ def put(integer: Integer, number: str, byteorder: ByteOrder) -> tuple[str, tuple
 
 def to_bytes(integer: Integer, number: str) -> str:
     """The bytes of an integer; raises OverflowError if it does not fit. ``number`` must be a primary."""
+    if integer.bcd:
+        back = "[::-1]" if integer.byteorder == "little" else ""
+        return f'bytes.fromhex(f"{{{number}:0{2 * integer.size}d}}"){back}'
     return f'{number}.to_bytes({integer.size}, "{integer.byteorder}"{_signed(integer)})'
+
+
+def digits(integer: Integer, data: str) -> str:
+    """The digits of a byte string in binary-coded decimal; letters among them are illegal."""
+    return f"{data}[::-1].hex()" if integer.byteorder == "little" else f"{data}.hex()"
 
 
 def from_bytes(integer: Integer, data: str) -> str:
     """The integer of a byte string."""
+    if integer.bcd:
+        return f"int({digits(integer, data)})"
     return f'int.from_bytes({data}, "{integer.byteorder}"{_signed(integer)})'
 
 

@@ -377,6 +377,9 @@ def _beside(name: str, integer: Integer, rules: Iterable[Condition]) -> Iterator
     for rule in rules:
         for number in _outside(rule, integer.minimum, integer.maximum):
             yield name, number, integer.pack(number)
+    if integer.bcd:
+        data = bytes((0xA5, *bytes(integer.size - 1)))
+        yield name, integer.unpack(data), data
 
 
 def _outside(rule: Condition | None, least: int, most: int) -> list[int]:

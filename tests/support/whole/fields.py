@@ -242,7 +242,7 @@ class FieldMaker:
         made: Callable[[], tuple[Any, int]] = rng.choice(
             (self._plain, self._plain, self._plain, self._ranged, self._truth, self._of_enum, self._of_flags,
              self._scaled, self._fixed_point, self._constant, self._reserved, self._grouped, self._of_named,
-             self._real)
+             self._real, self._digits)
         )  # fmt: skip
         return made()
 
@@ -324,6 +324,27 @@ class FieldMaker:
         kind, bits = self.rng.choice(kinds)
         return kind, self._bytes_of(f"u{bits}", {})
 
+    def _digits(self) -> tuple[Any, int]:
+        """A number in binary-coded decimal."""
+        rng = self.rng
+        if self.shape.groups:
+            return self._plain()
+        kind = rng.choice(("u8", "u16", "u24", "u32", "u64"))
+        size = int(kind[1:]) // 8
+        most = 100**size - 1
+        spec: Doc = {"type": kind, "as": "bcd"}
+        if rng.random() < 0.3:
+            spec["byteorder"] = rng.choice(("big", "little"))
+        roll = rng.random()
+        if roll < 0.25:
+            low = rng.randint(0, most)
+            spec["range"] = f"{low}..{rng.randint(low, most)}"
+        elif roll < 0.5:
+            spec["scale"] = "1/100"
+        elif roll < 0.75:
+            spec[rng.choice(("default", "const"))] = rng.choice((most, rng.randint(0, most)))
+        return spec, size
+
     def _real(self) -> tuple[Any, int]:
         """A floating-point number."""
         rng, kind = self.rng, self.rng.choice(("f16", "f32", "f32", "f64"))
@@ -395,6 +416,7 @@ class FieldMaker:
                 self._ranged,
                 self._fixed_point,
                 self._of_named,
+                self._digits,
             )
         )
         spec, size = made()

@@ -51,6 +51,8 @@ class Number:
     truth: bool = False
     #: Bits that must be zero.
     forbidden: int = 0
+    #: Each byte has two decimal digits.
+    bcd: bool = False
     #: The integer is the bits of a floating-point number, perhaps with bounds.
     real: bool = False
     bounds: tuple[float, float] | None = None
@@ -376,8 +378,11 @@ class Fields:
         pieces = () if "packed" in spec else self._pieces(bits, spec)
         low = 0 if not signed else -(1 << bits - 1)
         high = 1 if truth else (1 << bits - signed) - 1
-        real = base in ("f16", "f32", "f64")
-        return Number(bits, signed, pieces, low, high, 0, scale, Fraction(0), truth, forbidden, real)
+        real, bcd = base in ("f16", "f32", "f64"), spec.get("as") == "bcd"
+        high = 10 ** (bits // 4) - 1 if bcd else high
+        return Number(
+            bits, signed, pieces, low, high, 0, scale, Fraction(0), truth, forbidden, bcd=bcd, real=real
+        )
 
     def _carrier(self, base: str) -> tuple[int, bool, Fraction | None, bool, int]:
         if base == "bool":

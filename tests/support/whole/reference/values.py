@@ -102,7 +102,22 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
         assert not isinstance(given, int)
         told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
         return put(kind.pieces, told)
-    return put(kind.pieces, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
+    return _put(kind, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
+
+
+def _put(number: Number, raw: int) -> bytes:
+    return put(number.pieces, int(str(raw), 16) if number.bcd else raw)
+
+
+def _get(number: Number, data: bytes) -> int:
+    """The integer of wire bytes. Raises Wrong for a digit above 9."""
+    pattern = get(number.pieces, data)
+    if not number.bcd:
+        return pattern
+    text = f"{pattern:x}"
+    if not text.isdecimal():
+        raise Wrong("range", text)
+    return int(text)
 
 
 def _number(number: Number, raw: Raw) -> int:
@@ -124,7 +139,7 @@ def _encoded_run(kind: Run, given: Raw) -> bytes:
         octets = [text[at : at + 8] for at in range(0, len(text), 8)]
         return bytes(int(each if kind.packed == "most" else each[::-1], 2) for each in octets)
     if kind.item:
-        return b"".join(put(kind.item.pieces, _number(kind.item, each)) for each in given)  # type: ignore[arg-type]
+        return b"".join(_put(kind.item, _number(kind.item, each)) for each in given)  # type: ignore[arg-type]
     assert isinstance(given, bytes)
     if kind.text and any(each > 0x7F for each in given):
         raise Wrong("range", "text")
@@ -157,7 +172,7 @@ def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:
     if isinstance(kind, Packed):
         whole = get(kind.pieces, data)
         return {name: _checked(number, whole >> shift) for name, shift, number in kind.members}
-    raw = _signed(kind, get(kind.pieces, data))
+    raw = _signed(kind, _get(kind, data))
     if slot.role == "count":
         return {}
     check(kind, raw)
@@ -203,7 +218,7 @@ def _decoded_run(kind: Run, data: bytes, number: int) -> Raw:
         piece = data[at : at + kind.step]
         if stray(kind.item.pieces, piece):
             raise Wrong("range", "item")
-        items.append(_checked(kind.item, get(kind.item.pieces, piece)))
+        items.append(_checked(kind.item, _get(kind.item, piece)))
     return items
 
 
