@@ -116,7 +116,7 @@ def explain_mismatch(
     expected = check.algorithm.compute(data) & check.mask
     if (expected ^ received).bit_count() == 1:
         return "one bit of the check value itself was flipped on the wire"
-    if flipped := flipped_bit(check, received, data):
+    if (flipped := flipped_bit(check, received, data)) and own[flipped[0]][0] >= 0:
         index, value = flipped
         return f"one bit was flipped on the wire: {value:02x} at offset {own[index][0]} would match"
     tried = "algorithm of the catalogue, byte order or coverage near the schema's"

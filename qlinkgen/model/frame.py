@@ -12,6 +12,8 @@ from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Scalar
 
+#: What the names of attributes begin with where a check value covers them.
+ATTRIBUTE = "attribute."
 #: The role of a part of a frame.
 Role = Literal["constant", "length", "message", "address", "payload", "checksum", "bits", "derived"]
 
@@ -23,7 +25,7 @@ class Checksum:
     algorithm: Algorithm
     #: The check value's wire bytes; bits in no chunk are neither sent nor compared.
     chunks: tuple[Chunk, ...]
-    #: Names of the frame parts covered, in wire order.
+    #: Names of the frame parts covered, in wire order; between them ``attribute.NAME``.
     over: tuple[str, ...]
     confirmed: bool = True
     #: The value where the covered parts are empty, None if the algorithm gives it.
@@ -173,6 +175,13 @@ class DelimitedFrame:
     def payload(self) -> Part:
         """The payload."""
         return next(part for part in self.parts if part.role == "payload")
+
+    @property
+    def attributes(self) -> tuple[str, ...]:
+        """Names of the attributes of messages that check values cover."""
+        over = [name for part in self.parts if part.checksum for name in part.checksum.over]
+        found = (name.removeprefix(ATTRIBUTE) for name in over if name.startswith(ATTRIBUTE))
+        return tuple(dict.fromkeys(found))
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,8 @@ class Message:
     checksum: bool = True
     addresses: tuple[tuple[int, int], ...] = ()
     default_address: int = 0
+    #: Bytes of attributes that check values cover, by their names in ``over``.
+    seeds: tuple[tuple[str, bytes], ...] = ()
 
     @cached_property
     def min_size(self) -> int:

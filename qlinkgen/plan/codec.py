@@ -11,7 +11,8 @@ Every target checks a whole frame in this order:
    inserted byte is ``stuffing`` and a payload that is too long ``length``;
 5. bytes after the end: ``length``;
 6. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
-7. a message number that the direction does not have: ``unknown``;
+7. a message number that the direction does not have: ``unknown``; then a wrong check value that covers an
+   attribute of the message: ``crc``;
 8. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address, ``range``.
 
 A marked frame has no length: a payload size that its message cannot have is ``frame``, as are a wrong header
@@ -105,12 +106,13 @@ class Codec:
         return transparency.rule.stuff(payload) if isinstance(transparency, PayloadStuffing) else payload
 
     def cells(self, message: MessagePlan, sent: bytes, address: int = 0) -> dict[str, bytes]:
-        """The bytes of each part except the check values."""
-        return {
+        """The bytes of each part except the check values, and of the seeds."""
+        parts = {
             part.name: _cell(part, sent, message.id, address)
             for part in message.envelope.parts
             if not isinstance(part, CheckPart)
         }
+        return {**parts, **dict(message.message.seeds)}
 
     def join(self, message: MessagePlan, cells: Mapping[str, bytes], request: bytes = b"") -> bytes:
         """The frame of these parts as sent; computes the check values that are not among them."""
@@ -171,12 +173,12 @@ class Codec:
         message = self.plan.known(direction).get(-1 if taken.number is None else taken.number)
         envelope = message.envelope if message else self.plan.frame.envelopes[direction]
         for part in envelope.checks:
-            right = part.check.pack(self.check_value(part, envelope, taken.cells, request))
-            if taken.cells[part.name] != right:
-                refusal = part.check.rejected is not None and part.check.pack(part.check.rejected)
-                raise BadFrame("illegal" if taken.cells[part.name] == refusal else "crc", taken.end)
+            if part not in envelope.seeded:
+                self._verify(part, envelope, taken, taken.cells, request)
         if message is None:
             raise BadFrame("unknown", taken.end)
+        for part in envelope.seeded:
+            self._verify(part, envelope, taken, {**taken.cells, **dict(message.message.seeds)})
         try:
             values = content.unpack(message.payload, taken.payload)
         except BadContent as bad:
@@ -184,6 +186,18 @@ class Codec:
         if message.allowed and taken.address is not None and not message.allowed.holds(taken.address):
             raise BadFrame("range", taken.end, self.plan.frame.address)
         return Decoded(message, taken.address, values, taken.payload)
+
+    def _verify(
+        self,
+        part: CheckPart,
+        envelope: Envelope,
+        taken: Taken,
+        cells: Mapping[str, bytes],
+        request: bytes = b"",
+    ) -> None:
+        if taken.cells[part.name] != part.check.pack(self.check_value(part, envelope, cells, request)):
+            refusal = part.check.rejected is not None and part.check.pack(part.check.rejected)
+            raise BadFrame("illegal" if taken.cells[part.name] == refusal else "crc", taken.end)
 
     # Packets
 

@@ -132,8 +132,13 @@ class _Walk:
         return Dissection(
             self.plan, self.direction, self.wire, self.request, self.message, self.number, self.address,
             tuple(sorted(self.spans, key=lambda span: span.places[0])),
-            tuple(dict.fromkeys(faults)), self.kind, self.cells, self.expected,
+            tuple(dict.fromkeys(faults)), self.kind, {**self.cells, **self._seeds()}, self.expected,
         )  # fmt: skip
+
+    def _seeds(self) -> dict[str, Cell]:
+        """The bytes of the seeds, which are not on the wire."""
+        seeds = self.message.message.seeds if self.message else ()
+        return {name: Cell(data, (-1,) * len(data), data) for name, data in seeds}
 
     # Places
 
@@ -437,10 +442,12 @@ class _Walk:
     def _check(self, part: CheckPart) -> None:
         data, check = self._found(part).data, part.check
         covered = [each for each in self.envelope.parts if each.name in check.over]
-        if len(data) < part.size or any(map(self._short, covered)) or (check.chained and not self.message):
+        by_message = check.chained or part in self.envelope.seeded
+        if len(data) < part.size or any(map(self._short, covered)) or (by_message and not self.message):
             self._span(part, None)
             return
         cells = {name: cell.sent if self.alone else cell.data for name, cell in self.cells.items()}
+        cells |= dict(self.message.message.seeds) if self.message else {}
         right = check.pack(self.codec.check_value(part, self.envelope, cells, self.request))
         received, expected = check.unpack(data), check.unpack(right)
         if data != right and self._displaced(part):

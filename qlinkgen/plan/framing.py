@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import assert_never
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
+from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.frame import Part as StatedPart
 from qlinkgen.model.integer import Chunk, Integer, byte_chunks
 from qlinkgen.model.message import Direction
@@ -141,6 +141,13 @@ class CheckPart:
     def size(self) -> int:
         """Bytes before stuffing."""
         return self.check.size
+
+
+@dataclass(frozen=True, slots=True)
+class Seed:
+    """Bytes that a check value covers but that are not sent: a numeric attribute of the message."""
+
+    attribute: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -307,10 +314,16 @@ class Rescan:
             distinguish them from noise.
         verified: frames have a check value, so one with a valid check value is consumed even if its contents
             are wrong.
+        seeded: the check value covers a seed, so it cannot be verified if the message is unknown.
     """
 
     bare: bool
     verified: bool
+    seeded: bool = False
+
+    def proves(self, kind: str) -> bool:
+        """Whether a frame with a fault of this kind is certain to be one."""
+        return self.verified and kind != "crc" and not (self.seeded and kind == "unknown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -456,18 +469,33 @@ class Envelope:
         """Whether the main check value covers the part."""
         return self.check is not None and part.name in self.check.check.over
 
-    def coverage(self, check: CheckPart) -> tuple[tuple[Part, ...], ...]:
-        """The parts that a check value covers, adjacent ones grouped."""
-        runs: list[list[Part]] = []
+    def coverage(self, check: CheckPart) -> tuple[tuple[Part, ...] | Seed, ...]:
+        """What a check value covers, in order: adjacent parts as one run, and seeds."""
+        found: list[list[Part] | Seed] = []
+        places = {part.name: index for index, part in enumerate(self.parts)}
         last = -2
-        for index, part in enumerate(self.parts):
-            if part.name in check.check.over:
-                if index == last + 1:
-                    runs[-1].append(part)
-                else:
-                    runs.append([part])
-                last = index
-        return tuple(map(tuple, runs))
+        for name in check.check.over:
+            if name.startswith(ATTRIBUTE):
+                found.append(Seed(name.removeprefix(ATTRIBUTE)))
+                last = -2
+                continue
+            if name not in places:  # the id of a packet, which its response does not repeat
+                continue
+            if places[name] == last + 1 and found and isinstance(found[-1], list):
+                found[-1].append(self.parts[places[name]])
+            else:
+                found.append([self.parts[places[name]]])
+            last = places[name]
+        return tuple(each if isinstance(each, Seed) else tuple(each) for each in found)
+
+    def seeds(self, check: CheckPart) -> tuple[Seed, ...]:
+        """The seeds that a check value covers."""
+        return tuple(each for each in self.coverage(check) if isinstance(each, Seed))
+
+    @cached_property
+    def seeded(self) -> tuple[CheckPart, ...]:
+        """Check values that cover a seed, so that they can be verified only if the message is known."""
+        return tuple(part for part in self.checks if self.seeds(part))
 
 
 def _bits_of(part: Part, whole: type[Part], slot: type[Slot]) -> Iterator[Bits]:
@@ -650,7 +678,9 @@ def _receiver(envelope: Envelope, transparency: Transparency) -> Receiver:
     """Choose between hunting and rescanning, for all targets."""
     if isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
         return Hunt(transparency.rule.after[0], transparency.rule.insert)
-    return Rescan(bare=not envelope.preamble, verified=envelope.check is not None)
+    return Rescan(
+        bare=not envelope.preamble, verified=envelope.check is not None, seeded=bool(envelope.seeded)
+    )
 
 
 def _unique(envelope: Envelope, stuffing: FrameStuffing) -> bool:

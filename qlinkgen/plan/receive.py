@@ -218,7 +218,7 @@ class RescanningReceiver(Receiver):
     def _whole(self, taken: Taken) -> Iterator[Event]:
         raw = self._buffer[: taken.end]
         event = self.judged(taken, raw, self._start)
-        proven = self._strategy.verified and event.kind != "crc"
+        proven = self._strategy.proves(event.kind)
         if event.kind != "message" and not proven:
             yield from self._drop(event.kind, raw)
             return

@@ -136,7 +136,7 @@ class Dissection:
         spans: by first offset, a member after its integer; those that are not members cover the wire once.
         faults: the violated rules, the one of `kind` first; () if `kind` is "".
         kind: the kind of error that `Codec.decode` raises, "" for a valid frame.
-        cells: the parts found.
+        cells: the parts found, and seeds of the check value, whose places are -1.
         expected: the right check values that are known, by part.
     """
 

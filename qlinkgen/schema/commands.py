@@ -24,6 +24,7 @@ from qlinkgen.schema.messages import MessageBuilder, Written
 from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.seeds import is_number
 from qlinkgen.schema.source import Path
 
 
@@ -67,6 +68,8 @@ class CommandBuilder:
         for name, spec in self._file.commands.items():
             self._command(name, spec, ("commands", name))
         for name, message in self._file.messages.items():
+            for key, value in message.attributes.items():
+                self._check_attribute(key, value, ("messages", name, "attributes", key))
             self.messages.append(self._build.single(name, message))
         if not self._file.commands and not self._file.messages:
             what = "the protocol has no commands and no messages"
@@ -237,6 +240,10 @@ class CommandBuilder:
             hint = did_you_mean(key, self._file.attributes, "declare it under attributes")
             what = f"attribute {shown(key)} is not declared"
             self._report.error("unknown-attribute", place, what, hint, of_key=True, needs=needs)
+        elif declared.values is None:
+            if not is_number(value, declared.type or ""):
+                what, hint = f"{key} cannot be {value}", f"use a number that fits {declared.type}"
+                self._report.error("unknown-attribute", place, what, hint, needs=needs)
         elif not any(value == allowed and type(value) is type(allowed) for allowed in declared.values):
             words = [shown(allowed).strip("'") for allowed in declared.values]
             hint = did_you_mean(str(value), words, f"use {listed(words, 'or')}")

@@ -358,10 +358,11 @@ class BusSpec(_Mapping):
 
 
 class AttributeSpec(_Mapping):
-    """A protocol-specific attribute of commands."""
+    """A protocol-specific attribute of commands and messages."""
 
     doc: Text = Field(default="", description="Description, in one sentence")
-    values: list[Label] = Field(min_length=1, description="Allowed values")
+    values: list[Label] | None = Field(default=None, min_length=1, description="Allowed values")
+    type: str | None = Field(default=None, description="Integer type of a number that a checksum covers")
 
 
 class RepeatSpec(_Mapping):
@@ -561,6 +562,7 @@ class MessageSpec(Fact):
         default=None, description="Direction of the message; default: any node sends it"
     )
     examples: list[ExampleSpec] = Field(default_factory=list, description="Frames of the source document")
+    attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
 
 
 class SchemaFile(_Mapping):

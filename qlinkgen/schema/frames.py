@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from qlinkgen.model import checksum as catalogue
-from qlinkgen.model.frame import Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.types import Chunk
 from qlinkgen.schema.file_model import MarkedSpec, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
@@ -217,6 +217,10 @@ class FrameBuilder:
             place,
         )
         checksum = self._parts.checksum(spec.checksum, ("payload",), place)
+        for index, name in enumerate(spec.checksum.over or ()):
+            if name.startswith(ATTRIBUTE):
+                what = f"{name} is not covered in a marked frame"
+                self._parts.fault("not-applicable", (*place, "over", index), what, "remove it")
         if checksum and any(chunk.mask & spec.marker for chunk in checksum.chunks):
             what = f"a byte of the checksum can have the marker bit {spec.marker:#04x}"
             self._parts.fault("marker-in-payload", place, what, "divide it with sent: [0..6, 7..13]")

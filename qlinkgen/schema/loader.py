@@ -20,6 +20,7 @@ from qlinkgen.schema.messages import MessageBuilder
 from qlinkgen.schema.names import check_names
 from qlinkgen.schema.reading import read_regular, reason_of
 from qlinkgen.schema.report import Reporter, did_you_mean
+from qlinkgen.schema.seeds import check_references, check_types
 from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
 from qlinkgen.schema.types import TypeBuilder
@@ -101,6 +102,8 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
         return None
     frame = FrameBuilder(file, report, crc).build()
     bus = build_bus(file)
+    check_types(file, report)
+    check_references(file, report, frame)
     check_addresses(frame, bus, report)
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)

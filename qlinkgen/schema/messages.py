@@ -14,6 +14,7 @@ from qlinkgen.schema.file_model import CommandSpec, Fields, MessageSpec, ReplySp
 from qlinkgen.schema.notation import StatedId
 from qlinkgen.schema.pieces import IdBuilder
 from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.seeds import SeedBuilder
 from qlinkgen.schema.source import Path
 
 _FRAME: Path = ("frame",)
@@ -49,6 +50,7 @@ class MessageBuilder:
         self._fields = fields
         self._frame = frame
         self._bus = bus
+        self._seeds = SeedBuilder(file, report, frame)
         #: Paths of the fields and of the number of each message, by its name.
         self.places: dict[str, Path] = {}
         self.id_places: dict[str, Path] = {}
@@ -67,11 +69,12 @@ class MessageBuilder:
         """Request or response of a command."""
         direction: Direction = "request" if layout.part == "request" else "response"
         ranges, default = self._addresses(addressing, direction)
+        number = self._number(layout, direction, f"{name}.{direction}")
         message = Message(
             name=f"{name}.{direction}",
             command=name,
             direction=direction,
-            id=self._number(layout, direction, f"{name}.{direction}"),
+            id=number,
             fields=self._fields.build(layout.fields, layout.path),
             doc=spec.doc,
             section=section,
@@ -80,6 +83,7 @@ class MessageBuilder:
             checksum=self._has_checksum(name),
             addresses=ranges,
             default_address=default,
+            seeds=self._seeds.of_command(name, number),
         )
         self._add(message, layout)
         return message
@@ -88,11 +92,12 @@ class MessageBuilder:
         """An answer other than the response; ``command`` is "" if it is that of all."""
         ranges, default = self._addresses(addressing, "response")
         name = f"{command}.{layout.part}" if command else layout.part
+        number = self._number(layout, "response", name)
         message = Message(
             name=name,
             command=command or name,
             direction="response",
-            id=self._number(layout, "response", name),
+            id=number,
             fields=self._fields.build(layout.fields, layout.path),
             doc=spec.doc,
             section=spec.section,
@@ -100,6 +105,7 @@ class MessageBuilder:
             checksum=self._has_checksum(command or name),
             addresses=ranges,
             default_address=default,
+            seeds=self._seeds.of_command(command, number),
         )
         self._add(message, layout)
         return message
@@ -119,11 +125,12 @@ class MessageBuilder:
         path: Path = ("messages", name, "fields")
         layout = Written(name, StatedId(spec.id), ("messages", name, "id"), spec.fields, path)
         nodes = self._bus.nodes if self.addressed else None
+        number = self._number(layout, spec.direction or "message", name)
         message = Message(
             name=name,
             command=name,
             direction=spec.direction or "message",
-            id=self._number(layout, spec.direction or "message", name),
+            id=number,
             fields=self._fields.build(spec.fields, path),
             doc=spec.doc,
             section=spec.section,
@@ -131,6 +138,7 @@ class MessageBuilder:
             checksum=self._has_checksum(name),
             addresses=(nodes,) if nodes else (),
             default_address=nodes[0] if nodes else 0,
+            seeds=self._seeds.of(name, number, spec.attributes, ("messages", name)),
         )
         self._add(message, layout)
         if isinstance(self._frame, PacketFrame) and spec.direction != "request":

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from qlinkgen.model import checksum as catalogue
-from qlinkgen.model.frame import Checksum, Derivation, Part, Role
+from qlinkgen.model.frame import ATTRIBUTE, Checksum, Derivation, Part, Role
 from qlinkgen.model.types import Chunk, Scalar, byte_chunks
 from qlinkgen.schema.file_model import CrcSpec, PartKind, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
@@ -213,6 +213,8 @@ class PartBuilder:
         if self._report.touched(path):
             return
         for index, name in enumerate(names):
+            if name.startswith(ATTRIBUTE) and path[-1] == "over":
+                continue
             place, needs = (*path, index), ((*self._parts_path(path), name),)
             if name not in order:
                 hint = did_you_mean(name, order, f"the parts are {listed(order)}")

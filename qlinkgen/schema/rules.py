@@ -192,6 +192,11 @@ _ALL = (
         "Each would have to be computed before the other.",
     ),
     Rule(
+        "check-seed",
+        "A message has every attribute that a check value covers; messages with one id have the same.",
+        "Otherwise the check value of the message could not be computed.",
+    ),
+    Rule(
         "part-order",
         "Parts are listed once, in wire order.",
         "A checksum depends on the order of the bytes.",

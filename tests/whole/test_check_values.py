@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from qlinkgen.backends import python
+from qlinkgen.model.checksum import find
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
@@ -21,9 +22,14 @@ qlinkgen: 1
 protocol: {name: tank, title: Tank, revision: "1", source: Example, doc: A tank}
 byteorder: big
 bus: {kind: master_slave}
+attributes: {extra: {type: u16}, salt: {type: u8}}
 messages:
-  log: {id: 5, fields: {note: "bytes[0..40]"}}
-  state: {id: 6, direction: response, fields: {level: {type: u16, range: 0..1000}}}
+  log: {id: 5, attributes: {extra: 0x1234, salt: 5}, fields: {note: "bytes[0..40]"}}
+  state:
+    id: 6
+    direction: response
+    attributes: {extra: 0, salt: 7}
+    fields: {level: {type: u16, range: 0..1000}}
 frame:
   parts:
 """
@@ -62,6 +68,14 @@ SHAPES = {
     data: {role: payload, size: 0..40}
     crc: {type: u16, algorithm: crc-16/modbus, init: 0x1234, over: [data], otherwise: 0xBEEF}
 """,
+    "one over numbers of the message that are not sent": """\
+    start: FD
+    length: {type: u8, counts: [data]}
+    code: {role: message, type: u8}
+    sum: {type: u8, algorithm: sum8, over: [attribute.salt, length]}
+    data: {role: payload, size: 0..40}
+    crc: {type: u16, algorithm: crc-16/mcrf4xx, over: [length, code, data, attribute.extra, attribute.salt]}
+""",
     "two of one algorithm in a stuffed frame": """\
     start: A5 A5
     length: {type: u8, counts: [data]}
@@ -94,6 +108,22 @@ def test_a_frame_by_hand() -> None:
     # 03 ^ 05 = 06; AA + 06 + 01 + 02 + 03 = 00B6.
     frame = bytes.fromhex("aa 03 05 06 010203 00b6")
     assert Codec(plan(_TWO)).encode("log", {"note": b"\1\2\3"}) == frame
+
+
+def test_numbers_that_are_not_sent() -> None:
+    found = plan(SHAPES["one over numbers of the message that are not sent"])
+    codec = Codec(found)
+    frame = codec.encode("log", {"note": b"\7"})
+    covered = bytes.fromhex("01 05 07 1234 05")
+    assert frame == bytes.fromhex("fd 01 05 06 07") + find("crc-16/mcrf4xx").compute(covered).to_bytes(
+        2, "big"
+    )
+    # The check value of an unknown message cannot be verified, so it proves nothing.
+    unknown = frame[:2] + b"\x09" + frame[3:]
+    events = receiver(found, "request").run(unknown + frame)
+    assert [(event.kind, event.offset) for event in events] == [("unknown", 0), ("message", len(unknown))]
+    hidden = unknown[:4] + frame  # a false start of five bytes, whose length reaches into the frame
+    assert receiver(found, "request").run(hidden)[-1].kind == "message"
 
 
 def test_a_value_where_there_is_nothing_to_cover() -> None:

@@ -83,8 +83,13 @@ class FrameSection:
     @property
     def needs_ids(self) -> bool:
         """Whether receiving a frame depends on message ids, which are then defined before it."""
-        by_message = self.view.checks_header or self.view.sized_by_message
+        by_message = self.view.checks_header or self.view.sized_by_message or self.seeded
         return by_message or isinstance(self.plan.frame.receiver, Marks | InStep)
+
+    @property
+    def seeded(self) -> bool:
+        """Whether check values cover attributes of messages."""
+        return bool(self.plan.frame.envelope.seeded)
 
     @property
     def request_sum(self) -> str:

@@ -18,6 +18,7 @@ from qlinkgen.backends.c.frames import FrameSection, frame_section
 from qlinkgen.backends.c.layout import Helper, Layouts
 from qlinkgen.backends.c.messages import MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
+from qlinkgen.backends.c.parts import in_hex
 from qlinkgen.backends.c.sizes import SizeView, size_view
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types
@@ -49,6 +50,27 @@ class HeadView:
     nearest: list[Rounding]
     floats: list[str]
     types: list[Kind]
+
+
+@dataclass(frozen=True, slots=True)
+class SeedView:
+    """The bytes of the attributes that a check value covers, and the messages that have them."""
+
+    bytes: str
+    size: int
+    constants: list[str]
+
+
+def seed_views(names: Names, messages: Sequence[MessagePlan]) -> list[SeedView]:
+    """The seeds of messages; messages with one id have one entry."""
+    found: dict[bytes, list[str]] = {}
+    ids: set[int] = set()
+    for each in messages:
+        if each.id not in ids:
+            ids.add(each.id)
+            data = b"".join(data for _, data in each.message.seeds)
+            found.setdefault(data, []).append(names.constant(each.message))
+    return [SeedView(", ".join(map(in_hex, data)), len(data), names) for data, names in found.items()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +165,10 @@ class Header:
             texts.append(
                 self._place("header_check", f=view, header_checks=header_checks, unused=[*unused, *address])
             )
+        if self._section.seeded:
+            known = [Group(d, self._expected(messages)) for d, messages in received]
+            seeds = seed_views(names, self._plan.messages)
+            texts.append(self._place("seeds", f=view, seeds=seeds, known=known, unused=unused))
         if view.sized_by_message:
             size_groups = [
                 Group(d, [size_view(names, message, self._layouts) for message in messages])

@@ -11,6 +11,7 @@ from qlinkgen.backends.c.crc import CheckView, render
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import grouped, unsigned, unsigned_type
 from qlinkgen.model.checksum import Checksum
+from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.naming import address_member
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.framing import (
@@ -31,6 +32,7 @@ from qlinkgen.plan.framing import (
     Numeric,
     Part,
     PayloadPart,
+    Seed,
     Slot,
 )
 from qlinkgen.plan.transparency import FrameStuffing
@@ -72,12 +74,17 @@ def sender_of(frame: FramePlan) -> Sender:
 
 @dataclass(frozen=True, slots=True)
 class ValueView:
-    """A function that computes a check value: its name, the name of the part, and statements."""
+    """A function that computes a check value: its name, the name of the part, and statements.
+
+    Attributes:
+        seeded: it needs the bytes of the attributes of the message.
+    """
 
     function: str
     part: str
     algorithm: CheckView
     updates: list[str]
+    seeded: bool
 
 
 @dataclass(frozen=True)
@@ -91,6 +98,10 @@ class PartWriter:
     frame: FramePlan
     sender: Sender
     layouts: Layouts
+    #: Names and bytes of the attributes of any message that check values cover.
+    seeds: tuple[tuple[str, bytes], ...] = ()
+    #: A receiver knows the direction.
+    directed: bool = False
 
     @property
     def envelope(self) -> Envelope:
@@ -122,7 +133,9 @@ class PartWriter:
     def alone(self) -> CheckPart | None:
         """The only check value, if it follows the payload: wrapping and scanning compute it in passing."""
         checks = self.envelope.checks
-        if len(checks) != 1 or checks[0] not in self.envelope.back or checks[0].check.otherwise is not None:
+        if len(checks) != 1 or checks[0] not in self.envelope.back or self.envelope.seeded:
+            return None
+        if checks[0].check.otherwise is not None:
             return None
         return checks[0]
 
@@ -351,6 +364,9 @@ class PartWriter:
     def _loops(self, check: CheckPart, key: str, array: str, start: str, payload_end: str) -> list[str]:
         lines: list[str] = []
         for run in self.envelope.coverage(check):
+            if isinstance(run, Seed):
+                lines += self._seed_updates(run, key)
+                continue
             parts = [part for part in run if part in self.parts()]
             if parts:
                 first = self._place(parts[0], start, payload_end)
@@ -367,6 +383,15 @@ class PartWriter:
             return payload_end
         base = payload_end if part in self.envelope.back else start
         return _sum(base, self._at(part) + (part.size if after else 0))
+
+    def _seed_updates(self, seed: Seed, key: str) -> list[str]:
+        """Statements that update a check value with a seed; ``seeds`` are the bytes of all of a message."""
+        if not self.seeds:  # no messages
+            return ["(void)seeds;"]
+        names = [name.removeprefix(ATTRIBUTE) for name, _ in self.seeds]
+        at = sum(len(data) for _, data in self.seeds[: names.index(seed.attribute)])
+        size = len(self.seeds[names.index(seed.attribute)][1])
+        return [f"value = {self.prefix}_{key}_update(value, seeds[{at + each}]);" for each in range(size)]
 
     # Several check values, or one before the payload
 
@@ -388,7 +413,8 @@ class PartWriter:
         updates = self._empty(part) + self._lead_updates(part, algorithm.key) + loops
         if not any("payload_end" in line for line in updates):
             updates.insert(0, "(void)payload_end;")
-        return ValueView(self._function(part), part.name, algorithm, updates)
+        seeded = part in self.envelope.seeded
+        return ValueView(self._function(part), part.name, algorithm, updates, seeded=seeded)
 
     def _empty(self, part: CheckPart) -> list[str]:
         """The statement that returns the value where the payload, which alone is covered, is empty."""
@@ -406,16 +432,27 @@ class PartWriter:
         lines: list[str] = []
         for part in self.envelope.filling if self.alone is None else ():
             place = end if part in self.envelope.back else body
-            lines += [*self._computed(part, body, payload_end)]
+            lines += self._computed(part, body, payload_end, f"{self.prefix}_seeds_({self.sender.id})")
             lines += [f"    {line}" for line in put_check(part.check, place, self._at(part), "value")]
             lines.append("}")
         return lines
 
     def judges(self, body: str, end: str, payload_end: str) -> list[str]:
         """Statements that verify the check values that are not verified before the payload."""
-        late = [part for part in self.envelope.checks if part not in self.envelope.header_checks]
-        parts = late if self.alone is None else []
-        return [line for part in parts for line in self.judge(part, body, end, payload_end)]
+        if self.alone is not None:
+            return []
+        early, seeded = self.envelope.header_checks, self.envelope.seeded
+        late = [part for part in self.envelope.checks if part not in (*early, *seeded)]
+        lines = [line for part in late for line in self.judge(part, body, end, payload_end)]
+        if seeded:
+            directed = "direction, " if self.directed else ""
+            known = f"{self.prefix}_known_seeds_({directed}{self.number(self.envelope.id)})"
+            lines += ["{", f"    const uint8_t *const seeds = {known};"]
+            lines += indented(refusal("seeds == NULL", f"{self.prefix.upper()}_ERROR_UNKNOWN"))
+            for part in seeded:
+                lines += indented(self.judge(part, body, end, payload_end))
+            lines.append("}")
+        return lines
 
     def judge(self, part: CheckPart, body: str, end: str, payload_end: str) -> list[str]:
         """Statements that verify a check value."""
@@ -424,9 +461,10 @@ class PartWriter:
         wrong = refusal(test, f"{self.prefix.upper()}_ERROR_CRC")
         return [*self._computed(part, body, payload_end), *(f"    {line}" for line in wrong), "}"]
 
-    def _computed(self, part: CheckPart, body: str, payload_end: str) -> list[str]:
+    def _computed(self, part: CheckPart, body: str, payload_end: str, seeds: str = "seeds") -> list[str]:
         kind = self.algorithms[part.check.algorithm].type
-        return ["{", f"    const {kind} value = {self._function(part)}({body}, {payload_end});"]
+        more = f", {seeds}" if part in self.envelope.seeded else ""
+        return ["{", f"    const {kind} value = {self._function(part)}({body}, {payload_end}{more});"]
 
     # Places
 
@@ -487,6 +525,11 @@ def differs(check: Check, place: str, at: int, value: str) -> str:
         f"{place}[{at + index}] != (uint8_t)({_piece(value, chunk.shift, chunk.mask)})"
         for index, chunk in enumerate(check.value.chunks)
     )
+
+
+def indented(lines: list[str]) -> list[str]:
+    """Lines one level deeper."""
+    return [f"    {line}" for line in lines]
 
 
 def in_hex(byte: int) -> str:

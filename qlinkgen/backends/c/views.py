@@ -85,7 +85,7 @@ def _directed(plan: Plan) -> bool:
             return False
         case Rescan():
             by_length = isinstance(plan.frame.end, ByLength)
-            needed = plan.frame.checks_header or not receiver.verified or not by_length
+            needed = plan.frame.checks_header or not receiver.verified or not by_length or receiver.seeded
         case Marks():
             needed = True
         case _:
@@ -243,7 +243,10 @@ class PartsViews:
 
 def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
     """The views of a delimited frame."""
-    writer = PartWriter(plan.protocol.name, plan.frame, sender_of(plan.frame), layouts)
+    seeds = plan.messages[0].message.seeds if plan.messages else ()
+    writer = PartWriter(
+        plan.protocol.name, plan.frame, sender_of(plan.frame), layouts, seeds, directed=_directed(plan)
+    )
     envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
     rule, body_size = None, 0
     match transparency:

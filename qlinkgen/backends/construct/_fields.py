@@ -388,6 +388,7 @@ class Message(Construct):
         addresses: Sequence[tuple[int, int]] = (),
         checksum: bool = True,
         empty_is_default: bool = False,
+        seeds: Sequence[tuple[str, bytes]] = (),
     ) -> None:
         super().__init__()
         self.name = name
@@ -396,6 +397,8 @@ class Message(Construct):
         self.addresses = addresses
         self.checksum = checksum
         self.empty_is_default = empty_is_default
+        #: Bytes that check values cover although they are not sent.
+        self.seeds = dict(seeds)
         self.defaults = {field.name: field.subcon.value for field in self._settable()}
         self.runs = {field.name: run for field in fields if (run := _run(field))}
         #: Constant numbers of items.

@@ -389,6 +389,7 @@ class Frame(Construct):
         cells: dict[str, bytes] = {}
         for part in self.parts:
             cells[part.name] = self._cell(part, shown, sent, address, cells)
+        cells |= message.seeds
         left = self.checks if message.checksum else []
         while left:  # a check value may cover others
             names = {part.name for part in left}
@@ -401,7 +402,7 @@ class Frame(Construct):
         if stuffing and inner:
             data = b"".join(cells[name] for name in inner)
             cells |= dict.fromkeys(inner, b"") | {inner[0]: stuffing.add(data)}
-        return b"".join(cells.values())
+        return b"".join(cells[part.name] for part in self.parts)
 
     def _cell(
         self,
@@ -466,6 +467,17 @@ class Frame(Construct):
     def _frame(self, wire: bytes, request: bytes) -> Container:
         raise NotImplementedError
 
+    @staticmethod
+    def _compare(check: Check, cells: Mapping[str, bytes], request: bytes) -> None:
+        sent, expected = cells[check.name], check.value(cells, request)
+        if sent != expected:
+            rejected = check.rejected
+            refused = rejected is not None and sent == check.packed(rejected)
+            kind = "illegal" if refused else "crc"
+            raise FrameError(
+                kind, f"received {sent.hex()}, expected {expected.hex()}"
+            )
+
     def _known(self, number: int) -> Message:
         if number not in self.by_id:
             raise FrameError("unknown", f"unknown message id {number:#04x}")
@@ -481,16 +493,14 @@ class Frame(Construct):
     ) -> Container:
         """Check a frame in cells: check value, message, sizes, values, address. Returns its message."""
         found = self.by_id.get(number)
-        for check in self.checks if found is None or found.checksum else ():
-            sent, expected = cells[check.name], check.value(cells, request)
-            if sent != expected:
-                rejected = check.rejected
-                refused = rejected is not None and sent == check.packed(rejected)
-                kind = "illegal" if refused else "crc"
-                raise FrameError(
-                    kind, f"received {sent.hex()}, expected {expected.hex()}"
-                )
+        seeds = found.seeds if found else {}
+        unseeded = [check for check in self.checks if not _seeds(check)]
+        for check in unseeded if found is None or found.checksum else ():
+            self._compare(check, cells, request)
         message = self._known(number)
+        for check in self.checks:
+            if _seeds(check):
+                self._compare(check, {**cells, **seeds}, request)
         try:
             fields = message.parse(payload)
         except RangeError as error:
@@ -505,6 +515,10 @@ class Frame(Construct):
             )
         place = {self.address: address} if self.address else {}
         return Container(message=message.name, **place, fields=fields)
+
+
+def _seeds(check: Check) -> list[str]:
+    return [name for name in check.over if name.startswith("attribute.")]
 
 
 def messages_of(*frames: Frame) -> dict[str, Message]:

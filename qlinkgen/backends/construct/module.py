@@ -76,6 +76,8 @@ def _message(message: MessagePlan, types: Types) -> Call:
         settings["checksum"] = False
     if message.payload.empty_is_default:
         settings["empty_is_default"] = True
+    if message.message.seeds:
+        settings["seeds"] = message.message.seeds
     return Call(
         "Message", (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )

@@ -10,15 +10,17 @@ from qlinkgen.backends import python_text
 from qlinkgen.backends.python import docstrings, values
 from qlinkgen.backends.python.decode import Decoder
 from qlinkgen.backends.python.encode import Encoder
-from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, listing, wrapped
+from qlinkgen.backends.python.frames import seed_name
+from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, listing, literal, wrapped
 from qlinkgen.backends.python.measure import measure_lines
 from qlinkgen.backends.python.names import attribute, class_name, constant_name, natural
 from qlinkgen.backends.python.place import Place
 from qlinkgen.model.fields import Layout, Value
+from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, Envelope
+from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, Envelope, Seed
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -151,6 +153,10 @@ class ClassBuilder:
     def _message(self, message: MessagePlan) -> ClassModel:
         facts = [f'NAME = "{message.name}"', f"ID = {in_hex(message.id)}"]
         facts.append(f"MAX_WIRE_SIZE = {message.wire_size}")
+        facts += [
+            f"{seed_name(Seed(name.removeprefix(ATTRIBUTE)))} = {literal(data)}"
+            for name, data in message.message.seeds
+        ]
         head = ClassModel(class_name(message), self._base(message), self._doc(message), facts)
         if shape := self._shapes.get(self._shape_of(message)):
             return replace(head, base=shape[0])

@@ -32,6 +32,7 @@ from qlinkgen.plan.framing import (
     Part,
     PayloadPart,
     Rescan,
+    Seed,
 )
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
@@ -161,6 +162,7 @@ class PlacedCheck:
 
     Attributes:
         mark: what the names of its functions end with, "" for the main one.
+        seeded: it covers attributes of the message.
         main: another algorithm can replace it.
         early: it is verified before the payload.
     """
@@ -172,6 +174,7 @@ class PlacedCheck:
     covered: str
     otherwise: int | None
     mark: str
+    seeded: bool
     main: bool
     early: bool
 
@@ -183,6 +186,7 @@ class PartsView:
     Attributes:
         checks: the check values in wire order.
         filling: the same in the order in which they are computed.
+        seeds: attributes of message classes that check values cover.
         blank: size of the check value at the end of the frame, 0 if something else is there.
     """
 
@@ -190,6 +194,7 @@ class PartsView:
     checks: Sequence[PlacedCheck]
     filling: Sequence[PlacedCheck]
     blank: int
+    seeds: Sequence[str]
     address: AddressView | None
     length: LengthView | None
     stuffing: StuffingView | None
@@ -472,6 +477,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         checks=checks,
         filling=filling,
         blank=last.size if isinstance(last, CheckPart) else 0,
+        seeds=sorted({seed_name(seed) for part in envelope.checks for seed in envelope.seeds(part)}),
         address=address,
         length=length,
         stuffing=_stuffing(plan),
@@ -588,7 +594,9 @@ def _bare_checks(envelope: Envelope, part: Part, reached: str, no_frame: str) ->
 def _placed(envelope: Envelope, part: CheckPart, mark: str) -> PlacedCheck:
     """The view of a check value."""
     covered = " + ".join(
-        f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
+        f"message.{seed_name(run)}"
+        if isinstance(run, Seed)
+        else f"frame[{_edge(envelope, run[0])}:{_edge(envelope, run[-1], after=True)}]"
         for run in envelope.coverage(part)
     )
     return PlacedCheck(
@@ -599,6 +607,7 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str) -> PlacedCheck:
         covered=covered,
         otherwise=part.check.otherwise,
         mark=mark,
+        seeded=part in envelope.seeded,
         main=part is envelope.check,
         early=part in envelope.header_checks,
     )
@@ -612,6 +621,11 @@ def _all_placed(envelope: Envelope) -> tuple[list[PlacedCheck], list[PlacedCheck
         for part in envelope.checks
     }
     return list(views.values()), [views[part.name] for part in envelope.filling]
+
+
+def seed_name(seed: Seed) -> str:
+    """The attribute of a message class that holds the bytes of a seed."""
+    return f"SEED_{seed.attribute.upper()}"
 
 
 def _edge(envelope: Envelope, part: Part, *, after: bool = False) -> str:

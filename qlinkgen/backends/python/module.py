@@ -160,7 +160,7 @@ class Module:
             case UniqueView():
                 return frames.wrap_lines(view, each.body_size)
             case PartsView():
-                return ["return _wrapped(body)"]
+                return [f"return _wrapped(body{', self' if view.seeds else ''})"]
             case MarkedView() | PacketView():
                 return []
 
@@ -190,7 +190,8 @@ class Module:
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():
                 used |= {"short_of"}
-        if isinstance(view, UniqueView | PartsView) and not view.address:
+        seeds = isinstance(view, PartsView) and view.seeds
+        if isinstance(view, UniqueView | PartsView) and not view.address and not seeds:
             typing -= set() if plan.enums else {"ClassVar"}
         if isinstance(view, PacketView) and not plan.enums:
             typing -= {"ClassVar"}

@@ -44,6 +44,8 @@ class Shape:
     word: int = 0
     #: The checksum of a marked frame lists its messages.
     only: bool = False
+    #: Numeric attributes that check values cover.
+    seeds: Doc = field(default_factory=dict)
     #: Name and bits of the pieces of the message id, if there is not just one.
     pieces: list[tuple[str, int]] = field(default_factory=list)
     #: A part states the direction, so every message needs one.
@@ -141,6 +143,7 @@ class _Parts:
     words: _Words
     parts: Doc = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
+    seeds: Doc = field(default_factory=dict)
 
     def _chance(self, probability: float) -> bool:
         return self.rng.random() < probability
@@ -252,7 +255,21 @@ class _Parts:
             spec["sent"] = rng.choice(
                 (["0..6", "8..14"], ["8..15"], ["0..3", "4..7", "8..11", "12..15"], ["7..14", "0..6"])
             )
+        if not whole and "otherwise" not in spec:
+            self._seeded(spec)
         names["checksum"] = self._add("crc", spec)
+
+    def _seeded(self, spec: Doc) -> Doc:
+        """Let a check value cover an attribute of the message, rarely."""
+        if self._chance(0.15):
+            name = self.rng.choice(("crc_extra", "salt"))
+            self.seeds.setdefault(name, {"type": self.rng.choice(("u8", "u8", "u16", "u32"))})
+            over = [*spec["over"]]
+            over.insert(
+                self.rng.choice((len(over), len(over), self.rng.randint(0, len(over)))), f"attribute.{name}"
+            )
+            spec["over"] = over
+        return spec
 
     def _start(self, width: int) -> Doc:
         return {"init": self.rng.randrange(1 << width)} if self._chance(0.15) else {}
@@ -265,7 +282,7 @@ class _Parts:
         covered = front if front and self._chance(0.5) else others
         covered = [name for name in covered if rng.random() < 0.7] or covered[:1]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
-        name = self._add("head", spec | _order(rng) | self._start(width))
+        name = self._add("head", self._seeded(spec) | _order(rng) | self._start(width))
         least = 1 if "lead" in names else 0
         place = rng.randint(least, len(front) if self._chance(0.7) else len(others))
         others.insert(place, name)
@@ -275,11 +292,13 @@ class _Parts:
         for each, part in self.parts.items():
             # No two check values cover each other.
             if "over" in part and each not in self._under(name) and self._chance(0.6):
-                part["over"] = [other for other in others if other in (name, *part["over"])]
+                kept = [other for other in others if other in (name, *part["over"])]
+                part["over"] = [*kept, *(each for each in part["over"] if each not in others)]
 
     def _under(self, name: str) -> set[str]:
         """A part, and the parts that it covers, directly or through others."""
-        return {name}.union(*(self._under(each) for each in self.parts[name].get("over", ())))
+        over = self.parts[name].get("over", ()) if name in self.parts else ()
+        return {name}.union(*map(self._under, over))
 
     def _counts(self, names: Doc, *, hunted: bool, every: bool) -> None:
         counted = [
@@ -332,6 +351,7 @@ class _Parts:
             int(address["type"][1:]) if address else 0,
             names.get("address", ""),
             int(stuffing["after"].split()[0], 16) if stuffing else 0xA5,
+            seeds=self.seeds,
         )
 
     def _longest(self, names: Doc, stuffing: Doc, most: int, *, below: bool) -> int:

@@ -153,6 +153,7 @@ class _Maker:
             shape.frame["marked"]["checksum"]["only"] = rng.sample(names, rng.randint(1, len(names)))
         if found["commands"] and shape.kind != "packet" and rng.random() < 0.4:
             self._answers(shape, maker, found)
+        self._seeds(shape, found)
         return {key: value for key, value in found.items() if value or key == "commands"}
 
     def _only(self, shape: Shape, maker: FieldMaker, bus: Doc, taken: set[str], *, attributes: bool) -> Doc:
@@ -189,6 +190,17 @@ class _Maker:
         if rng.random() < 0.3:
             command["response_within"] = "20 ms"
         return self._described(command)
+
+    def _seeds(self, shape: Shape, found: Doc) -> None:
+        """Give every message the attributes that check values cover."""
+        for name, spec in shape.seeds.items():
+            found.setdefault("attributes", {})[name] = spec
+            top = (1 << int(spec["type"][1:])) - 1
+            for each in (*found["commands"].values(), *found["messages"].values()):
+                each.setdefault("attributes", {})[name] = self.rng.choice((0, top, self.rng.randint(0, top)))
+            if found.get("replies"):
+                defaults = found.setdefault("defaults", {})
+                defaults.setdefault("attributes", {})[name] = self.rng.randint(0, top)
 
     def _answers(self, shape: Shape, maker: FieldMaker, found: Doc) -> None:
         """Give answers numbers of their own, and other replies to the commands."""

@@ -50,6 +50,10 @@ class Reference:
         ]
         self.address_name = addressed[0] if addressed else "address" if "marked" in shape else None
         self.messages = document.messages(data, Fields(data, most), self.address_name is not None)
+        if isinstance(self.frame, Frame):
+            self.frame.seeds = {
+                message.number: document.seeds(data, message.name) for message in self.messages
+            }
         self.by_name = {message.name: message for message in self.messages}
         used = {message.direction for message in self.messages}
         self.directions: tuple[Direction, ...] = (

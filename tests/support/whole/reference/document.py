@@ -513,6 +513,21 @@ def numbered(document: Doc, given: Any, direction: Direction) -> int:
     return number
 
 
+def seeds(document: Doc, message: str) -> Mapping[str, bytes]:
+    """The bytes of the numeric attributes of a message."""
+    name = message.partition(".")[0]
+    given = dict(document.get("defaults", {}).get("attributes", {}))
+    given |= document.get("commands", {}).get(name, {}).get("attributes", {})
+    if name in document.get("messages", {}):
+        given = document["messages"][name].get("attributes", {})
+    found = {}
+    for each, spec in document.get("attributes", {}).items():
+        if "type" in spec and each in given:
+            order = document.get("byteorder", "big")
+            found[f"attribute.{each}"] = given[each].to_bytes(int(spec["type"][1:]) // 8, order)
+    return found
+
+
 def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, ...]:
     """All messages of a file, in order."""
     found: list[Message] = []

@@ -126,6 +126,8 @@ class Frame:
         frame, order = document["frame"], document.get("byteorder", "big")
         self.parts = [part_of(name, spec, order) for name, spec in frame["parts"].items()]
         self.by_role: Mapping[str, Part] = {part.role: part for part in self.parts[::-1]}
+        #: Bytes of attributes of messages, by number of the message.
+        self.seeds: dict[int, Mapping[str, bytes]] = {}
         self.checks = [part for part in self.parts if part.role == "checksum"]
         self.payload_at = self.parts.index(self.by_role["payload"])
         self.least, self.most = whole_span(self.by_role["payload"].spec["size"])
@@ -183,6 +185,11 @@ class Frame:
             and part.name not in self.stuffing.exempt
         )
 
+    @property
+    def seeded(self) -> bool:
+        """Whether a check value covers attributes of the message."""
+        return any(name.startswith("attribute.") for check in self.checks for name in check.spec["over"])
+
     # Building
 
     def wrap(self, number: int, payload: bytes, address: int) -> bytes:
@@ -208,6 +215,7 @@ class Frame:
                 cut[part.name] = put(part.pieces, self.derived(part, cut))
             else:
                 cut[part.name] = payload if part.role == "payload" else part.constant
+        cut |= self.seeds.get(number, {})
         for _ in self.checks:  # so often that those which cover others become right
             for check in self.checks:
                 cut[check.name] = put(check.pieces, self.check_value(check, cut))
@@ -247,9 +255,10 @@ class Frame:
             return int(check.spec["otherwise"])
         return checks.compute(check.spec["algorithm"], covered, check.spec.get("init"))
 
-    def check_fails(self, cut: Mapping[str, bytes], *, early: bool = False) -> bool:
-        """Whether a check value is wrong; `early`: one that needs only the parts found."""
-        checks = [each for each in self.checks if not early or {each.name, *each.spec["over"]} <= cut.keys()]
+    def check_fails(self, cut: Mapping[str, bytes], seeds: Mapping[str, bytes] | None = None) -> bool:
+        """Whether one of the check values is wrong that need only the parts found, and the seeds."""
+        cut = {**cut, **(seeds or {})}
+        checks = [each for each in self.checks if {each.name, *each.spec["over"]} <= cut.keys()]
         return any(cut[each.name] != put(each.pieces, self.check_value(each, cut)) for each in checks)
 
     def bad_constant(self, cut: Mapping[str, bytes]) -> bool:
@@ -362,7 +371,7 @@ class Splitter:
         for part in frame.parts[: frame.payload_at]:
             self._take(part, cursor, cut)
             self._judge(part, cursor, cut)
-        if frame.check_fails(cut, early=True):
+        if frame.check_fails(cut):
             raise Refused("crc", cursor.at)
         payload = frame.by_role["payload"]
         cut[payload.name] = self._payload(payload, cursor, cut)

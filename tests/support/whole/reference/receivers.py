@@ -233,7 +233,8 @@ class Searcher(Receiver):
     def _attempt(self) -> tuple[Event, int, bool]:
         cut = self.splitter.split(self.buffer)
         event = self._event(cut, self._plain(cut))
-        if event.kind == "crc" or (event.kind != "message" and "checksum" not in self.frame.by_role):
+        unproven = "checksum" not in self.frame.by_role or (self.frame.seeded and event.kind == "unknown")
+        if event.kind == "crc" or (event.kind != "message" and unproven):
             # It may not be a frame at all, so another one may begin after its first byte.
             raise Refused(event.kind, cut.size)
         return event, cut.size, cut.pending
@@ -253,10 +254,11 @@ class Searcher(Receiver):
 
     def _event(self, cut: Cut, payload: bytes) -> Event:
         raw = self.buffer[: cut.size]
-        if self.frame.check_fails(cut.parts):
-            return Event("crc", self.at, self.start, raw)
         number, address = (self.frame.number(role, cut.parts) for role in ("message", "address"))
         message = self.known.get(number or 0)
+        seeds = self.frame.seeds[message.number] if message else {}
+        if self.frame.check_fails(cut.parts, seeds):
+            return Event("crc", self.at, self.start, raw)
         return self.carried(message, address, lambda: payload, self.start, raw)
 
 
