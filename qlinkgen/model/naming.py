@@ -94,7 +94,7 @@ _C_LOCALS = frozenset(
     size_t""".split()  # noqa: SIM905
 )
 #: Members of a table of handlers other than functions.
-_C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id"})
+_C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id", "replying"})
 #: Names that the header itself defines, or their beginnings, without the prefix of the protocol.
 _C_STEMS = frozenset(
     """addressing async_master_calls async_node_calls bits bits_per bus check codec_error command crc

@@ -35,6 +35,7 @@ class SlaveEntry:
         unsupported: the result if the slave has no function for it.
         right: condition for a valid payload.
         unless_silent: term of a condition that prevents a response to a broadcast.
+        replies: functions of other answers.
     """
 
     name: str
@@ -50,6 +51,17 @@ class SlaveEntry:
     unsupported: str
     right: str
     unless_silent: str
+    replies: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class ReplyEntry:
+    """A function with which the function of a command answers in another way."""
+
+    name: str
+    commands: list[str]
+    function: str
+    has_struct: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +110,36 @@ def slave_entries(
             answer = answer if answer and answer.name in present else None
             # A message without a command goes to one node.
             addressing = command.addressing if command else "node"
-            entries.append(_entry(names, message, answer, addressing if addressed else "", reject))
+            others = (
+                [each.message for each in command.replies if each.message.name in present] if command else []
+            )
+            replies = [names.function(each) for each in others] if answer else []
+            entries.append(
+                _entry(names, message, answer, addressing if addressed else "", reject, replies=replies)
+            )
     return entries
 
 
+def reply_entries(names: Names, commands: tuple[Command, ...], kept: tuple[Message, ...]) -> list[ReplyEntry]:
+    """The other answers of a slave, each once."""
+    present = {message.name for message in kept}
+    found: dict[str, ReplyEntry] = {}
+    for command in commands:
+        for message in (reply.message for reply in command.replies):
+            if message.name in present and command.request.name in present:
+                new = ReplyEntry(message.name, [], names.function(message), bool(message.values))
+                found.setdefault(message.name, new).commands.append(command.name)
+    return list(found.values())
+
+
 def _entry(
-    names: Names, message: Message, answer: Message | None, addressing: str, reject: str
+    names: Names,
+    message: Message,
+    answer: Message | None,
+    addressing: str,
+    reject: str,
+    *,
+    replies: list[str],
 ) -> SlaveEntry:
     function, answer_constant = names.function(message), names.constant(answer) if answer else ""
     target = "&request, " if message.values else ""
@@ -123,6 +159,7 @@ def _entry(
         unsupported=f"{reject}({answer_constant}_MIN_SIZE, wire, capacity)" if refuses else "0",
         right=decoded if message.fields else "frame->size == 0U",
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
+        replies=replies,
     )
 
 

@@ -225,6 +225,7 @@ class Header:
             d=section.dispatch,
             example_command=snake(answered.name).upper() if answered else "",
             slave=slave,
+            replies=self._replies(slave),
             slave_groups=dispatch.slave_groups(slave, self._names.prefix),
             master=dispatch.callbacks(self._names, self._address, self._plan.messages) if listens else [],
             transactions=dispatch.transactions(self._protocol, self._names.upper, commands),
@@ -234,6 +235,11 @@ class Header:
         section = self._section
         addressed = bool(section.view.address)
         return dispatch.slave_entries(self._names, self._kept, addressed=addressed, reject=section.reject)
+
+    def _replies(self, slave: Sequence[dispatch.SlaveEntry]) -> list[dispatch.ReplyEntry]:
+        """Functions that answer in another way, if any function of the slave may."""
+        used = any(entry.replies for entry in slave)
+        return dispatch.reply_entries(self._names, self._plan.commands, self._kept) if used else []
 
     def _head(self) -> HeadView:
         protocol, runs, check = self._protocol, self._byte_runs(), self._section.check
