@@ -17,6 +17,7 @@ from qlinkgen.plan.describe import (
     number_text,
     part_text,
     span_text,
+    transparency_text,
     value_text,
 )
 from qlinkgen.plan.framing import (
@@ -31,7 +32,7 @@ from qlinkgen.plan.framing import (
 )
 from qlinkgen.plan.payload import ConstantStep, Member, Step
 from qlinkgen.plan.spans import Dissection, Fault, Rule
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan
 
 Words = tuple[str, str]
@@ -74,6 +75,15 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             assert isinstance(of, LengthPart)
             cause = "a bit was flipped, or the bytes before it are data, not a preamble"
             return f"{of.name} is {fault.seen}, allowed are {span_text(of.least, of.most)}", cause
+        case Rule.TERMINATOR:
+            assert isinstance(of, ConstantPart)
+            most = found.plan.frame.max_wire
+            return f"no {of.data.hex(' ')} within {most} bytes, the longest frame", _LOST
+        case Rule.COUNTED:
+            assert isinstance(of, LengthPart)
+            size = len(found.cells[found.plan.frame.envelope.payload.name].data) + of.bias
+            rule = f"{of.name} is {fault.seen}, but it counts {counted(size)} up to the terminator"
+            return rule, "bytes were lost or added"
         case Rule.LAST:
             cause = (
                 "the capture contains more frames, or bytes were added; `qlinkgen decode` reads whole streams"
@@ -176,6 +186,9 @@ def _missing(found: Dissection, fault: Fault) -> Words:
 
 def _stuffing(found: Dissection, fault: Fault, at: int) -> Words:
     way = found.plan.frame.transparency
+    if isinstance(way, Coded):
+        seen = "the end of the coded bytes" if fault.seen is None else f"{fault.seen:02x}"
+        return f"{seen} at offset {at} is wrong: {transparency_text(found.plan.frame)}", _LOST
     assert isinstance(way, FrameStuffing | PayloadStuffing)
     seen = "the end of the payload" if fault.seen is None else f"{fault.seen:02x}"
     after = f"{way.rule.after.hex(' ')} at offset {at - len(way.rule.after)}"
@@ -238,6 +251,9 @@ def _coverages(found: Dissection, plain: Mapping[str, bytes], over: Sequence[str
         case FrameStuffing():
             sent = {name: found.cells[name].sent for name in plain}
             return coverages(plain, over, sent, " with the stuffing")
+        case Coded():
+            sent = {name: found.cells[name].sent for name in plain}
+            return coverages(plain, over, sent, " as coded")
         case Plain() | SevenBit():
             return coverages(plain, over, plain, "")
         case _:

@@ -18,7 +18,7 @@ from qlinkgen.cli.codec import MessageObject
 from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
-from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, FramePlan, frame_plan
+from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, ByTerminator, FramePlan, frame_plan
 
 #: Kinds of faults in the order of the checks: of two faults, the later one is reported.
 PROGRESS = ("unknown", "length", "frame", "stuffing", "truncated", "crc", "illegal", "range")
@@ -188,7 +188,7 @@ def open_stream(protocol: Described, codec: ModuleType, direction: Direction | N
 def _ends_alike(frame: FramePlan) -> bool:
     """Whether the boundaries of frames are independent of the direction."""
     match frame.end:
-        case ByLength():
+        case ByLength() | ByTerminator():
             return bool(frame.envelope.preamble)
         case ByMark():
             return True

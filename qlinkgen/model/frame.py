@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 from qlinkgen.model.checksum import Checksum as Algorithm
+from qlinkgen.model.coding import Coding
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Scalar
@@ -15,7 +16,9 @@ from qlinkgen.model.types import Scalar
 #: What the names of attributes begin with where a check value covers them.
 ATTRIBUTE = "attribute."
 #: The role of a part of a frame.
-Role = Literal["constant", "length", "message", "address", "payload", "checksum", "bits", "derived"]
+Role = Literal[
+    "constant", "length", "message", "address", "payload", "checksum", "terminator", "bits", "derived"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +95,10 @@ class Derivation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """A part of a frame. ``scalar`` is the integer of all parts but constants, payload and checksum."""
+    """A part of a frame. ``scalar`` is the integer of all parts but constants, payload and checksum.
+
+    ``constant`` holds the bytes of a constant or a terminator, which may begin the next frame if ``shared``.
+    """
 
     name: str
     role: Role
@@ -100,6 +106,7 @@ class Part:
     section: Text = ""
     confirmed: bool = True
     constant: bytes = b""
+    shared: bool = False
     scalar: Scalar | None = None
     checksum: Checksum | None = None
     #: What its bits hold: all of a message id or address, those described of a part with role "bits", whose
@@ -135,10 +142,15 @@ class Stuffing:
 
 @dataclass(frozen=True)
 class DelimitedFrame:
-    """Parts in wire order; the end follows from the length if there is one, otherwise from the message."""
+    """Parts in wire order; a terminator, otherwise a length, otherwise the message determines the end.
+
+    ``coding`` applies to the parts named in ``coded``, one coding after the other.
+    """
 
     parts: tuple[Part, ...]
     stuffing: Stuffing | None = None
+    coding: tuple[Coding, ...] = ()
+    coded: tuple[str, ...] = ()
     doc: Text = ""
     section: Text = ""
 

@@ -25,7 +25,7 @@ from qlinkgen.plan.framing import (
 )
 from qlinkgen.plan.payload import payload_plan
 from qlinkgen.plan.select import Options
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -72,6 +72,9 @@ def _growth(frame: FramePlan, envelope: Envelope, message: Message) -> int:
             return 0
         case PayloadStuffing():
             return transparency.rule.growth(message.max_size)
+        case Coded():
+            size = envelope.overhead + message.max_size
+            return transparency.most_frame(size) - size
         case FrameStuffing():
             parts = envelope.between(transparency.front, transparency.back)
             return transparency.rule.growth(sum(_stuffable(each, message, transparency) for each in parts))

@@ -15,6 +15,11 @@ Every target checks a whole frame in this order:
    attribute of the message: ``crc``;
 8. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address, ``range``.
 
+A frame that a terminator ends is decoded as a whole. Step 2 is: a wrong first constant is ``frame``; no
+terminator within the longest frame, or nothing before it, is ``length``; a wrong coding is ``stuffing``; a
+payload that is too short or too long is ``length``; then, in wire order, a wrong constant is ``frame`` and a
+wrong length ``length``.
+
 A marked frame has no length: a payload size that its message cannot have is ``frame``, as are a wrong header
 or end, and bytes after the end. In a frame without leading constants an unknown number or an illegal address
 is found in step 2.
@@ -29,6 +34,7 @@ from typing import assert_never
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import content
 from qlinkgen.plan.content import BadContent, Raw, Unsendable
+from qlinkgen.plan.ended import frame_reader
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
@@ -50,8 +56,8 @@ from qlinkgen.plan.framing import (
     Rescan,
     Slot,
 )
-from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, read_marked
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.reading import BadFrame, Incomplete, NoFrame, Taken, read_marked
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Parts whose bytes do not depend on other parts.
@@ -103,7 +109,7 @@ class Codec:
     def sent(self, payload: bytes) -> bytes:
         """The payload as a length counts it: with inserted bytes if only the payload is stuffed."""
         transparency = self.plan.frame.transparency
-        return transparency.rule.stuff(payload) if isinstance(transparency, PayloadStuffing) else payload
+        return transparency.rule.encode(payload) if isinstance(transparency, PayloadStuffing) else payload
 
     def cells(self, message: MessagePlan, sent: bytes, address: int = 0) -> dict[str, bytes]:
         """The bytes of each part except the check values, and of the seeds."""
@@ -125,6 +131,8 @@ class Codec:
         match transparency:
             case FrameStuffing():
                 return transparency.stuff(frame)
+            case Coded():
+                return transparency.encode(frame)
             case Plain() | SevenBit() | PayloadStuffing():
                 return frame
             case _:
@@ -161,7 +169,7 @@ class Codec:
                 return self.judge(read_marked(frame, known, wire), direction)
             case Hunt() | Rescan():
                 hunting = isinstance(frame.receiver, Hunt)
-                taken = FrameReader(frame, known, direction).read(wire, hunting=hunting)
+                taken = frame_reader(frame, known, direction).read(wire, hunting=hunting)
                 if wire[taken.end :] not in (b"", taken.due):
                     raise BadFrame("length", taken.end)
                 return self.judge(taken, direction)

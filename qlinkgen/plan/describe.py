@@ -21,6 +21,7 @@ from qlinkgen.model.types import (
 )
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.check import Check
+from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -28,6 +29,7 @@ from qlinkgen.plan.framing import (
     ByLength,
     ByMark,
     ByMessage,
+    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -63,7 +65,7 @@ from qlinkgen.plan.payload import (
     Step,
     ValueStep,
 )
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 
 # Numbers ----------------------------------------------------------------------------------------------------
 
@@ -394,7 +396,7 @@ def id_text(frame: FramePlan, number: int) -> str:
     match end:
         case ByMark():
             return str(number)
-        case ByLength() | ByMessage():
+        case ByLength() | ByMessage() | ByTerminator():
             return f"0x{number:02X}"
         case _:
             assert_never(end)
@@ -409,6 +411,10 @@ def end_text(frame: FramePlan) -> str:
             return f"the payload has {end.part.name}{bias} bytes"
         case ByMessage():
             return "the size follows from the message and the counts in its payload"
+        case ByTerminator():
+            begins = ", which may also begin the next frame" if end.shared else ""
+            after = f"; {end.after} bytes follow" if end.after else ""
+            return f"the next {end.part.data.hex(' ').upper()}{begins}{after}"
         case ByMark():
             return f"the next byte with bit 0x{end.header.marker:02X} set"
         case _:
@@ -431,8 +437,35 @@ def transparency_text(frame: FramePlan) -> str:
         case PayloadStuffing():
             rule = f"a byte {way.rule.insert:02X} is inserted after every {_after_text(way)}"
             return f"{rule} in {envelope.payload.name}, before length and checksum are computed"
+        case Coded(stages=()):
+            return "bytes are sent as they are"
+        case Coded():
+            parts = envelope.between(way.front, way.back)
+            names = ", ".join(each.name for each in parts)
+            return f"{'; then '.join(map(_stage_text, way.stages))}; in {names}"
         case _:
             assert_never(way)
+
+
+def _stage_text(coding: Stage) -> str:
+    match coding:
+        case Escaping():
+            escape, escaped = f"{coding.escape:02X}", " ".join(f"{byte:02X}" for byte, _ in coding.codes)
+            if coding.mask:
+                return f"{escape} precedes each of {escaped}, which are XORed with {coding.mask:02X}"
+            return ", ".join(f"{byte:02X} is sent as {escape} {second:02X}" for byte, second in coding.codes)
+        case Insertion():
+            return f"a byte {coding.insert:02X} is inserted after every {coding.after.hex(' ').upper()}"
+        case Cobs():
+            return "COBS removes each 00"
+        case Digits():
+            return "each byte is two hexadecimal digits"
+        case Pair():
+            return "each byte is followed by its complement"
+        case Add():
+            return f"{coding.number:02X} is added to each byte"
+        case _:
+            assert_never(coding)
 
 
 def _after_text(way: FrameStuffing | PayloadStuffing) -> str:
@@ -449,6 +482,9 @@ def receiver_text(frame: FramePlan) -> tuple[str, str]:
                 "frame itself is buffered"
             )
         case Rescan():
+            if isinstance(frame.end, ByTerminator) and preamble:
+                text = f"a frame reaches from {preamble} to the next terminator"
+                return "rescan", f"{text}; after a failure the search continues at the next {preamble[:2]}"
             seen = f"{preamble} may also be data" if preamble else "frames do not begin with a constant"
             proof = (
                 "a frame with a valid check value but wrong contents is skipped as a whole"

@@ -7,7 +7,7 @@ another fault are not listed: after a wrong inserted byte, for example, the chec
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import assert_never
@@ -22,6 +22,7 @@ from qlinkgen.plan.framing import (
     ByLength,
     ByMark,
     ByMessage,
+    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -38,7 +39,7 @@ from qlinkgen.plan.framing import (
 from qlinkgen.plan.payload import Member, Step
 from qlinkgen.plan.reading import BadFrame, Cursor, Incomplete, is_wrong
 from qlinkgen.plan.spans import Around, Cell, Dissection, Fault, Rule, Span
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 Named = Part | Step | Member | None
@@ -53,7 +54,8 @@ def dissect(plan: Plan, wire: bytes, direction: Direction, request: bytes = b"")
         kind = bad.kind
     else:
         kind = ""
-    return _Walk(codec, wire, direction, request, kind).run()
+    walk = _EndedWalk if isinstance(plan.frame.end, ByTerminator) else _Walk
+    return walk(codec, wire, direction, request, kind).run()
 
 
 def request_size(plan: Plan, wire: bytes) -> int:
@@ -120,6 +122,8 @@ class _Walk:
         self.no_preamble = False
         #: A count is out of range; the payload is assumed to be the rest.
         self.miscounted = False
+        #: All offsets that represent a byte, by the first of them; one offset each if none is listed.
+        self.units: dict[int, range] = {}
 
     def run(self) -> Dissection:
         """Dissect the frame."""
@@ -224,6 +228,8 @@ class _Walk:
                 size = length - end.part.bias if fits and length is not None else self._left() - trailer
             case ByMark():
                 size = self._marked_size(end)
+            case ByTerminator():
+                raise AssertionError("the terminator is found first")
             case ByMessage() if self.frame.needs_request:
                 payload = self.message.payload if self.message else None
                 size = max(payload.least, min(payload.most, self._left() - trailer)) if payload else 0
@@ -485,7 +491,7 @@ class _Walk:
             if len(data) > part.most and self.alone:
                 self._fault("length", Rule.SIZE, at, part, len(data))
             if places:
-                self.spans.append(Span(part, places, data, len(data)))
+                self.spans.append(Span(part, *self._sent(places), len(data)))
             return
         if not data and message.payload.empty_is_default and not self._short(part):
             return
@@ -501,7 +507,9 @@ class _Walk:
             self._fault(kind, Rule.SIZE, at, part, len(data))
         for each in fields.wrong:
             self.faults.append(Fault("range", Rule.VALUE, places[each.at], each.of, each.seen, each.inside))
-        self.spans += (replace(span, places=tuple(places[i] for i in span.places)) for span in fields.spans)
+        for span in fields.spans:
+            own, raw = self._sent(places[i] for i in span.places)
+            self.spans.append(replace(span, places=own, raw=raw))
 
     def _plain(self, cell: Cell, *, whole: bool) -> tuple[bytes, tuple[int, ...]]:
         """The payload and its offsets without the bytes inserted by payload stuffing."""
@@ -535,4 +543,85 @@ class _Walk:
         if cell.places:
             fault = fault or ("truncated" if self._short(part) else "")
             size = self.wanted.get(part.name, part.size)
-            self.spans.append(Span(part, cell.places, cell.data, size, number, fault))
+            self.spans.append(Span(part, *self._sent(cell.places), size, number, fault))
+
+    def _sent(self, places: Iterable[int]) -> tuple[tuple[int, ...], bytes]:
+        """All offsets that represent bytes, and what is there."""
+        own = tuple(each for place in places for each in self.units.get(place, (place,)))
+        return own, bytes(self.wire[at] for at in own)
+
+
+class _EndedWalk(_Walk):
+    """Divides a frame that a terminator ends: decodes it as a whole, then takes its parts from both ends."""
+
+    def _divide(self, front: Sequence[Part]) -> None:
+        del front
+        assert isinstance(self.frame.end, ByTerminator)
+        last, wire = self.frame.end.part, self.wire
+        lost = self.envelope.parts[0] if self.no_preamble else None
+        start = self.cursor.at - (self.wanted[lost.name] if lost else 0)
+        stop = wire.find(last.data, start + len(self.envelope.preamble))
+        end = len(wire) if stop < 0 else min(len(wire), stop + last.size + self.frame.end.after)
+        plain = self._decoded(start, len(wire) if stop < 0 else stop)
+        places = [*plain, *((at, wire[at]) for at in range(len(wire) if stop < 0 else stop, end))]
+        self.cursor.at = end
+        self._allot(places[max(0, -start) :] if lost else places, whole=stop >= 0)
+        self._identify()
+        if stop < 0 and self.kind == "length":
+            self._fault("length", Rule.TERMINATOR, len(wire), last)
+        if self.message is not None:
+            self.envelope = self.message.envelope
+
+    def _decoded(self, start: int, stop: int) -> list[tuple[int, int]]:
+        """Offset and value of each byte before the terminator."""
+        coded, last = self.frame.transparency, self.frame.end
+        assert isinstance(coded, Coded)
+        assert isinstance(last, ByTerminator)
+        back = coded.back - last.part.size - last.after
+        first, end = max(start + coded.front, self.cursor.at), max(start + coded.front, stop - back)
+        read = coded.read(self.wire[first:end])
+        before = first
+        found = [(at, self.wire[at]) for at in range(max(start, 0), min(first, stop))]
+        for byte, place in zip(read.plain, read.places, strict=True):
+            found.append((before, byte))
+            self.units[before] = range(before, first + place + 1)
+            before = first + place + 1
+        if read.wrong is not None:
+            at = first + read.wrong
+            self._fault("stuffing", Rule.STUFFING, at, seen=self.wire[at] if at < end else None)
+            self._around(Around.EXTRA, range(before, end), "stuffing")
+        elif found and before < end:
+            self.units[found[-1][0]] = range(found[-1][0], end)
+        return [*found, *((at, self.wire[at]) for at in range(max(end, first), stop))]
+
+    def _allot(self, places: Sequence[tuple[int, int]], *, whole: bool) -> None:
+        """Give each part its bytes."""
+        parts = [part for part in self.envelope.parts if part.name not in self.cells]
+        fixed = sum(part.size for part in parts)
+        left = len(places) - (fixed if whole else sum(part.size for part in self.envelope.front))
+        size, at = max(0, left), 0
+        for part in parts:
+            wanted = size if isinstance(part, PayloadPart) else part.size
+            own = places[at : at + wanted]
+            at += len(own)
+            offsets = tuple(place for place, _ in own)
+            sent = self._sent(offsets)[1]
+            self.cells[part.name] = Cell(bytes(byte for _, byte in own), offsets, sent)
+            self.wanted[part.name] = wanted if self.wanted_all(whole) else len(own)
+        payload = self.envelope.payload
+        if whole and (left < payload.least or left > payload.most):
+            self._fault("length", Rule.SIZE, places[0][0] if places else self.cursor.at, payload, size)
+
+    def wanted_all(self, whole: bool) -> bool:
+        """Whether missing bytes are reported as such."""
+        return not whole
+
+    def _close_cells(self) -> None:
+        """Cells have their bytes as sent already."""
+
+    def _length(self, part: LengthPart) -> None:
+        number, size = self._number_in(part, part.integer), len(self._found(self.envelope.payload).data)
+        wrong = number is not None and number != size + part.bias and not self._short(part)
+        if wrong:
+            self._fault("length", Rule.COUNTED, self._found(part).places[0], part, number)
+        self._span(part, number, "length" if wrong else "")

@@ -17,9 +17,10 @@ from qlinkgen.model.frame import Part as StatedPart
 from qlinkgen.model.integer import Chunk, Integer, byte_chunks
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.check import Check
+from qlinkgen.plan.coding import Insertion, stage
 from qlinkgen.plan.transparency import (
+    Coded,
     FrameStuffing,
-    Insertion,
     PayloadStuffing,
     Plain,
     SevenBit,
@@ -31,7 +32,7 @@ from qlinkgen.plan.transparency import (
 
 @dataclass(frozen=True, slots=True)
 class ConstantPart:
-    """Constant bytes."""
+    """Constant bytes, among them a terminator."""
 
     name: str
     data: bytes
@@ -287,7 +288,21 @@ class ByMark:
     end: MarkPart
 
 
-End = ByLength | ByMessage | ByMark
+@dataclass(frozen=True, slots=True)
+class ByTerminator:
+    """Bytes that do not occur before end the frame; ``after`` bytes of other parts follow them.
+
+    Attributes:
+        part: the terminator, one of the parts after the payload.
+        shared: it may also begin the next frame.
+    """
+
+    part: ConstantPart
+    after: int
+    shared: bool
+
+
+End = ByLength | ByMessage | ByMark | ByTerminator
 
 
 # How a receiver finds frames --------------------------------------------------------------------------------
@@ -563,7 +578,26 @@ class FramePlan:
         """Maximum size on the wire of a frame, valid or not."""
         most = self.envelope.max_frame
         stuffing = self.transparency
-        return stuffing.most_frame(most) if isinstance(stuffing, FrameStuffing) else most
+        return stuffing.most_frame(most) if isinstance(stuffing, FrameStuffing | Coded) else most
+
+    @property
+    def longest(self) -> int:
+        """Number of bytes after which a receiver reports bytes outside of frames."""
+        return self.max_wire if isinstance(self.end, ByTerminator) else self.envelope.max_frame
+
+    @property
+    def flag(self) -> bytes:
+        """The bytes that both begin and end a frame, b"" if no bytes do."""
+        end = self.end.part.data if isinstance(self.end, ByTerminator) else b""
+        return end if end == self.envelope.preamble else b""
+
+    @property
+    def kept(self) -> int:
+        """Number of bytes at the end of a frame that may begin the next one.
+
+        Even if the schema does not share them: the end of a frame may be lost.
+        """
+        return len(self.flag) if isinstance(self.end, ByTerminator) and not self.end.after else 0
 
     def with_check(self, direction: Direction, *, checked: bool) -> Envelope:
         """The envelope of a message with (``checked``) or without a check value."""
@@ -593,9 +627,14 @@ def _delimited(frame: DelimitedFrame) -> FramePlan:
     transparency = _transparency(frame)
     envelope = Envelope(_parts(frame, transparency))
     address = frame.address
+    end: End = ByLength(envelope.length) if envelope.length else ByMessage()
+    if stated := frame.part("terminator"):
+        part = next(each for each in envelope.parts if each.name == stated.name)
+        assert isinstance(part, ConstantPart)
+        end = ByTerminator(part, envelope.from_end(part) - part.size, stated.shared)
     return FramePlan(
         envelopes=dict.fromkeys(("request", "response", "message"), envelope),
-        end=ByLength(envelope.length) if envelope.length else ByMessage(),
+        end=end,
         transparency=transparency,
         receiver=_receiver(envelope, transparency),
         address=address.name if address else "",
@@ -605,6 +644,8 @@ def _delimited(frame: DelimitedFrame) -> FramePlan:
 
 def _transparency(frame: DelimitedFrame) -> Transparency:
     stuffing = frame.stuffing
+    if frame.part("terminator"):
+        return _coded(frame)
     if stuffing is None:
         return Plain()
     rule = Insertion(stuffing.after, stuffing.insert)
@@ -614,6 +655,18 @@ def _transparency(frame: DelimitedFrame) -> Transparency:
     stuffed = [index for index, name in enumerate(names) if name not in stuffing.exempt]
     front, back = frame.parts[: stuffed[0]], frame.parts[stuffed[-1] + 1 :]
     return FrameStuffing(rule, sum(part.size for part in front), sum(part.size for part in back))
+
+
+def _coded(frame: DelimitedFrame) -> Coded:
+    """The coding of a frame with a terminator; without one, all before that is sent as it is."""
+    names = [part.name for part in frame.parts]
+    coded = [index for index, name in enumerate(names) if name in frame.coded]
+    if not coded:
+        roles = [part.role for part in frame.parts]
+        coded = [int(roles[0] == "constant"), roles.index("terminator") - 1]
+    front, back = frame.parts[: coded[0]], frame.parts[coded[-1] + 1 :]
+    stages = tuple(map(stage, frame.coding))
+    return Coded(stages, sum(part.size for part in front), sum(part.size for part in back))
 
 
 def _parts(frame: DelimitedFrame, transparency: Transparency) -> tuple[Part, ...]:
@@ -633,7 +686,7 @@ def _derived(part: StatedPart, before: Mapping[str, Part]) -> Part:
 
 def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -> Part:
     match part.role:
-        case "constant":
+        case "constant" | "terminator":
             return ConstantPart(part.name, part.constant)
         case "payload":
             return PayloadPart(part.name, part.min_size, part.max_size, transparency.most_sent(part.max_size))

@@ -11,12 +11,14 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.model.message import Direction
+from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.framing import (
     AddressPart,
     ByLength,
     ByMark,
     ByMessage,
+    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -31,7 +33,7 @@ from qlinkgen.plan.framing import (
     Rescan,
     gathered,
 )
-from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing
+from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing
 from qlinkgen.plan.tree import MessagePlan
 
 
@@ -58,13 +60,15 @@ class NoFrame(Exception):
     Attributes:
         kind: the error of a decoder of one whole frame; receivers do not report it.
         at: wire offset.
+        empty: size of an empty frame, which has only its terminator; 0 for others.
     """
 
-    def __init__(self, kind: str, at: int) -> None:
+    def __init__(self, kind: str, at: int, *, empty: int = 0) -> None:
         """Set the attributes."""
         super().__init__(kind, at)
         self.kind = kind
         self.at = at
+        self.empty = empty
 
 
 class Incomplete(Exception):
@@ -97,6 +101,7 @@ class Taken:
         address: the address, None if the frame has none.
         end: wire offset of its end.
         due: the inserted byte that may follow the end, b"" if none may.
+        kept: number of its last bytes that may begin the next frame.
     """
 
     cells: dict[str, bytes] = field(default_factory=dict)
@@ -105,6 +110,7 @@ class Taken:
     address: int | None = None
     end: int = 0
     due: bytes = b""
+    kept: int = 0
 
 
 class Cursor:
@@ -251,22 +257,22 @@ class FrameReader:
         if self._envelope.identifies(part):
             self._identify(taken)
             if self._bare:
-                self._check_known(cursor, taken)
+                self._check_known(cursor.at, taken)
         return 0
 
     def _identify(self, taken: Taken) -> None:
         taken.number = gathered(self._envelope.id, taken.cells)
         taken.address = gathered(self._envelope.address, taken.cells) if self._envelope.address else None
 
-    def _check_known(self, cursor: Cursor, taken: Taken) -> None:
+    def _check_known(self, at: int, taken: Taken) -> None:
         """Without a leading constant, only number and address distinguish a frame from noise."""
         if taken.number is None:
             return
         message = self._known.get(taken.number)
         if message is None:
-            raise NoFrame("unknown", cursor.at)
+            raise NoFrame("unknown", at)
         if taken.address is not None and message.allowed and not message.allowed.holds(taken.address):
-            raise NoFrame("range", cursor.at)
+            raise NoFrame("range", at)
 
     def _payload(self, cursor: Cursor, taken: Taken, length: int) -> bytes:
         part, end = self._envelope.payload, self._plan.end
@@ -275,8 +281,8 @@ class FrameReader:
                 sent = self._take(cursor, part, length - end.part.bias)
             case ByMessage():
                 sent = self._measured(cursor, part, taken)
-            case ByMark():
-                raise AssertionError("a marked frame is read by its marks")
+            case ByMark() | ByTerminator():
+                raise AssertionError("marks or a terminator are found first")
             case _:
                 assert_never(end)
         taken.cells[part.name] = sent

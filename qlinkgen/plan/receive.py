@@ -13,6 +13,7 @@ from typing import assert_never
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec, Decoded, take_packet
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
+from qlinkgen.plan.ended import frame_reader
 from qlinkgen.plan.framing import ByMark, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, take_marked
 from qlinkgen.plan.tree import Plan
@@ -172,9 +173,8 @@ class RescanningReceiver(Receiver):
         super().__init__(plan, direction)
         assert isinstance(plan.frame.receiver, Rescan)
         self._strategy = plan.frame.receiver
-        self._reader = FrameReader(plan.frame, self.known, direction)
-        envelope = plan.frame.envelopes[direction]
-        self._first, self._longest = envelope.preamble[:1], envelope.max_frame
+        self._reader = frame_reader(plan.frame, self.known, direction)
+        self._first, self._longest = plan.frame.envelopes[direction].preamble[:1], plan.frame.longest
         self._buffer, self._skipped, self._due = b"", b"", b""
         #: Why the frame that may begin the buffer is not complete.
         self._incomplete = Incomplete()
@@ -204,8 +204,13 @@ class RescanningReceiver(Receiver):
                     self._incomplete = incomplete.with_traceback(None)
                     return
                 yield from self._drop("", b"")
-            except NoFrame:
-                yield from self._drop("", b"")
+            except NoFrame as no_frame:
+                if no_frame.empty and self._strategy.bare:
+                    # The terminator of the bytes skipped so far.
+                    yield from self._report(self._start)
+                    self._buffer = self._buffer[no_frame.empty :]
+                else:
+                    yield from self._drop("", b"")
             except BadFrame as bad:
                 yield from self._drop(bad.kind, self._buffer[: bad.end])
             else:
@@ -224,7 +229,7 @@ class RescanningReceiver(Receiver):
             return
         yield from self._report(self._start)
         yield event
-        self._buffer = self._buffer[taken.end :]
+        self._buffer = self._buffer[taken.end - taken.kept :]
         self._due = taken.due
 
     def _drop(self, kind: str, raw: bytes) -> Iterator[Event]:
@@ -245,7 +250,7 @@ class RescanningReceiver(Receiver):
 
     def give_up(self) -> Iterator[Event]:
         """Give up the incomplete frame and search its bytes for others."""
-        if self._buffer and not self._strategy.bare:
+        if self._buffer not in (b"", self.plan.frame.flag) and not self._strategy.bare:
             yield self.event("truncated", self._buffer, self._start)
             self._buffer = self._buffer[1:]
         yield from self._scan()

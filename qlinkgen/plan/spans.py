@@ -46,6 +46,10 @@ class Rule(Enum):
     STUFFING = "stuffing"
     #: The length is within its bounds.
     LENGTH = "length"
+    #: The terminator follows within the longest frame.
+    TERMINATOR = "terminator"
+    #: The length is the size of what it counts; ``seen`` is the length.
+    COUNTED = "counted"
     #: The frame ends with the last byte; ``seen`` bytes follow.
     LAST = "last"
     #: The message number is known.
@@ -73,7 +77,7 @@ class Span:
 
     Attributes:
         of: the part, step or member, or the role of bytes outside of them.
-        places: wire offsets, ascending; a member has those of its integer.
+        places: wire offsets, ascending; a member has those of its integer, a coded byte may have several.
         raw: the bytes at these offsets.
         size: the expected number of bytes.
         number: the integer that they encode, or the number of items in a row of bits; None if they are

@@ -1,13 +1,14 @@
-"""Transparency: byte stuffing, and the bytes it adds.
+"""Transparency: how the bytes of a frame are coded on the wire, and the bytes that this adds.
 
 Each class is one kind of transparency with its encoding, its decoding and its growth. No other module of the
-compiler implements stuffing.
+compiler, besides the codings themselves, implements it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+
+from qlinkgen.plan.coding import Insertion, Read, Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,35 +29,6 @@ class SevenBit:
     def most_sent(self, payload: int) -> int:
         """Most bytes that a payload of so many bytes takes on the wire, as far as a length counts them."""
         return payload
-
-
-@dataclass(frozen=True, slots=True)
-class Insertion:
-    """Inserts an ``insert`` byte after each occurrence of ``after``; occurrences do not overlap."""
-
-    after: bytes
-    insert: int
-
-    @property
-    def inserted(self) -> bytes:
-        """``after`` and the inserted byte."""
-        return self.after + bytes((self.insert,))
-
-    def stuff(self, data: bytes) -> bytes:
-        """The bytes with inserted ones."""
-        return data.replace(self.after, self.inserted)
-
-    def places(self, sent: bytes) -> Iterator[int]:
-        """Offsets at which an inserted byte is due; the last may be the end of the data."""
-        at = sent.find(self.after)
-        while at >= 0:
-            at += len(self.after)
-            yield at
-            at = sent.find(self.after, at + (sent[at : at + 1] == bytes((self.insert,))))
-
-    def growth(self, size: int) -> int:
-        """Maximum number of bytes inserted into ``size`` bytes."""
-        return size // len(self.after)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +53,7 @@ class FrameStuffing:
     def stuff(self, frame: bytes) -> bytes:
         """The stuffed frame."""
         end = len(frame) - self.back
-        return frame[: self.front] + self.rule.stuff(frame[self.front : end]) + frame[end:]
+        return frame[: self.front] + self.rule.encode(frame[self.front : end]) + frame[end:]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +69,48 @@ class PayloadStuffing:
     def unstuff(self, sent: bytes) -> bytes | None:
         """The payload without inserted bytes, None if one is missing or wrong."""
         plain = sent.replace(self.rule.inserted, self.rule.after)
-        return plain if self.rule.stuff(plain) == sent else None
+        return plain if self.rule.encode(plain) == sent else None
 
 
-Transparency = Plain | SevenBit | FrameStuffing | PayloadStuffing
+@dataclass(frozen=True, slots=True)
+class Coded:
+    """A frame that a terminator ends; its first ``front`` and last ``back`` bytes are not coded.
+
+    The others pass the ``stages`` one after the other; without any they are sent unchanged.
+    """
+
+    stages: tuple[Stage, ...]
+    front: int
+    back: int
+
+    def most_sent(self, payload: int) -> int:
+        """Most bytes that a payload of so many bytes takes on the wire, as far as a length counts them."""
+        return payload
+
+    def most_frame(self, size: int) -> int:
+        """Maximum size on the wire of a frame of ``size`` bytes."""
+        inner = size - self.front - self.back
+        for stage in self.stages:
+            inner += stage.growth(inner)
+        return self.front + inner + self.back
+
+    def encode(self, frame: bytes) -> bytes:
+        """The frame as sent."""
+        end = len(frame) - self.back
+        inner = frame[self.front : end]
+        for stage in self.stages:
+            inner = stage.encode(inner)
+        return frame[: self.front] + inner + frame[end:]
+
+    def read(self, sent: bytes) -> Read:
+        """Decode the coded bytes, without those before and after them."""
+        found = Read(sent, tuple(range(len(sent))))
+        for stage in reversed(self.stages):
+            inner = stage.read(found.plain)
+            places = (*found.places, len(sent) if found.wrong is None else found.wrong)
+            wrong = found.wrong if inner.wrong is None else places[inner.wrong]
+            found = Read(inner.plain, tuple(places[at] for at in inner.places), wrong)
+        return found
+
+
+Transparency = Plain | SevenBit | FrameStuffing | PayloadStuffing | Coded

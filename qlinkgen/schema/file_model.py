@@ -165,7 +165,9 @@ class FieldSpec(Fact):
     )
 
 
-PartRole = Literal["constant", "length", "message", "address", "direction", "payload", "checksum"]
+PartRole = Literal[
+    "constant", "length", "message", "address", "direction", "payload", "checksum", "terminator"
+]
 #: What a part turns out to be: its role, or an integer whose bits have several, or that follows from another.
 PartKind = PartRole | Literal["bits", "derived"]
 #: The role that a key tells.
@@ -249,8 +251,8 @@ class PartSpec(Fact):
     )
     type: str | None = Field(default=None, description="Integer type: u8, u16 ... u64")
     byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
-    value: ByteText | None = Field(default=None, description="The constant bytes")
-    text: Characters | None = Field(default=None, description="The constant bytes, as characters")
+    value: ByteText | None = Field(default=None, description="The bytes of a constant or a terminator")
+    text: Characters | None = Field(default=None, description="These bytes as characters")
     const: Consts | None = Field(
         default=None, description="Legal values of a constant integer, the first of which is sent"
     )
@@ -259,6 +261,7 @@ class PartSpec(Fact):
         default=None, description="Earlier part with the same value; ~PART, PART + N: derived from it"
     )
     bits: dict[str, PartBitSpec] | None = Field(default=None, description="Roles of the bits of the integer")
+    shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
     counts: list[str] | None = Field(default=None, description="Parts whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     algorithm: AnyAlgorithm | None = Field(
@@ -317,6 +320,38 @@ class StuffingSpec(_Mapping):
     section: Text = Field(default="", description="Section of the source document that states it")
 
 
+class CodingSpec(_Mapping):
+    """How a run of parts travels: exactly one of escape, replace, insert, cobs, digits, pair and add."""
+
+    escape: ByteText | None = Field(default=None, description="Byte before each escaped byte")
+    xor: ByteText | None = Field(default=None, description="XORed with each escaped byte")
+    of: list[ByteText] | None = Field(default=None, description="Bytes that are escaped")
+    replace: dict[str, ByteText] | None = Field(
+        default=None, description="Byte: the two bytes that are sent in its place"
+    )
+    insert: ByteText | None = Field(default=None, description="Byte inserted after each occurrence of after")
+    after: ByteText | None = Field(default=None, description="Pattern after which a byte is inserted")
+    cobs: ByteText | None = Field(default=None, description="Byte that COBS removes: 00")
+    digits: Literal["hex"] | None = Field(default=None, description="Each byte as two hexadecimal digits")
+    pair: Literal["complement"] | None = Field(
+        default=None, description="Each byte is followed by its complement"
+    )
+    add: ByteText | None = Field(default=None, description="Number added to each byte")
+    over: list[str] | None = Field(
+        default=None, description="Coded parts; default: all but the first constant and the terminator"
+    )
+
+
+def _coding_form(value: object) -> str:
+    return f"{BRANCH}many" if isinstance(value, list) else f"{BRANCH}one"
+
+
+Codings = Annotated[
+    Annotated[CodingSpec, Tag(f"{BRANCH}one")] | Annotated[list[CodingSpec], Tag(f"{BRANCH}many")],
+    Discriminator(_coding_form),
+]
+
+
 class HeaderSpec(_Mapping):
     """Bits of address and message id in the header byte."""
 
@@ -339,6 +374,10 @@ class FrameSpec(Fact):
 
     parts: Parts | None = Field(default=None, description="Parts in wire order")
     stuffing: StuffingSpec | None = Field(default=None, description="Keeps the preamble unique")
+    coding: Codings | None = Field(
+        default=None,
+        description="How bytes before a terminator travel; a list applies in its order",
+    )
     marked: MarkedSpec | None = Field(default=None, description="Header and end are marked by a bit")
     packet: Parts | None = Field(default=None, description="No frame: message id, words, checksum")
 

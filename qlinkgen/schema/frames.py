@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.types import Chunk
+from qlinkgen.schema.coding import CodingBuilder
 from qlinkgen.schema.file_model import MarkedSpec, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.parts import PartBuilder
@@ -14,6 +15,7 @@ from qlinkgen.schema.pieces import MAX_ID_BITS, placed
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.stuffing import build_stuffing, check_unique
+from qlinkgen.schema.terminators import check_terminator_part
 
 _KINDS = ("parts", "marked", "packet")
 _PACKET_ROLES = ("message", "payload", "checksum")
@@ -71,6 +73,9 @@ class FrameBuilder:
         if spec.stuffing is not None and spec.parts is None:
             what = "'stuffing' applies only to frames of parts"
             self._parts.fault("not-applicable", ("frame", "stuffing"), what, "remove it")
+        if spec.coding is not None and spec.parts is None:
+            what = "'coding' applies only to frames of parts"
+            self._parts.fault("not-applicable", ("frame", "coding"), what, "remove it")
         if spec.parts is not None:
             return self._delimited(spec.parts)
         return self._marked(spec.marked) if spec.marked is not None else self._packet(spec.packet or {})
@@ -90,7 +95,9 @@ class FrameBuilder:
         )
         spec = self._file.frame
         stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
-        frame = DelimitedFrame(parts, stuffing, spec.doc, spec.section)
+        codings = CodingBuilder(parts, self._parts, self._report)
+        coding, coded = codings.build(spec.coding)
+        frame = DelimitedFrame(parts, stuffing, coding, coded, spec.doc, spec.section)
         self._check_pieces(frame, path)
         self._check_order(frame, path)
         self._check_empty(frame, path)
@@ -98,6 +105,7 @@ class FrameBuilder:
             return None
         self._check_length(frame, path)
         check_unique(frame, self._report)
+        check_terminator_part(frame, self._report)
         return frame
 
     def _check_order(self, frame: DelimitedFrame, path: Path) -> None:

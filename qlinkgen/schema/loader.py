@@ -23,6 +23,7 @@ from qlinkgen.schema.report import Reporter, did_you_mean
 from qlinkgen.schema.seeds import check_references, check_types
 from qlinkgen.schema.source import Data, parse
 from qlinkgen.schema.structure import check_structure
+from qlinkgen.schema.terminators import check_terminator
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
 
@@ -113,6 +114,7 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
     commands = CommandBuilder(file, report, messages, frame, bus)
     commands.build()
     check_echoes(file, commands.commands, messages.places, report)
+    check_terminator(frame, commands.messages, report)
     types.report_unused()
     check_names(file, commands.messages, messages.places, report)
     report_unconfirmed(file, report)

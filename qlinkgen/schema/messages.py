@@ -205,14 +205,16 @@ class MessageBuilder:
             self._error("payload-too-short", path, what, hint)
 
     def _check_end(self, message: Message, path: Path) -> None:
-        """Check that the fields determine the end of a frame without a length."""
-        if isinstance(self._frame, DelimitedFrame) and self._frame.part("length"):
+        """Check that the fields determine the end of a frame without a length or terminator."""
+        if isinstance(self._frame, DelimitedFrame) and (
+            self._frame.part("length") or self._frame.part("terminator")
+        ):
             return
         for field in message.fields:
             if is_open(field):
                 neither = f"neither the frame nor {message.name} has a length"
                 what = f"the end of {field.name} is unknown: {neither}"
-                hint = "give it a count or a fixed size, or give the frame a length"
+                hint = "give it a count or a fixed size, or give the frame a length or terminator"
                 self._error("no-frame-end", (*path, field.name), what, hint)
         if message.empty_is_default and message.max_size:
             what = f"an empty {message.name} cannot be distinguished from a full one: the frame has no length"

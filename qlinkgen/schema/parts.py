@@ -16,7 +16,7 @@ from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
-_SINGLE_ROLES = ("length", "address", "direction", "payload")
+_SINGLE_ROLES = ("length", "address", "direction", "payload", "terminator")
 _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "constant": ("value", "text", "type", "byteorder", "const"),
     "bits": ("type", "byteorder", "bits"),
@@ -27,6 +27,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "address": ("type", "byteorder"),
     "payload": ("size",),
     "checksum": ("type", "byteorder", "algorithm", "init", "over", "otherwise", "sent"),
+    "terminator": ("value", "text", "shared"),
 }
 _KEYS = (
     "type",
@@ -37,6 +38,7 @@ _KEYS = (
     "values",
     "equals",
     "bits",
+    "shared",
     "counts",
     "size",
     "algorithm",
@@ -99,7 +101,7 @@ class PartBuilder:
         if role == "constant" and spec.const is not None:
             self.reject(spec, ("value", "text"), "constant with a type", path)
         value, size, checksum, scalar = b"", (0, 0), None, None
-        if role == "constant" and spec.const is None:
+        if role == "terminator" or (role == "constant" and spec.const is None):
             value = self.constant(spec, path)
         elif role == "payload":
             size = self.payload_size(spec, path)
@@ -126,6 +128,7 @@ class PartBuilder:
             section=spec.section,
             confirmed=spec.confirmed,
             constant=value,
+            shared=spec.shared,
             scalar=scalar,
             checksum=checksum,
             counts=tuple(spec.counts or ()),

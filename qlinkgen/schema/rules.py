@@ -210,7 +210,18 @@ _ALL = (
     Rule(
         "no-frame-end",
         "A receiver can determine the end of every frame.",
-        "Without a length in the frame, the fields of a message must have fixed sizes or counts.",
+        "Without a length or terminator, the fields of a message must have fixed sizes or counts.",
+    ),
+    Rule(
+        "terminator-in-frame",
+        "The terminator of a frame cannot occur before it.",
+        "A receiver would end the frame there. One of its bytes must be impossible before it: by a coding, "
+        "or by the ranges and types of numbers and fields.",
+    ),
+    Rule(
+        "bad-coding",
+        "A coding is of one kind, can be decoded, and applies to adjacent parts.",
+        "Bytes that are sent alike could not be told apart.",
     ),
     Rule(
         "marker-in-payload",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.reading import Cursor
-from qlinkgen.plan.transparency import FrameStuffing, Insertion
+from qlinkgen.plan.transparency import FrameStuffing
 
 ONE, TWO = Insertion(b"\xa5", 0x00), Insertion(b"\xa5\xa5", 0x00)
 

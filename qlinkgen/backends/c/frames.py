@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.c import crc, framing
+from qlinkgen.backends.c.coding import EndedView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.marked import PLACE, MarkedView, Shapes, marked_view, shape
 from qlinkgen.backends.c.names import Names
@@ -39,7 +40,16 @@ ReceivedMessages = Sequence[tuple[Direction, Sequence[MessagePlan]]]
 
 #: Views of the templates of one kind of frame, in addition to `FrameView`.
 View = (
-    PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | MarkedView | PacketView | None
+    PlaceView
+    | PartsView
+    | PlainView
+    | StuffedView
+    | InsertView
+    | HuntView
+    | EndedView
+    | MarkedView
+    | PacketView
+    | None
 )
 
 
@@ -160,7 +170,10 @@ def frame_section(plan: Plan, layouts: Layouts) -> FrameSection:
         case Hunt() | Rescan():
             views = parts_views(plan, layouts)
             frame = "frame_stuffed" if views.stuffed else "frame_plain"
-            templates = ("place", "values", frame, "wrap", "frame_public")
+            templates: tuple[str, ...] = ("place", "values", frame, "wrap", "frame_public")
+            if views.ended:
+                made = ("coding", "wrap_coded") if views.ended.stages else ("frame_plain",)
+                templates = ("place", "values", *made, "scan_ended", "wrap", "frame_public")
             kind = "receiver_streamed" if isinstance(receiver, Hunt) else "receiver_rescan"
             return FrameSection(plan, views.f, views.others, views.algorithms, templates, kind)
         case Marks():

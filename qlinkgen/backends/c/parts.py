@@ -18,6 +18,7 @@ from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
     Bits,
+    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -262,6 +263,30 @@ class PartWriter:
         if self.frame.checks_header and self.envelope.identifies(part):
             yield from self._header_check(reached, part, directed)
 
+    def whole_checks(self, directed: str) -> Iterator[str]:
+        """Statements that check the header of a decoded frame in wire order, without its first constant."""
+        upper = self.prefix.upper()
+        for part in self.envelope.front[int(bool(self.envelope.preamble)) :]:
+            match part:
+                case ConstantPart():
+                    for at, byte in enumerate(part.data, self._at(part)):
+                        yield from refusal(f"body[{at}] != {in_hex(byte)}", f"{upper}_ERROR_FRAME")
+                case LengthPart():
+                    counted = f"(payload + {part.bias}U)" if part.bias else "payload"
+                    yield from refusal(f"{self.get(part)} != {counted}", f"{upper}_ERROR_LENGTH")
+                case IdPart() | AddressPart() | CellPart() | EqualPart():
+                    for test in self._wrong(part):
+                        yield from refusal(test, f"{upper}_ERROR_FRAME")
+                    if self.frame.checks_header and self.envelope.identifies(part):
+                        lines = list(self._header_check("true", part, directed))
+                        yield from (line.removeprefix("    ") for line in lines[1:-1])
+                case CheckPart():
+                    pass
+                case PayloadPart() | MarkPart():
+                    raise AssertionError(f"{part.name} is not a part of a header")
+                case _:
+                    assert_never(part)
+
     def _announced(self, length: LengthPart, *, all_there: bool) -> Iterator[str]:
         if test := length_bounds(length, self.get(length)):
             yield from refusal(test, f"{self.prefix.upper()}_ERROR_LENGTH")
@@ -441,7 +466,8 @@ class PartWriter:
         """Statements that verify the check values that are not verified before the payload."""
         if self.alone is not None:
             return []
-        early, seeded = self.envelope.header_checks, self.envelope.seeded
+        early = () if isinstance(self.frame.end, ByTerminator) else self.envelope.header_checks
+        seeded = self.envelope.seeded
         late = [part for part in self.envelope.checks if part not in (*early, *seeded)]
         lines = [line for part in late for line in self.judge(part, body, end, payload_end)]
         if seeded:

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.backends.c.coding import EndedView, stage_views
 from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
 from qlinkgen.backends.c.parts import PartWriter, ValueView, in_hex, length_bounds, sender_of
-from qlinkgen.plan.framing import ByLength, ByMessage, Hunt, InStep, Marks, Rescan
-from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.coding import Insertion
+from qlinkgen.plan.framing import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import Plan
 
 
@@ -84,8 +86,8 @@ def _directed(plan: Plan) -> bool:
         case Hunt() | InStep():
             return False
         case Rescan():
-            by_length = isinstance(plan.frame.end, ByLength)
-            needed = plan.frame.checks_header or not receiver.verified or not by_length or receiver.seeded
+            by_message = isinstance(plan.frame.end, ByMessage)
+            needed = plan.frame.checks_header or not receiver.verified or by_message or receiver.seeded
         case Marks():
             needed = True
         case _:
@@ -225,11 +227,14 @@ class PartsViews:
     stuffed: StuffedView | None
     inserted: InsertView | None
     hunt: HuntView | None
+    ended: EndedView | None
 
     @property
     def others(
         self,
-    ) -> Mapping[str, PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | None]:
+    ) -> Mapping[
+        str, PlaceView | PartsView | PlainView | StuffedView | InsertView | HuntView | EndedView | None
+    ]:
         """All views except `f`."""
         return {
             "place": self.place,
@@ -238,6 +243,7 @@ class PartsViews:
             "stuffed": self.stuffed,
             "inserted": self.inserted,
             "hunt": self.hunt,
+            "ended": self.ended,
         }
 
 
@@ -256,6 +262,9 @@ def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
             rule, body_size = transparency.rule, envelope.payload.most_sent
         case FrameStuffing():
             rule, body_size = transparency.rule, writer.head + envelope.trailer_size + envelope.payload.most
+        case Coded():
+            size = envelope.overhead + envelope.payload.most
+            body_size = size if transparency.stages else 0
         case SevenBit():
             raise AssertionError("a marked frame has no parts that a length or its message ends")
         case _:
@@ -266,7 +275,7 @@ def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
         algorithms=list(writer.algorithms.values()),
         f=frame,
         place=PlaceView(
-            tailed=rule is not None,
+            tailed=rule is not None or body_size > 0,
             tail=envelope.trailer_size,
             header=envelope.header_size,
             overhead=envelope.overhead,
@@ -276,6 +285,7 @@ def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
         stuffed=_stuffed(writer, stuffing, directed) if stuffing else None,
         inserted=_inserted(rule) if rule else None,
         hunt=_hunted(writer, receiver) if isinstance(receiver, Hunt) else None,
+        ended=_ended(writer, plan.frame.end, directed) if isinstance(plan.frame.end, ByTerminator) else None,
     )
 
 
@@ -288,7 +298,7 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
         tail=envelope.trailer_size,
         header=envelope.header_size,
         overhead=envelope.overhead,
-        max_frame=envelope.max_frame,
+        max_frame=writer.frame.longest,
         index_type=unsigned_type(max(16, max_wire.bit_length())),
         id_value=writer.number(envelope.id),
         address_value=writer.number(envelope.address),
@@ -369,6 +379,53 @@ def _due(rule: Insertion, array: str, end: str, last: str) -> str:
         return f"{last} == {in_hex(rule.after[0])}"
     terms = [f"({array}[{end} - {size - at}U] == {in_hex(byte)})" for at, byte in enumerate(rule.after)]
     return " && ".join([f"(since >= {size}U)", *reversed(terms)])
+
+
+def _ended(writer: PartWriter, end: ByTerminator, directed: str) -> EndedView:
+    envelope, coded, data = writer.envelope, writer.frame.transparency, end.part.data
+    assert isinstance(coded, Coded)
+    lead, closing = envelope.preamble, end.part.size + end.after
+    tail, header = envelope.trailer_size, envelope.header_size
+    both = header + tail
+    return EndedView(
+        stages=stage_views(coded.stages),
+        lead=len(lead),
+        lead_checks=[(f"wire[{at}] != {in_hex(byte)}", at + 1) for at, byte in enumerate(lead)],
+        size=len(data),
+        closing=closing,
+        limit=writer.frame.max_wire - end.after,
+        matches=_matches("wire[stop{}]", data),
+        matches_first=_matches("(receiver->wire[receiver->first{}]", data, ")"),
+        last=in_hex(data[-1]),
+        kept=writer.frame.kept,
+        flag=len(writer.frame.flag),
+        front=coded.front,
+        back=coded.back,
+        splits=(coded.front, coded.back) != (len(lead), closing),
+        header=header,
+        tail=tail,
+        least=envelope.payload.least,
+        most=envelope.payload.most,
+        checks=list(writer.whole_checks(directed)),
+        update_sent=writer.covered_loops("wire", f"(capacity - {both}U - size)", f"(capacity - {tail}U)"),
+        update_received=writer.covered_loops("body", "0", f"payload + {header}U"),
+        put_header=writer.put_header("head", "size"),
+        put_trailer=writer.put_trailer("trailer", "head"),
+        put_check=writer.put_check("trailer", "value"),
+        fills=writer.fills("head", "trailer", f"{header}U + size"),
+    )
+
+
+def _matches(place: str, data: bytes, closing: str = "") -> str:
+    """The condition for bytes at a place; ``{}`` in it is the offset of each."""
+    offsets = ["", *(f" + {at}U" for at in range(1, len(data)))]
+    terms = [
+        f"{place.format(offset)} == {in_hex(byte)}{closing}"
+        for offset, byte in zip(offsets, data, strict=True)
+    ]
+    if closing or len(terms) == 1:
+        return " && ".join(terms)
+    return " && ".join(f"({term})" for term in terms)
 
 
 def _hunted(writer: PartWriter, receiver: Hunt) -> HuntView:

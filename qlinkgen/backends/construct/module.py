@@ -10,9 +10,11 @@ from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequen
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.naming import record_key
+from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
+    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -32,7 +34,7 @@ from qlinkgen.plan.framing import (
     Rescan,
     Slot,
 )
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Names of definitions other than messages and types.
@@ -217,6 +219,8 @@ def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
     match frame.receiver:
         case Hunt():
             return Call("DelimitedFrame", (layout, messages), (*settings, ("hunt", True)))
+        case Rescan() if isinstance(frame.end, ByTerminator):
+            return _ended(frame, frame.end, layout, messages, address)
         case Rescan():
             bare = (("bare", True),) if frame.receiver.bare else ()
             return Call("DelimitedFrame", (layout, messages), (*settings, *bare))
@@ -228,10 +232,47 @@ def _frame(frame: FramePlan, layout: Node, messages: Sequence) -> Call:
             assert_never(frame.receiver)
 
 
+def _ended(
+    frame: FramePlan,
+    end: ByTerminator,
+    layout: Node,
+    messages: Sequence,
+    address: tuple[tuple[str, Node], ...],
+) -> Call:
+    coded = frame.transparency
+    assert isinstance(coded, Coded)
+    bare = (("bare", True),) if isinstance(frame.receiver, Rescan) and frame.receiver.bare else ()
+    coding = (("coding", Sequence(tuple(map(_stage, coded.stages)))),) if coded.stages else ()
+    over = tuple(part.name for part in frame.envelope.between(coded.front, coded.back))
+    least = (("least", frame.envelope.payload.least),) if frame.envelope.payload.least else ()
+    places = (("end", end.part.name), ("most", frame.max_wire), ("over", Sequence(over)), *least)
+    return Call("EndedFrame", (layout, messages), (*address, *bare, *coding, *places))
+
+
+def _stage(coding: Stage) -> Call:
+    match coding:
+        case Escaping():
+            codes = Sequence(coding.codes)
+            mask = (("mask", hexadecimal(coding.mask)),) if coding.mask else ()
+            return Call("Escape", (hexadecimal(coding.escape), codes), mask)
+        case Insertion():
+            return Call("Insert", (coding.after, bytes((coding.insert,))))
+        case Cobs():
+            return Call("Cobs")
+        case Digits():
+            return Call("Digits")
+        case Pair():
+            return Call("Pair")
+        case Add():
+            return Call("Add", (hexadecimal(coding.number),))
+        case _:
+            assert_never(coding)
+
+
 def _stuffing(frame: FramePlan) -> tuple[tuple[str, Node], ...]:
     how = frame.transparency
     match how:
-        case Plain() | SevenBit():
+        case Plain() | SevenBit() | Coded():
             return ()
         case PayloadStuffing():
             over: tuple[str, ...] = ()

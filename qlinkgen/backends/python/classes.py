@@ -20,7 +20,7 @@ from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, Envelope, Seed
+from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, ByTerminator, Envelope, Seed
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -190,7 +190,7 @@ class ClassBuilder:
         match end:
             case ByMessage():
                 return True
-            case ByLength() | ByMark():
+            case ByLength() | ByMark() | ByTerminator():
                 return False
             case _:
                 assert_never(end)

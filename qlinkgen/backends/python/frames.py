@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.python import integers, pieces
+from qlinkgen.backends.python.coding import CodingView, coding_view
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import class_name
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
@@ -18,6 +19,7 @@ from qlinkgen.plan.framing import (
     AddressPart,
     ByLength,
     ByMark,
+    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -34,7 +36,7 @@ from qlinkgen.plan.framing import (
     Rescan,
     Seed,
 )
-from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -157,6 +159,42 @@ class StuffingView:
 
 
 @dataclass(frozen=True)
+class EndedView:
+    """A terminator, and the coding of the bytes before it.
+
+    Attributes:
+        last: its last byte.
+        kept: number of its bytes that may begin the next frame.
+        closing: size of the terminator and what follows it.
+        after: size of what follows it.
+        limit: maximum size of a frame up to its terminator.
+        lead: size of the constant at the beginning.
+        front: number of uncoded bytes at the beginning.
+        back: number of uncoded bytes at the end.
+        splits: uncoded bytes are not only the first constant and the terminator.
+        least: minimum size of a payload.
+        flag: the terminator is also the beginning of a frame.
+        checks: conditions for wrong bytes, and the kind of fault.
+        coding: None if bytes are sent as they are.
+    """
+
+    terminator: str
+    last: str
+    kept: int
+    closing: int
+    after: int
+    limit: int
+    lead: int
+    front: int
+    back: int
+    splits: bool
+    least: int
+    flag: bool
+    checks: Sequence[tuple[str, str]]
+    coding: CodingView | None
+
+
+@dataclass(frozen=True)
 class PlacedCheck:
     """A check value, its offsets in the frame, and the expression for the bytes that it covers.
 
@@ -198,6 +236,7 @@ class PartsView:
     address: AddressView | None
     length: LengthView | None
     stuffing: StuffingView | None
+    ended: EndedView | None
     preamble: str
     begins_with: str
     header: int
@@ -470,7 +509,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
     envelope = plan.frame.envelope
     address = _address_view(plan)
     length = _length_view(plan, envelope)
-    checks, filling = _all_placed(envelope)
+    checks, filling = _all_placed(envelope, early=not isinstance(plan.frame.end, ByTerminator))
     last = envelope.parts[-1]
     return PartsView(
         title=title,
@@ -481,11 +520,14 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         address=address,
         length=length,
         stuffing=_stuffing(plan),
+        ended=_ended(plan, plan.frame.end, bare=receiver.bare)
+        if isinstance(plan.frame.end, ByTerminator)
+        else None,
         preamble=literal(envelope.preamble) if envelope.preamble else "",
         begins_with=envelope.preamble.hex(" "),
         header=envelope.header_size,
         trailer=envelope.trailer_size,
-        max_frame=envelope.max_frame,
+        max_frame=plan.frame.longest,
         max_payload=envelope.payload.most,
         blank_header=_blank_header(envelope, 0, address),
         blank_trailer=_blank(envelope, envelope.back, address) if _trails(envelope) else "bytes(_TRAILER)",
@@ -524,6 +566,58 @@ def _tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
     yield from pieces.wrong(envelope, part, "frame")
 
 
+def _ended(plan: Plan, end: ByTerminator, *, bare: bool) -> EndedView:
+    envelope, coded, part = plan.frame.envelope, plan.frame.transparency, end.part
+    assert isinstance(coded, Coded)
+    lead, closing = len(envelope.preamble), part.size + end.after
+    return EndedView(
+        terminator=literal(part.data),
+        last=literal(part.data[-1:]),
+        kept=plan.frame.kept,
+        closing=closing,
+        after=end.after,
+        limit=plan.frame.max_wire - end.after,
+        lead=lead,
+        front=coded.front,
+        back=coded.back,
+        splits=(coded.front, coded.back) != (lead, closing),
+        least=envelope.payload.least,
+        flag=bool(plan.frame.flag),
+        checks=list(_ended_checks(envelope, bare=bare)),
+        coding=coding_view(coded.stages) if coded.stages else None,
+    )
+
+
+def _ended_checks(envelope: Envelope, *, bare: bool) -> Iterator[tuple[str, str]]:
+    """The checks of a decoded frame in wire order, without its check values."""
+    for part in envelope.front[int(bool(envelope.preamble)) :]:
+        start = envelope.offset(part)
+        match part:
+            case ConstantPart():
+                yield f"frame[{start}:{start + part.size}] != {literal(part.data)}", "frame"
+            case LengthPart():
+                counted = f"len(frame) - {envelope.overhead - part.bias}"
+                yield f"{pieces.read(envelope, part, 'frame')} != {counted}", "length"
+            case IdPart() | AddressPart() | CellPart() | EqualPart():
+                yield from ((test, "frame") for test in pieces.wrong(envelope, part, "frame"))
+                if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
+                    if any(bits.part is part for bits in envelope.id) or not envelope.id:
+                        yield "_number(frame) not in known", "unknown"
+                    if envelope.address and envelope.known_at(part, envelope.address):
+                        yield "not _allowed(frame, known)", "range"
+            case CheckPart():
+                pass
+            case MarkPart() | PayloadPart():
+                raise AssertionError(f"{part.name} is not a part of a header")
+            case _:
+                assert_never(part)
+
+
+def _number_at(envelope: Envelope, part: LengthPart | IdPart | AddressPart, source: str = "head") -> str:
+    start = envelope.offset(part)
+    return integers.read(part.integer, source, lambda more: str(start + more))
+
+
 def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
     if not isinstance(plan.frame.end, ByLength):
         return None
@@ -543,7 +637,7 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
 def _stuffing(plan: Plan) -> StuffingView | None:
     transparency = plan.frame.transparency
     match transparency:
-        case Plain() | SevenBit():
+        case Plain() | SevenBit() | Coded():
             return None
         case FrameStuffing():
             whole, front, back = True, transparency.front, transparency.back
@@ -591,7 +685,7 @@ def _bare_checks(envelope: Envelope, part: Part, reached: str, no_frame: str) ->
         yield HeadCheck(f"{reached} not _allowed(head, known)", no_frame, "address")
 
 
-def _placed(envelope: Envelope, part: CheckPart, mark: str) -> PlacedCheck:
+def _placed(envelope: Envelope, part: CheckPart, mark: str, *, early: bool) -> PlacedCheck:
     """The view of a check value."""
     covered = " + ".join(
         f"message.{seed_name(run)}"
@@ -609,15 +703,20 @@ def _placed(envelope: Envelope, part: CheckPart, mark: str) -> PlacedCheck:
         mark=mark,
         seeded=part in envelope.seeded,
         main=part is envelope.check,
-        early=part in envelope.header_checks,
+        early=early and part in envelope.header_checks,
     )
 
 
-def _all_placed(envelope: Envelope) -> tuple[list[PlacedCheck], list[PlacedCheck]]:
-    """The views of all check values in wire order, and in the order in which they are computed."""
+def _all_placed(envelope: Envelope, *, early: bool) -> tuple[list[PlacedCheck], list[PlacedCheck]]:
+    """The views of all check values in wire order, and in the order in which they are computed.
+
+    ``early``: those of the header alone are verified before the payload.
+    """
     others = [part for part in envelope.checks if part is not envelope.check]
     views = {
-        part.name: _placed(envelope, part, f"_{others.index(part) + 2}" if part in others else "")
+        part.name: _placed(
+            envelope, part, f"_{others.index(part) + 2}" if part in others else "", early=early
+        )
         for part in envelope.checks
     }
     return list(views.values()), [views[part.name] for part in envelope.filling]

@@ -21,6 +21,8 @@ from qlinkgen.backends.python.names import by_kind, class_name, imported
 from qlinkgen.backends.python.place import Place, place_of
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Enum, Flags
+from qlinkgen.plan.coding import Digits
+from qlinkgen.plan.transparency import Coded
 from qlinkgen.plan.tree import Plan
 
 #: Names of the support module that every module re-exports.
@@ -60,6 +62,7 @@ class Imports:
 
     struct: Sequence[str]
     struct_error: bool
+    binascii: bool
     decimal: bool
     index: bool
     rules: Sequence[str]
@@ -198,6 +201,7 @@ class Module:
         return Imports(
             struct=[name for name in _STRUCT if name in used],
             struct_error=True,
+            binascii=_has_digits(plan),
             decimal="Decimal" in used,
             index="index" in used,
             rules=[name for name in _RULES if name in used],
@@ -246,3 +250,8 @@ def _tidy(text: str) -> str:
 def _placed(template: str, module: ModuleView, **parts: str) -> str:
     """Render a template; ``parts`` are texts rendered from others."""
     return templates().get_template(f"templates/{template}").render(vars(module), **parts)
+
+
+def _has_digits(plan: Plan) -> bool:
+    coded = plan.frame.transparency
+    return isinstance(coded, Coded) and any(isinstance(stage, Digits) for stage in coded.stages)

@@ -16,6 +16,7 @@ from qlinkgen.backends.vectors.choice import filled
 from qlinkgen.backends.vectors.writer import Json
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.codec import Codec
+from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import Raw, count_items, pack, pack_items, unpack_items
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.framing import (
@@ -50,7 +51,7 @@ from qlinkgen.plan.payload import (
     ValueStep,
 )
 from qlinkgen.plan.reading import BadFrame
-from qlinkgen.plan.transparency import FrameStuffing, Insertion, PayloadStuffing, Plain, SevenBit
+from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan
 
 
@@ -276,15 +277,26 @@ class _Frame:
                     for what, data in _damaged(rule, wire, at):
                         yield self._part_at(cells, wire, at - 1), what, data
             case PayloadStuffing(rule):
-                sent = rule.stuff(pack(plan, filled(rule.after).values(plan)))
+                sent = rule.encode(pack(plan, filled(rule.after).values(plan)))
                 for at in _lone(rule, sent, rule.places(sent)):
                     for what, data in _damaged(rule, sent, at):
                         cells = self._codec.cells(self._message, data, address)
                         yield self._envelope.payload.name, what, self._joined(cells)
-            case Plain() | SevenBit():
+            case Coded(stages=()) | Plain() | SevenBit():
                 pass
+            case Coded():
+                yield from self._miscoded(self._transparency)
             case _:
                 assert_never(self._transparency)
+
+    def _miscoded(self, coded: Coded) -> Iterator[tuple[str, str, bytes]]:
+        """Frames with a coded byte changed or missing."""
+        wire, name = self._good.wire, self._envelope.payload.name
+        for at in range(coded.front, len(wire) - coded.back):
+            if wire[at] not in self._good.payload:
+                yield name, "a coded byte is wrong", wire[:at] + bytes((wire[at] ^ 0x80,)) + wire[at + 1 :]
+                yield name, "a coded byte is missing", wire[:at] + wire[at + 1 :]
+                return
 
     def _inserted(self, wire: bytes) -> list[int]:
         """Offsets of the bytes inserted into a stuffed frame."""

@@ -15,6 +15,8 @@ from tests.support.whole.reference.special import Packets
 def mark(reference: Reference) -> int:
     """The byte after which others are inserted; any without stuffing."""
     frame = reference.frame
+    if isinstance(frame, Frame) and frame.terminator:
+        return frame.terminator.constant[-1]
     return frame.stuffing.after[0] if isinstance(frame, Frame) and frame.stuffing else 0xA5
 
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from tests.support.whole import endings
+from tests.support.whole.endings import Ending
 from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
 
@@ -71,13 +73,15 @@ class Shape:
 
 def choose(rng: random.Random, words: _Words) -> Shape:
     """A frame of any kind."""
-    kind = rng.choices(("hunted", "parts", "mixed", "marked", "packet"), (16, 40, 26, 10, 8))[0]
+    kind = rng.choices(("hunted", "parts", "mixed", "marked", "packet", "ended"), (16, 40, 26, 10, 8, 25))[0]
     if kind == "marked":
         return _marked(rng)
     if kind == "packet":
         shape = _packet(rng)
     elif kind == "mixed":
         shape = _Parts(rng, words).mixed()
+    elif kind == "ended":
+        shape = _Parts(rng, words).make_ended(endings.choose(rng))
     else:
         shape = _Parts(rng, words).make(hunted=kind == "hunted")
     for key in ("parts", "packet"):
@@ -209,6 +213,49 @@ class _Parts:
         shape.id_bits = sum(bits for _, bits in mixture.pieces)
         shape.address_bits, shape.address_name = mixture.address_bits, mixture.address
         return shape
+
+    def make_ended(self, ending: Ending) -> Shape:
+        """A frame with a terminator."""
+        rng, coded = self.rng, bool(ending.codings)
+        lead = rng.choice((ending.terminator, "", "", "", rng.choice(_LEADS)))
+        names = {"lead": self._add("start", {"role": "constant", "value": lead})} if lead else {}
+        names |= self._ended_header(coded=coded)
+        names["payload"] = self._add("data", {"role": "payload"})
+        early = coded and self._chance(0.8)
+        if early:
+            self._checked(names, whole=False)
+        end: Doc = {"role": "terminator", "value": ending.terminator}
+        names["terminator"] = self._add("close", end)
+        if not early and self._chance(0.6):
+            self._checked(names, whole=False)
+        if self._chance(0.15):
+            names["end"] = self._add("end", {"role": "constant", "value": rng.choice(_ENDS)})
+        while coded and self._chance(0.2):
+            self._also_checked(names)
+        last = next(reversed(self.parts)) == names["terminator"]
+        if lead == ending.terminator and last and self._chance(0.7):
+            end["shared"] = True
+        if "length" in names:
+            self._counts(names, hunted=False, every=False)
+        frame: Doc = {"parts": self.parts} | ({"coding": ending.coding} if coded else {})
+        shape = self._shape(frame, names, {}, strict=False)
+        shape.mark, shape.has_length = int(ending.terminator.split()[-1], 16), True
+        if not coded:
+            shape.id_bits, shape.most = 7, min(shape.most, 40)
+            self.parts[names["payload"]]["size"] = f"{shape.least}..{shape.most}"
+            shape.groups = {"bits": 7, "first": rng.choice(("least", "most"))}
+        return shape
+
+    def _ended_header(self, *, coded: bool) -> Doc:
+        roles = ["message"] + ["address"] * (coded and self._chance(0.5)) + ["length"] * self._chance(0.25)
+        self.rng.shuffle(roles)
+        names: Doc = {}
+        for role in roles:
+            name, spec = self._header_part(role)
+            names[role] = self._add(name, spec if coded else spec | {"type": "u8"})
+        if self._chance(0.1):
+            self._add("version", {"role": "constant", "value": "01"})
+        return names
 
     def _lead(self) -> str:
         return self.rng.choice(_LEADS) if self._chance(0.75) else ""

@@ -549,7 +549,8 @@ def traits(reference: Reference) -> str:
     if not isinstance(frame, Frame):
         return type(frame).__name__.lower()
     words = ["hunt" if frame.unique else "search", "bare" if frame.bare else "lead"]
-    words += ["length"] if "length" in frame.by_role else ["counts"]
+    words += ["ended" if frame.terminator else "length" if "length" in frame.by_role else "counts"]
+    words += [each.kind for each in frame.codings]
     words += [] if "checksum" in frame.by_role else ["unchecked"]
     words += ["end"] if frame.parts[-1].role == "constant" else []
     if frame.stuffing:

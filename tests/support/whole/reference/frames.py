@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.support.whole.reference import checks
+from tests.support.whole.reference.codings import codings
 from tests.support.whole.reference.document import (
     Doc,
     Message,
@@ -98,9 +99,9 @@ class Stuffing:
 def part_of(name: str, spec: object, order: str) -> Part:
     """A part from its mapping."""
     spec = part_doc(spec)
-    if spec["role"] == "constant" and "type" not in spec:
+    if spec["role"] == "terminator" or (spec["role"] == "constant" and "type" not in spec):
         constant = spec["text"].encode("ascii") if "text" in spec else octets(spec["value"])
-        return Part(name, "constant", len(constant), spec, constant)
+        return Part(name, spec["role"], len(constant), spec, constant)
     if spec["role"] == "payload":
         return Part(name, "payload", 0, spec)
     pieces = byte_pieces(int(spec["type"][1:]) // 8, spec.get("byteorder", order))
@@ -138,8 +139,76 @@ class Frame:
         #: No leading constant: a candidate begins with a known message and a legal address.
         self.bare = self.parts[0].role != "constant"
         most, stuffing = self.most, self.stuffing
+        self.terminator = self.by_role.get("terminator")
+        self.codings = codings(frame.get("coding"))
+        self._over = _coded_names(frame.get("coding"), self.parts)
         #: Maximum payload size on the wire, including inserted bytes if the length counts them.
         self.most_sent = most + most // len(stuffing.after) if stuffing and stuffing.payload_alone else most
+
+    @property
+    def longest(self) -> int:
+        """Number of bytes after which those outside of frames are reported."""
+        if self.terminator is None:
+            return self.overhead + self.most_sent
+        inner = outer = 0
+        for part in self.parts:
+            size = self.most if part.role == "payload" else part.size
+            if part.name in self._over:
+                inner += size
+            else:
+                outer += size
+        for coding in self.codings:
+            inner = coding.most(inner)
+        return inner + outer
+
+    def ended(self, wire: bytes) -> Cut:
+        """The frame up to its terminator. Raises NeedMore or Refused."""
+        assert self.terminator
+        first = self.parts[0]
+        lead = first.constant if first.role == "constant" else b""
+        if wire[: len(lead)] != lead[: len(wire)]:
+            raise Refused("frame", told=False)
+        end, names = self.terminator.constant, [part.name for part in self.parts]
+        after = sum(part.size for part in self.parts[names.index(self.terminator.name) + 1 :])
+        limit = self.longest - after
+        stop = len(lead)
+        while stop + len(end) <= limit and wire[stop : stop + len(end)] != end:
+            if stop + len(end) > len(wire):
+                raise NeedMore
+            stop += 1
+        if stop + len(end) > limit:
+            raise Refused("length", limit)
+        if stop == len(lead):
+            raise Refused("empty", stop + len(end), told=False)
+        size = stop + len(end) + after
+        if len(wire) < size:
+            raise NeedMore
+        kept = len(end) if end == lead and not after else 0
+        return Cut(self._opened(wire[:size]), size, pending=False, kept=kept)
+
+    def _opened(self, wire: bytes) -> dict[str, bytes]:
+        """The parts of a whole frame. Raises Refused."""
+        names = [part.name for part in self.parts]
+        first, last = names.index(self._over[0]), names.index(self._over[-1]) + 1
+        front = sum(part.size for part in self.parts[:first])
+        back = sum(part.size for part in self.parts[last:])
+        if front + back > len(wire):
+            raise Refused("length", len(wire))
+        inner = wire[front : len(wire) - back]
+        try:
+            for coding in reversed(self.codings):
+                inner = coding.decode(inner)
+        except Wrong as wrong:
+            raise Refused(wrong.kind, len(wire)) from None
+        plain = wire[:front] + inner + wire[len(wire) - back :]
+        size = len(plain) - self.overhead
+        if not self.least <= size <= self.most:
+            raise Refused("length", len(wire))
+        cut: dict[str, bytes] = {}
+        for part in self.parts:
+            own = size if part.role == "payload" else part.size
+            cut[part.name], plain = plain[:own], plain[own:]
+        return cut
 
     @functools.cached_property
     def unique(self) -> bool:
@@ -236,6 +305,8 @@ class Frame:
 
     def _stuffed(self, cut: Mapping[str, bytes]) -> bytes:
         wire, run = b"", b""
+        if self.terminator:
+            return self._coded(cut)
         for part in self.parts:
             if self.stuffed(part):
                 run += cut[part.name]
@@ -243,6 +314,19 @@ class Frame:
             wire += self._run(run) + cut[part.name]
             run = b""
         return wire + self._run(run)
+
+    def _coded(self, cut: Mapping[str, bytes]) -> bytes:
+        wire, run = b"", b""
+        for part in self.parts:
+            if part.name not in self._over:
+                wire += cut[part.name]
+                continue
+            run += cut[part.name]
+            if part.name == self._over[-1]:
+                for coding in self.codings:
+                    run = coding.encode(run)
+                wire += run
+        return wire
 
     def _run(self, data: bytes) -> bytes:
         return self.stuffing.stuff(data) if self.stuffing and data else data
@@ -295,6 +379,17 @@ class Frame:
             part = next(each for each in self.parts if each.name == name)
             number = number << bits | get(part.pieces, cut[name]) >> shift & (1 << bits) - 1
         return number
+
+
+def _coded_names(spec: Any, parts: list[Part]) -> list[str]:
+    """Names of the coded parts: all between the first constant and the terminator unless stated."""
+    roles, names = [part.role for part in parts], [part.name for part in parts]
+    if "terminator" not in roles:
+        return []
+    for each in spec if isinstance(spec, list) else [spec or {}]:
+        if "over" in each:
+            return list(each["over"])
+    return names[int(roles[0] == "constant") : roles.index("terminator")]
 
 
 def _stuffing(spec: Any) -> Stuffing | None:
@@ -356,6 +451,8 @@ class Cut:
     parts: Mapping[str, bytes]
     size: int
     pending: bool
+    #: Bytes at its end that may begin the next frame.
+    kept: int = 0
 
 
 class Splitter:
@@ -367,6 +464,8 @@ class Splitter:
 
     def split(self, wire: bytes) -> Cut:
         """The frame at the beginning, checked byte by byte. Raises NeedMore or Refused."""
+        if self._frame.terminator:
+            return self._ended(wire)
         frame, cursor, cut = self._frame, Cursor(wire, self._frame), dict[str, bytes]()
         for part in frame.parts[: frame.payload_at]:
             self._take(part, cursor, cut)
@@ -380,6 +479,23 @@ class Splitter:
         if frame.bad_constant(cut):
             raise Refused("frame", cursor.at)
         return Cut(cut, cursor.at, cursor.pending)
+
+    def _ended(self, wire: bytes) -> Cut:
+        frame = self._frame
+        found = frame.ended(wire)
+        cursor, cut = Cursor(wire[: found.size], frame), dict[str, bytes]()
+        cursor.at = found.size
+        for part in frame.parts:
+            cut[part.name] = found.parts[part.name]
+            if part.role == "constant" and cut[part.name] != part.constant:
+                raise Refused("frame", found.size)
+            if part.role == "length":
+                announced = (frame.number("length", cut) or 0) - frame.bias
+                if announced != len(found.parts[frame.by_role["payload"].name]):
+                    raise Refused("length", found.size)
+            else:
+                self._judge(part, cursor, cut)
+        return found
 
     def _take(self, part: Part, cursor: Cursor, cut: dict[str, bytes]) -> None:
         data = b""

@@ -174,7 +174,7 @@ class Searcher(Receiver):
         except NeedMore:
             raise Wrong("truncated") from None
         except Refused as refused:
-            raise Wrong(refused.kind) from None
+            raise Wrong("length" if refused.kind == "empty" else refused.kind) from None
 
     def take(self, byte: int) -> Iterator[Event]:
         """The events of the bytes so far."""
@@ -185,7 +185,7 @@ class Searcher(Receiver):
     def finish(self) -> Iterator[Event]:
         """Give up the incomplete frame and search its bytes for others."""
         self.ended = True
-        if self.buffer and not self.frame.bare:
+        if self.buffer and not self.frame.bare and self.buffer != self._flag():
             yield Event("truncated", self.at, self.start, self.buffer)
             self._advance(1)
         yield from self._scan()
@@ -206,11 +206,20 @@ class Searcher(Receiver):
                     return
                 yield from self._drop(Refused("truncated", told=False))
             except Refused as refused:
-                yield from self._drop(refused)
+                if refused.kind == "empty" and self.frame.bare:
+                    yield from self._report()
+                    self._advance(refused.size)
+                else:
+                    yield from self._drop(refused)
             else:
                 yield from self._report()
                 yield event
                 self._advance(size)
+
+    def _flag(self) -> bytes:
+        """The bytes that end a frame, if they also begin one."""
+        end = self.frame.terminator.constant if self.frame.terminator else b""
+        return end if self.frame.parts[0].constant == end else b""
 
     def _advance(self, size: int) -> None:
         self.buffer, self.start, self.needed = self.buffer[size:], self.start + size, 0
@@ -221,7 +230,7 @@ class Searcher(Receiver):
         elif refused.told:
             yield Event(refused.kind, self.at, self.start, self.buffer[: refused.size])
         self._advance(1)
-        if len(self.skipped) == self.frame.overhead + self.frame.most_sent:
+        if len(self.skipped) == self.frame.longest:
             yield from self._report()
 
     def _report(self) -> Iterator[Event]:
@@ -237,7 +246,7 @@ class Searcher(Receiver):
         if event.kind == "crc" or (event.kind != "message" and unproven):
             # It may not be a frame at all, so another one may begin after its first byte.
             raise Refused(event.kind, cut.size)
-        return event, cut.size, cut.pending
+        return event, cut.size - cut.kept, cut.pending
 
     def _plain(self, cut: Cut) -> bytes:
         """Decode the payload. Raises Refused."""

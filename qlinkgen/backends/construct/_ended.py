@@ -1,0 +1,240 @@
+"""Frames that a terminator ends, and the codings that keep it from occurring before.
+
+Codings apply one after the other to the bytes of the parts ``over``; decoding goes the other way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from construct import Container
+
+from ._fields import Message
+from ._frames import Address, Constant, Frame, FrameError, Id, Length, Part, Payload, _allowed, _size
+
+
+class Escape(NamedTuple):
+    """A byte that must not occur is sent as ``escape`` and a second byte.
+
+    With ``mask``, the second byte is any byte XOR mask.
+    """
+
+    escape: int
+    codes: Sequence[tuple[int, int]]
+    mask: int = 0
+
+    def add(self, data: bytes) -> bytes:
+        """The coded bytes."""
+        codes = {byte: bytes([self.escape, second]) for byte, second in self.codes}
+        return b"".join(codes.get(byte, bytes([byte])) for byte in data)
+
+    def remove(self, data: bytes) -> bytes:
+        """The decoded bytes."""
+        head, *rest = data.split(bytes([self.escape]))
+        plain = {second: byte for byte, second in self.codes}
+        for run in rest:
+            second = run[0] if run else self.escape
+            if not run or (not self.mask and second not in plain):
+                raise FrameError("stuffing", f"wrong byte after {self.escape:02x}")
+            head += bytes([second ^ self.mask if self.mask else plain[second]]) + run[1:]
+        return head
+
+
+class Insert(NamedTuple):
+    """Inserts a byte after each occurrence of a pattern."""
+
+    after: bytes
+    insert: bytes
+
+    def add(self, data: bytes) -> bytes:
+        """The coded bytes."""
+        return data.replace(self.after, self.after + self.insert)
+
+    def remove(self, data: bytes) -> bytes:
+        """The decoded bytes."""
+        plain = data.replace(self.after + self.insert, self.after)
+        if self.add(plain) != data:
+            raise FrameError("stuffing", f"{self.insert.hex()} does not follow each {self.after.hex()}")
+        return plain
+
+
+class Cobs(NamedTuple):
+    """Consistent overhead byte stuffing."""
+
+    def add(self, data: bytes) -> bytes:
+        """The coded bytes."""
+        coded, runs = b"", data.split(b"\0")
+        for index, run in enumerate(runs):
+            blocks = [run[at : at + 254] for at in range(0, len(run), 254)] or [b""]
+            if len(blocks[-1]) == 254 and index < len(runs) - 1:
+                blocks.append(b"")  # a full block does not imply a zero
+            coded += b"".join(bytes([len(block) + 1]) + block for block in blocks)
+        return coded
+
+    def remove(self, data: bytes) -> bytes:
+        """The decoded bytes."""
+        plain, at = b"", 0
+        while at < len(data):
+            size = data[at]
+            run = data[at + 1 : at + size]
+            if size == 0 or len(run) != size - 1 or 0 in run:
+                raise FrameError("stuffing", f"wrong code at {at}")
+            at += size
+            plain += run + (b"\0" if size < 255 and at < len(data) else b"")
+        return plain
+
+
+class Digits(NamedTuple):
+    """Each byte is two hexadecimal digits."""
+
+    def add(self, data: bytes) -> bytes:
+        """The coded bytes."""
+        return data.hex().upper().encode()
+
+    def remove(self, data: bytes) -> bytes:
+        """The decoded bytes."""
+        if len(data) % 2 or not all(byte in b"0123456789ABCDEFabcdef" for byte in data):
+            raise FrameError("stuffing", f"{data!r} are not pairs of digits")
+        return bytes.fromhex(data.decode())
+
+
+class Pair(NamedTuple):
+    """Each byte is followed by its complement."""
+
+    def add(self, data: bytes) -> bytes:
+        """The coded bytes."""
+        return bytes(each for byte in data for each in (byte, byte ^ 0xFF))
+
+    def remove(self, data: bytes) -> bytes:
+        """The decoded bytes."""
+        if self.add(data[::2]) != data:
+            raise FrameError("stuffing", "a byte is not followed by its complement")
+        return data[::2]
+
+
+class Add(NamedTuple):
+    """A number is added to each byte."""
+
+    number: int
+
+    def add(self, data: bytes) -> bytes:
+        """The coded bytes."""
+        return bytes((byte + self.number) % 256 for byte in data)
+
+    def remove(self, data: bytes) -> bytes:
+        """The decoded bytes."""
+        return bytes((byte - self.number) % 256 for byte in data)
+
+
+Coding = Escape | Insert | Cobs | Digits | Pair | Add
+
+
+class EndedFrame(Frame):
+    """A frame that its part ``end`` ends, which does not occur before; it has at most ``most`` bytes.
+
+    Its payload has at least ``least`` bytes.
+
+    With ``bare`` it does not begin with a constant, so an unknown id or an illegal address is detected first.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        messages: Iterable[Message],
+        *,
+        end: str,
+        most: int,
+        over: Sequence[str],
+        least: int = 0,
+        coding: Sequence[Coding] = (),
+        address: str = "",
+        bare: bool = False,
+    ) -> None:
+        super().__init__(parts, messages, address=address, bare=bare)
+        names = [part.name for part in parts]
+        sizes = [_size(part) for part in parts]
+        last = names.index(over[-1]) + 1
+        self.end = parts[names.index(end)]
+        self.most = most
+        self.least = least
+        self.coding = coding
+        self.front = sum(sizes[: names.index(over[0])])
+        self.back = sum(sizes[last:])
+        self.closing = sum(sizes[names.index(end) :])
+        self.sizes = dict(zip(names, sizes, strict=True))
+
+    def wrap(
+        self,
+        message: Message,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
+        number: int | None = None,
+    ) -> bytes:
+        """See Frame."""
+        plain = super().wrap(message, payload, address, request, number)
+        end = len(plain) - self.back
+        inner = plain[self.front : end]
+        for coding in self.coding:
+            inner = coding.add(inner)
+        return plain[: self.front] + inner + plain[end:]
+
+    def _frame(self, wire: bytes, request: bytes) -> Container:
+        del request
+        end = self._end(wire)
+        cells = self._cells(wire[:end])
+        payload = cells[self.payload.name]
+        numbers: dict[type, int] = {}
+        for part in self.parts:
+            cell = cells[part.name]
+            if isinstance(part, Constant) and cell != part.data:
+                raise FrameError("frame", f"{part.name} is {cell.hex()}, not {part.data.hex()}")
+            if isinstance(part, Length) and part.integer.parse(cell) != len(payload) + part.bias:
+                raise FrameError("length", f"{part.name} does not count {len(payload)} bytes")
+            if isinstance(part, Id | Address):
+                numbers[type(part)] = part.integer.parse(cell)
+                self._check_begin(numbers)
+        if len(wire) != end:
+            raise FrameError("length", f"{len(wire) - end} bytes follow the frame")
+        return self._judged(cells, numbers[Id], payload, numbers.get(Address, 0))
+
+    def _check_begin(self, numbers: Mapping[type, int]) -> None:
+        if self.bare and Id in numbers:
+            message = self._known(numbers[Id])
+            if Address in numbers and not _allowed(message, numbers[Address]):
+                raise FrameError("range", f"{message.name} cannot have address {numbers[Address]}")
+
+    def _end(self, wire: bytes) -> int:
+        """Offset of the end of the frame."""
+        first, last = self.parts[0], self.end
+        lead = first.data if isinstance(first, Constant) else b""
+        assert isinstance(last, Constant)
+        if not lead.startswith(wire[: len(lead)]):
+            raise FrameError("frame", f"the frame does not begin with {lead.hex()}")
+        limit = self.most - self.closing + len(last.data)
+        stop = wire.find(last.data, len(lead), limit)
+        if stop == len(lead) or (stop < 0 and len(wire) >= limit):
+            raise FrameError("length", f"{last.name} is not after 1 to {limit} bytes")
+        if stop < 0 or len(wire) < stop + self.closing:
+            raise FrameError("truncated", f"incomplete frame of {len(wire)} bytes")
+        return stop + self.closing
+
+    def _cells(self, wire: bytes) -> dict[str, bytes]:
+        """The decoded bytes of each part."""
+        end = len(wire) - self.back
+        plain = wire
+        if self.front < end:
+            inner = wire[self.front : end]
+            for coding in reversed(self.coding):
+                inner = coding.remove(inner)
+            plain = wire[: self.front] + inner + wire[end:]
+        size = len(plain) - sum(self.sizes.values())
+        if not self.least <= size <= self.payload.most:
+            text = f"payload of {size} bytes, expected {self.least} to {self.payload.most}"
+            raise FrameError("length", text)
+        cells, at = {}, 0
+        for part in self.parts:
+            stop = at + (size if isinstance(part, Payload) else self.sizes[part.name])
+            cells[part.name], at = plain[at:stop], stop
+        return cells

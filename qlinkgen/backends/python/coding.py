@@ -1,0 +1,135 @@
+"""Prints codings: statements that code and decode the local ``data``, fast where nothing is to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import assert_never
+
+from qlinkgen.backends.python.layout import literal
+from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
+
+
+@dataclass(frozen=True, slots=True)
+class CodingView:
+    """Definitions of tables; statements that replace ``data`` by coded and decoded bytes, or return None."""
+
+    tables: list[str]
+    encode: list[str]
+    decode: list[str]
+
+
+def coding_view(stages: tuple[Stage, ...]) -> CodingView:
+    """The statements of codings that apply one after the other."""
+    views = [_view(stage, f"_{index}" if len(stages) > 1 else "") for index, stage in enumerate(stages, 1)]
+    return CodingView(
+        tables=[line for view in views for line in view.tables],
+        encode=[line for view in views for line in view.encode],
+        decode=[line for view in reversed(views) for line in view.decode],
+    )
+
+
+def _view(stage: Stage, suffix: str) -> CodingView:
+    match stage:
+        case Escaping():
+            return _escaping(stage, f"_UNESCAPED{suffix}")
+        case Insertion():
+            return _insertion(stage)
+        case Cobs():
+            return CodingView([], _COBS, _UNCOBS)
+        case Digits():
+            decode = ["try:", "    data = unhexlify(data)", "except ValueError:", "    return None"]
+            return CodingView([], ["data = hexlify(data).upper()"], decode)
+        case Pair():
+            return _pair(f"_INVERTED{suffix}")
+        case Add():
+            table = f"_ADDED{suffix}", f"_SUBTRACTED{suffix}"
+            numbers = stage.number, -stage.number % 256
+            return CodingView(
+                [
+                    f"{name} = bytes((byte + {number}) % 256 for byte in range(256))"
+                    for name, number in zip(table, numbers, strict=True)
+                ],
+                [f"data = data.translate({table[0]})"],
+                [f"data = data.translate({table[1]})"],
+            )
+        case _:
+            assert_never(stage)
+
+
+def _escaping(stage: Escaping, table: str) -> CodingView:
+    escape = literal(bytes((stage.escape,)))
+    # The escape byte first: the others add it.
+    codes = sorted(stage.codes, key=lambda code: code[0] != stage.escape)
+    encode = []
+    for byte, second in codes:
+        pair = literal(bytes((stage.escape, second)))
+        encode.append(f"data = data.replace({literal(bytes((byte,)))}, {pair})")
+    if stage.mask:
+        definition = f"{table} = [bytes((byte ^ {stage.mask},)) for byte in range(256)]"
+    else:
+        rows = ", ".join(f"0x{second:02X}: {literal(bytes((byte,)))}" for byte, second in stage.codes)
+        definition = f"{table} = {{{rows}}}"
+    decode = [
+        f"if {escape} in data:",
+        f"    data, *runs = data.split({escape})",
+        "    try:",
+        f'        data += b"".join([{table}[run[0]] + run[1:] for run in runs])',
+        "    except LookupError:",
+        "        return None",
+    ]
+    return CodingView([definition], encode, decode)
+
+
+def _insertion(stage: Insertion) -> CodingView:
+    after, both = literal(stage.after), literal(stage.inserted)
+    decode = [
+        f"if {after} in data:",
+        f"    plain = data.replace({both}, {after})",
+        f"    if plain.replace({after}, {both}) != data:",
+        "        return None",
+        "    data = plain",
+    ]
+    return CodingView([], [f"data = data.replace({after}, {both})"], decode)
+
+
+def _pair(table: str) -> CodingView:
+    encode = [
+        "pairs = bytearray(2 * len(data))",
+        "pairs[::2] = data",
+        f"pairs[1::2] = data.translate({table})",
+        "data = bytes(pairs)",
+    ]
+    decode = [
+        "plain = data[::2]",
+        f"if data[1::2] != plain.translate({table}):",
+        "    return None",
+        "data = plain",
+    ]
+    return CodingView([f"{table} = bytes(range(255, -1, -1))"], encode, decode)
+
+
+_COBS = [
+    'pieces, runs = [], data.split(b"\\0")',
+    "for index, run in enumerate(runs):",
+    "    at = 0",
+    "    while len(run) - at >= 254:",
+    '        pieces.append(b"\\xff" + run[at : at + 254])',
+    "        at += 254",
+    "    # A full block does not imply a zero.",
+    "    if at == 0 or at < len(run) or index < len(runs) - 1:",
+    "        pieces.append(bytes((len(run) - at + 1,)) + run[at:])",
+    'data = b"".join(pieces)',
+]
+_UNCOBS = [
+    "pieces, at = [], 0",
+    "while at < len(data):",
+    "    size = data[at]",
+    "    run = data[at + 1 : at + size]",
+    '    if size == 0 or len(run) < size - 1 or b"\\0" in run:',
+    "        return None",
+    "    at += size",
+    "    pieces.append(run)",
+    "    if size < 255 and at < len(data):",
+    '        pieces.append(b"\\0")',
+    'data = b"".join(pieces)',
+]

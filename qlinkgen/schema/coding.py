@@ -1,0 +1,174 @@
+"""Second pass, codings: builds them, and checks their bytes and the parts they apply to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from qlinkgen.model.coding import Add, Cobs, Coding, Digits, Escape, Insert, Pair
+from qlinkgen.model.frame import Part
+from qlinkgen.schema.file_model import Codings, CodingSpec
+from qlinkgen.schema.notation import byte_string
+from qlinkgen.schema.parts import PartBuilder
+from qlinkgen.schema.report import Reporter, listed
+from qlinkgen.schema.source import Path
+
+_PATH: Path = ("frame", "coding")
+#: The key that names a coding, and the keys that complete it.
+_KINDS = {
+    "escape": ("xor", "of"),
+    "replace": (),
+    "insert": ("after",),
+    "cobs": (),
+    "digits": (),
+    "pair": (),
+    "add": (),
+}
+
+#: Receivers compare the last bytes as one number.
+_LONGEST_PATTERN = 4
+
+
+class CodingBuilder:
+    """Builds the codings of one frame."""
+
+    def __init__(self, parts: Sequence[Part], builder: PartBuilder, report: Reporter) -> None:
+        """``parts`` are those of the frame."""
+        self._parts = parts
+        self._builder = builder
+        self._report = report
+
+    def build(self, spec: Codings | None) -> tuple[tuple[Coding, ...], tuple[str, ...]]:
+        """The codings in the order in which they are applied, and the names of the coded parts."""
+        if spec is None:
+            return (), ()
+        if not any(part.role == "terminator" for part in self._parts):
+            what = "coding applies only to frames that a terminator ends"
+            hint = "add a part with role: terminator, or use stuffing"
+            needs = (_PATH, ("frame", "parts"))
+            self._report.error("not-applicable", _PATH, what, hint, of_key=True, needs=needs)
+            return (), ()
+        many = isinstance(spec, list)
+        specs = spec if isinstance(spec, list) else [spec]
+        codings = [self._coding(each, (*_PATH, index) if many else _PATH) for index, each in enumerate(specs)]
+        for index, coding in enumerate(codings[:-1]):
+            if isinstance(coding, Cobs):
+                self._error((*_PATH, index), "COBS is followed by another coding", "move cobs to the end")
+        coded = self._coded(None, _PATH)
+        given = [(each.over, index) for index, each in enumerate(specs) if each.over is not None]
+        for over, index in given:
+            path: Path = (*_PATH, index, "over") if many else (*_PATH, "over")
+            if over != given[0][0]:
+                what = "codings of one frame apply to different parts"
+                self._error(path, what, "name the same parts in each, or only in one")
+            else:
+                coded = self._coded(over, path)
+        return tuple(each for each in codings if each is not None), coded
+
+    def _error(self, path: Path, what: str, hint: str) -> None:
+        self._report.error("bad-coding", path, what, hint, of_key=True)
+
+    # Parts
+
+    def _coded(self, over: Sequence[str] | None, path: Path) -> tuple[str, ...]:
+        roles = [part.role for part in self._parts]
+        end = roles.index("terminator")
+        inner = self._parts[int(roles[0] == "constant") : end]
+        if over is None:
+            return tuple(part.name for part in inner)
+        names = [part.name for part in self._parts]
+        self._builder.known(over, names, path)
+        if any(name not in names for name in over):
+            return ()
+        places = [names.index(name) for name in over]
+        if places != list(range(places[0], places[0] + len(places))) if places else True:
+            self._error(path, "coded parts are not adjacent", "name all parts from the first to the last")
+        elif roles.index("payload") not in places or places[-1] >= end:
+            what = "coded parts must include the payload and precede the terminator"
+            self._error(path, what, f"name some of {listed(part.name for part in inner)}")
+        return tuple(over)
+
+    # Bytes
+
+    def _coding(self, spec: CodingSpec, path: Path) -> Coding | None:
+        given = [kind for kind in _KINDS if getattr(spec, kind) is not None]
+        if len(given) != 1:
+            what = f"a coding has {listed(given)}" if given else "a coding has no kind"
+            hint = f"write exactly one of {listed(_KINDS, 'or')}; several are a list"
+            if not self._report.incomplete(path):
+                self._error(path, what, hint)
+            return None
+        kind = given[0]
+        for key in _KINDS[kind]:
+            if getattr(spec, key) is None:
+                self._error(path, f"{kind} has no {key}", f"add {key}")
+                return None
+        others = {key for keys in _KINDS.values() for key in keys} - set(_KINDS[kind])
+        for key in sorted(others & spec.model_fields_set):
+            self._error((*path, key), f"'{key}' has no effect on {kind}", "remove it")
+        return self._of_kind(kind, spec, path)
+
+    def _of_kind(self, kind: str, spec: CodingSpec, path: Path) -> Coding | None:
+        simple: dict[str, Coding] = {"cobs": Cobs(), "digits": Digits(), "pair": Pair()}
+        if kind in simple:
+            if kind == "cobs" and spec.cobs != b"\0":
+                self._error((*path, "cobs"), "COBS removes zero bytes", "write cobs: 00")
+            return simple[kind]
+        if kind == "insert":
+            after = spec.after or b"\0"
+            if len(after) > _LONGEST_PATTERN:
+                what = f"a pattern of {len(after)} bytes is too long"
+                self._error((*path, "after"), what, f"use at most {_LONGEST_PATTERN} bytes")
+            return Insert(after, self._byte(spec.insert, (*path, "insert")))
+        if kind == "add":
+            return Add(self._byte(spec.add, (*path, "add")))
+        return self._escape(spec, path) if kind == "escape" else self._replace(spec, path)
+
+    def _byte(self, data: bytes | None, path: Path) -> int:
+        if data is not None and len(data) != 1:
+            self._error(path, f"{len(data)} bytes are given in place of one", "write one byte, like 0x7D")
+        return data[0] if data else 0
+
+    def _escape(self, spec: CodingSpec, path: Path) -> Coding | None:
+        escape, mask = self._byte(spec.escape, (*path, "escape")), self._byte(spec.xor, (*path, "xor"))
+        marked = [self._byte(each, (*path, "of", index)) for index, each in enumerate(spec.of or ())]
+        codes = {byte: byte ^ mask for byte in marked}
+        if mask == 0:
+            self._error((*path, "xor"), "xor 00 would send escaped bytes as they are", "write another byte")
+            return None
+        return self._checked(Escape(escape, tuple(codes.items()), mask), (*path, "of"))
+
+    def _replace(self, spec: CodingSpec, path: Path) -> Coding | None:
+        codes: dict[int, int] = {}
+        escapes: set[int] = set()
+        for key, sent in (spec.replace or {}).items():
+            place = (*path, "replace", key)
+            try:
+                byte = byte_string(int(key, 16) if key.startswith("0x") else key)
+            except ValueError:
+                byte = b""
+            if len(byte) != 1 or len(sent) != 2:
+                self._error(place, "a byte is replaced by two bytes", "write it like C0: DB DC")
+                return None
+            codes[byte[0]] = sent[1]
+            escapes.add(sent[0])
+        if len(escapes) != 1:
+            what = "replacements begin with different bytes" if escapes else "no byte is replaced"
+            self._error((*path, "replace"), what, "begin each with the same byte, which is replaced as well")
+            return None
+        return self._checked(Escape(escapes.pop(), tuple(codes.items())), (*path, "replace"))
+
+    def _checked(self, coding: Escape, path: Path) -> Coding | None:
+        """The coding if coded bytes can be decoded."""
+        seconds = [second for _, second in coding.codes]
+        if coding.escape not in dict(coding.codes):
+            what = f"{coding.escape:02X}, which begins two bytes, is not among the bytes that are replaced"
+            self._error(path, what, f"add {coding.escape:02X}")
+            return None
+        if len(set(seconds)) < len(seconds):
+            self._error(path, "two bytes are sent alike", "let the second bytes differ")
+            return None
+        if both := sorted(set(seconds) & dict(coding.codes).keys()):
+            what = f"{both[0]:02X} is the second of two bytes, but is replaced itself"
+            self._error(path, what, "use second bytes that are not replaced")
+            return None
+        return coding

@@ -1,0 +1,171 @@
+"""Checks that the terminator of a frame cannot occur before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import assert_never
+
+from qlinkgen.model.coding import ALL_BYTES, Alphabet
+from qlinkgen.model.fields import Field, Record, Records
+from qlinkgen.model.frame import DelimitedFrame, Frame, Part, PartBits
+from qlinkgen.model.message import Message
+from qlinkgen.model.types import Array, Bits, Blob, Chunk, Constant, Reserved, Scalar
+from qlinkgen.schema.report import Reporter
+from qlinkgen.schema.source import Path
+
+_PARTS: Path = ("frame", "parts")
+
+
+def check_terminator_part(frame: DelimitedFrame, report: Reporter) -> None:
+    """Check the place of a terminator, and what a shared one needs."""
+    end = frame.part("terminator")
+    if end is None:
+        return
+    place = (*_PARTS, end.name)
+    names = [part.name for part in frame.parts]
+    if names.index(end.name) < names.index(frame.payload.name):
+        what = f"{end.name} precedes the payload"
+        report.error("bad-frame", place, what, "move it after the payload", of_key=True)
+    if frame.stuffing is not None:
+        what = "stuffing cannot be combined with a terminator"
+        hint = "write coding: {insert: 00, after: A5}"
+        report.error("not-applicable", ("frame", "stuffing"), what, hint, of_key=True, needs=(place,))
+    if not end.shared:
+        return
+    if frame.parts[0].constant != end.constant:
+        what = f"{end.name} cannot begin a frame: frames do not begin with {end.constant.hex(' ').upper()}"
+        hint = "let the frame begin with a constant of the same bytes, or remove shared"
+        report.error("bad-frame", (*place, "shared"), what, hint, of_key=True, needs=(place,))
+    elif frame.parts[-1] is not end:
+        what = f"{end.name} cannot begin the next frame: {frame.parts[-1].name} follows it"
+        hint = f"move {frame.parts[-1].name} before it, or remove shared"
+        report.error("bad-frame", (*place, "shared"), what, hint, of_key=True, needs=(place,))
+
+
+def check_terminator(frame: Frame | None, messages: Sequence[Message], report: Reporter) -> None:
+    """Check that some byte of the terminator does not occur between the first part and it."""
+    end = frame.part("terminator") if isinstance(frame, DelimitedFrame) else None
+    if not isinstance(frame, DelimitedFrame) or end is None or report.failed:
+        return
+    inner = frame.parts[: frame.parts.index(end)]
+    if inner[0].role == "constant":
+        inner = inner[1:]
+    plain = {part.name: _bytes_of(part, frame, messages) for part in inner}
+    coded = _joined(found for name, found in plain.items() if name in frame.coded)
+    for coding in frame.coding:
+        coded = coding.alphabet(coded)
+    sent = coded | _joined(found for name, found in plain.items() if name not in frame.coded)
+    if not sent.issuperset(end.constant):
+        return
+    held = [name for name, found in plain.items() if found & {*end.constant}]
+    culprits = ["coded bytes"] if frame.coding else held
+    what = f"{end.constant.hex(' ').upper()}, which ends a frame, can occur in {culprits[-1]}"
+    hint = "add a coding such as {escape: 7D, xor: 20, of: [7E, 7D]}, or limit what the parts can hold"
+    report.error("terminator-in-frame", (*_PARTS, end.name), what, hint, of_key=True, needs=(("frame",),))
+
+
+def _joined(alphabets: Iterable[Alphabet]) -> Alphabet:
+    return frozenset().union(*alphabets)
+
+
+def _bytes_of(part: Part, frame: DelimitedFrame, messages: Sequence[Message]) -> Alphabet:
+    """The bytes that can occur in a part of a valid frame."""
+    match part.role:
+        case "constant" | "terminator":
+            return frozenset(part.constant)
+        case "payload":
+            return _joined(_bytes_in(field) for message in messages for field in message.fields)
+        case "checksum":
+            assert part.checksum is not None
+            return _joined(frozenset(range(chunk.mask + 1)) for chunk in part.checksum.chunks)
+        case "length":
+            assert part.scalar is not None
+            ranges = [(frame.length_bias + low, frame.length_bias + high) for low, high in _sizes(messages)]
+            return _joined(
+                values_of(chunk, low, high) for low, high in ranges for chunk in part.scalar.chunks
+            )
+        case "message" | "address" | "bits":
+            assert part.scalar is not None
+            return _joined(_bytes_of_pieces(part, chunk, messages) for chunk in part.scalar.chunks)
+        case "derived":
+            return ALL_BYTES
+        case _:
+            assert_never(part.role)
+
+
+def _sizes(messages: Sequence[Message]) -> Iterator[tuple[int, int]]:
+    """The sizes of payloads."""
+    for message in messages:
+        yield 0 if message.empty_is_default else message.min_size, message.max_size
+
+
+def _bytes_of_pieces(part: Part, chunk: Chunk, messages: Sequence[Message]) -> Alphabet:
+    """The values of a wire byte of a part whose bits have roles."""
+    found: set[int] = {0}
+    for bits in part.bits:
+        own = {
+            (number >> bits.at << bits.shift & bits.mask) >> chunk.shift & chunk.mask
+            for number in _numbers(bits, chunk, messages)
+        }
+        found = {one | other for one in found for other in own}
+    return frozenset(found)
+
+
+def _numbers(bits: PartBits, chunk: Chunk, messages: Sequence[Message]) -> Iterable[int]:
+    """Numbers that bits can have, enough for every value of a wire byte."""
+    if bits.is_id:
+        return {message.id for message in messages}
+    if bits.role == "constant":
+        return bits.constants
+    # Of each range, a number for every value of the bits in this byte.
+    step = 1 << max(0, chunk.shift - bits.shift)
+    return {
+        min(number, high)
+        for message in messages
+        for low, high in message.addresses
+        for number in range(low, min(high, low + 0x100 * step) + step, step)
+    }
+
+
+def values_of(chunk: Chunk, low: int, high: int) -> Alphabet:
+    """The values of a wire byte that carries some bits of a number from low to high."""
+    first, last = low >> chunk.shift, high >> chunk.shift
+    if last - first >= chunk.mask:
+        return frozenset(range(chunk.mask + 1))
+    return frozenset(value & chunk.mask for value in range(first, last + 1))
+
+
+def _bytes_in(field: Field) -> Alphabet:
+    """The bytes that can occur in a field of a valid message."""
+    kind = field.type
+    match kind:
+        case Blob():
+            return frozenset(range(0x80)) if kind.text else ALL_BYTES
+        case Array():
+            return ALL_BYTES if kind.packed else _bytes_of_number(kind.item)
+        case Bits():
+            return _joined(_bytes_of_bits(kind, chunk) for chunk in kind.container.chunks)
+        case Scalar():
+            return _bytes_of_number(kind)
+        case Record() | Records():
+            return _joined(map(_bytes_in, kind.layout.fields))
+        case _:
+            assert_never(kind)
+
+
+def _bytes_of_number(number: Scalar) -> Alphabet:
+    low, high = number.minimum, number.maximum
+    if isinstance(number.role, Constant):
+        low = high = number.default
+    # A receiver ignores reserved bytes, so another sender may fill them.
+    elif isinstance(number.role, Reserved):
+        low, high = number.natural_minimum, number.natural_maximum
+    if number.bcd:
+        low, high = int(str(low), 16), int(str(high), 16)
+    return _joined(values_of(chunk, low, high) for chunk in number.chunks)
+
+
+def _bytes_of_bits(kind: Bits, chunk: Chunk) -> Alphabet:
+    """Values of a byte whose other bits are sent as 0."""
+    used = sum(member.mask for member in kind.members) >> chunk.shift & chunk.mask
+    return frozenset(value for value in range(chunk.mask + 1) if not value & ~used)

@@ -1,0 +1,84 @@
+"""Random terminators, with codings that keep them from occurring before."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from typing import Any
+
+Doc = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Ending:
+    """A terminator and the codings of what precedes it; without any, payloads use seven bits a byte."""
+
+    terminator: str
+    codings: list[Doc]
+
+    @property
+    def coding(self) -> object:
+        """The value of the key."""
+        return self.codings[0] if len(self.codings) == 1 else self.codings
+
+
+def choose(rng: random.Random) -> Ending:
+    """An ending of any kind."""
+    kind = rng.choices(("bare", "escape", "replace", "cobs", "digits", "list"), (14, 26, 14, 14, 14, 18))[0]
+    if kind == "bare":
+        return Ending(rng.choice(("FF", "80", "FE 0A", "0D 8A", "A5 A5")), [])
+    if kind == "cobs":
+        return Ending("00", [{"cobs": "00"}])
+    if kind == "digits":
+        return Ending(rng.choice(("0D 0A", "0D", "00", "0A 0A", "3B", "FF")), [{"digits": "hex"}])
+    if kind == "list":
+        return _several(rng)
+    return _escaped(rng) if kind == "escape" else _replaced(rng)
+
+
+def _several(rng: random.Random) -> Ending:
+    first = rng.choice(
+        (
+            {"add": _hex(rng.randrange(256))},
+            {"pair": "complement"},
+            {"digits": "hex"},
+            {"insert": _hex(rng.randrange(256)), "after": rng.choice(("A5", "A5 A5", "00 01 00", "7D"))},
+        )
+    )
+    last = rng.choice((_escaped(rng), _replaced(rng), Ending("00", [{"cobs": "00"}])))
+    if rng.random() < 0.2:
+        last = Ending(
+            rng.choice(("0D", "0D 0A")), [*last.codings[: "cobs" not in last.codings[0]], {"digits": "hex"}]
+        )
+    return Ending(last.terminator, [first, *last.codings])
+
+
+def _escaped(rng: random.Random) -> Ending:
+    while True:
+        mask = rng.choice((0x20, 0x20, 0x01, 0x40, 0xFF, 0x5A))
+        marked = rng.choice(
+            ([0x7E, 0x7D], [0x7E, 0x7D], [0xC0, 0xDB, 0x11, 0x13], [0x03, 0x10], [0xA5, 0x00])
+        )
+        escape = rng.choice(marked[:2])
+        end = rng.choice([each for each in marked if each != escape])
+        if not {each ^ mask for each in marked} & {*marked}:
+            spec = {"escape": _hex(escape), "xor": _hex(mask), "of": list(map(_hex, marked))}
+            more = rng.choice(("", "", " 0A")) if 0x0A not in marked else ""
+            return Ending(_hex(end) + more, [spec])
+
+
+def _replaced(rng: random.Random) -> Ending:
+    numbers = rng.sample(range(256), 6)
+    escape, end, more, *seconds = numbers
+    if rng.random() < 0.5:
+        escape, end, seconds = 0xDB, 0xC0, [0xDD, 0xDC, 0xDE]
+        more = 0x11
+    codes = {_hex(escape): seconds[0], _hex(end): seconds[1]}
+    if rng.random() < 0.3:
+        codes[_hex(more)] = seconds[2]
+    pairs = {key: f"{_hex(escape)} {_hex(second)}" for key, second in codes.items()}
+    return Ending(_hex(end), [{"replace": dict(sorted(pairs.items(), key=lambda _: rng.random()))}])
+
+
+def _hex(byte: int) -> str:
+    return f"{byte:02X}"
