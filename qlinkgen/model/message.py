@@ -25,6 +25,8 @@ class Example:
     message: str
     wire: bytes
     after: bytes = b""
+    #: It is legal, but an encoder sends other bytes.
+    decode_only: bool = False
 
 
 @dataclass(frozen=True)

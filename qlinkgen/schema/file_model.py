@@ -554,6 +554,9 @@ class ExampleSpec(_Mapping):
     request: Values | None = Field(default=None, description="Values of the request, if it is one")
     response: Values | None = Field(default=None, description="Values of the response, if it is one")
     fields: Values | None = Field(default=None, description="Values of a message without a response")
+    decode_only: StrictBool = Field(
+        default=False, description="true: legal, but an encoder sends other bytes for these values"
+    )
 
     @property
     def parts(self) -> Mapping[str, object]:

@@ -32,6 +32,7 @@ Record = Mapping[str, Any]
 PEERS: Mapping[str, tuple[str, str]] = {
     "crsf": ("crsf_parser", "crsf-parser"),
     "modbus_rtu": ("pymodbus", "pymodbus"),
+    "msp": ("yamspy", "yamspy"),
     "pelco_d": ("ptz_control_lib", "pyptzcontroller"),
     "ubx": ("pyubx2", "pyubx2"),
     "vesc": ("pyvesc", "pyvesc"),

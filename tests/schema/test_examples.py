@@ -52,7 +52,8 @@ def example(name: str, message: Message, rng: random.Random) -> tuple[str, Any]:
     suffix = "" if direction == "message" else f"_{direction}"
     asked = [module(name).decode_request(after)] if after else []
     record = message_record(protocol(name), getattr(module(name), f"decode{suffix}")(wire, *asked))
-    del record["message"]
+    for told in ("message", "refused"):
+        record.pop(told, None)
     fields = record.pop("fields")
     key = "fields" if message.name == message.command else message.name.rpartition(".")[2]
     shown: dict[str, Any] = {"wire": wire.hex(" ").upper(), key: fields, **record}

@@ -53,10 +53,14 @@ class _Vectors:
 
     def of(self, message: MessagePlan) -> dict[str, Good]:
         """The vectors of a message by kind, and those of the document."""
-        examples = [each for each in self._protocol.examples if each.message == message.name]
+        examples = self._examples(message, decode_only=False)
         return {kind: self._one(message, kind) for kind in KINDS} | {
             f"{EXAMPLE}{number}": self._example(message, each) for number, each in enumerate(examples, 1)
         }
+
+    def _examples(self, message: MessagePlan, *, decode_only: bool) -> list[Example]:
+        of_message = (each for each in self._protocol.examples if each.message == message.name)
+        return [each for each in of_message if each.decode_only == decode_only]
 
     def _example(self, message: MessagePlan, example: Example) -> Good:
         direction = self._codec.plan.direction_of(message)
@@ -94,8 +98,11 @@ class _Vectors:
             kinds.setdefault((good.request, good.wire), []).append(kind)
         for same in kinds.values():
             yield self._row(same, vectors[same[0]])
+        message = vectors["defaults"].message
+        for each in self._examples(message, decode_only=True):
+            yield self._row([EXAMPLE], self._example(message, each)) | {"decode_only": True}
 
-    def _row(self, kinds: list[str], good: Good) -> Mapping[str, Json]:
+    def _row(self, kinds: list[str], good: Good) -> dict[str, Json]:
         named = dict.fromkeys(kind if kind in KINDS else EXAMPLE for kind in kinds)
         row: dict[str, Json] = {"message": good.message.name, "kinds": [*named]}
         if good.address is not None:

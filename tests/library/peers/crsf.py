@@ -18,6 +18,7 @@ _KINDS: Mapping[str, tuple[Any, Mapping[str, str]]] = {
         PacketsTypes.BATTERY_SENSOR,
         pairs("voltage=voltage current=current used=capacity remaining=remaining"),
     ),
+    "rc_channels": (PacketsTypes.RC_CHANNELS_PACKED, pairs("channels=channels")),
     "link_statistics": (
         PacketsTypes.LINK_STATISTICS,
         pairs("""
@@ -33,11 +34,17 @@ _STEPS = {"voltage": 10, "current": 10}
 UNKNOWN = frozenset({"attitude", "flight_mode", "gps", "heartbeat", "vario"})
 
 
+def _steps(field: str, value: Any) -> Any:
+    return round(value * _STEPS[field]) if field in _STEPS else value
+
+
 def build(record: Record) -> bytes | None:
     if record["message"] in UNKNOWN:
         return None
     number, named = _KINDS[record["message"]]
-    given = {named[each]: round(value * _STEPS.get(each, 1)) for each, value in record["fields"].items()}
+    given = {named[each]: _steps(each, value) for each, value in record["fields"].items()}
+    # Its list begins with the last channel.
+    given |= {"channels": given["channels"][::-1]} if "channels" in given else {}
     return bytes(crsf_build_frame(number, given))
 
 
@@ -47,7 +54,8 @@ def read(wire: bytes, direction: Direction) -> Record | None:
         return None
     found = crsf_frame.parse(wire)
     assert crsf_frame_crc(wire) == found.CRC
-    fields = {
-        each: int(found.payload[named]) / _STEPS.get(each, 1) for each, named in _KINDS[name][1].items()
-    }
+    fields = {}
+    for each, attribute in _KINDS[name][1].items():
+        value = found.payload[attribute]
+        fields[each] = list(value)[::-1] if isinstance(value, list) else int(value) / _STEPS.get(each, 1)
     return {"message": name, "fields": fields}

@@ -62,6 +62,12 @@ _KINDS: Mapping[str, tuple[type[ModbusPDU], Mapping[str, str]]] = {
             "start=address registers=registers",
             "start=address quantity=count",
         ),
+        (
+            "write_multiple_coils",
+            (bits.WriteMultipleCoilsRequest, bits.WriteMultipleCoilsResponse),
+            "start=address coils=bits",
+            "start=address quantity=count",
+        ),
         ("report_server_id", (other.ReportDeviceIdRequest, other.ReportDeviceIdResponse), "", ""),
         (
             "mask_write_register",
