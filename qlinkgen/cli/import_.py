@@ -152,6 +152,26 @@ def xlsx(
     return _written(file, output, lambda notes: read_xlsx(file, notes, options))
 
 
+@command.command("ksy")
+@click.argument("file", metavar="FILE.ksy", type=click.Path())
+@_common
+def ksy(file: str, name: str, output: str | None) -> int:
+    """Import a Kaitai Struct file.
+
+    A payload whose type is chosen by an earlier field makes the parts around it the frame, and each case a
+    message; without one, the file is one message. Types become records.
+
+    Computed instances, processes, positions and expressions other than fields, numbers and comparisons
+    cannot be taken.
+
+    \b
+    qlinkgen import ksy sensor.ksy -o sensor.yaml
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    from qlinkgen.importers.ksy import read_ksy  # noqa: PLC0415
+
+    return _written(file, output, lambda notes: read_ksy(file, notes, name=name))
+
+
 for _each in command.commands.values():
     _each.params.append(debug_option(hidden=True))
 

@@ -21,7 +21,7 @@ _SPECIAL = re.compile(
 )
 _BROKEN = re.compile(r":(?:\s|\Z)|\s#|[^\x20-\x7e\xa1-\ud7ff\ue000-\ufffd]")
 _IN_FLOW = re.compile(r"[,\[\]{}?:]")
-_KEY = re.compile(r"[a-z_][a-z0-9_]*\Z")
+_KEY = re.compile(r"(?:[a-z_][a-z0-9_]*|[0-9]+(?:\.\.[0-9]+)?)\Z")
 
 
 @dataclass
