@@ -87,7 +87,7 @@ def _of_field(field: Step | Member, span: Span) -> str:
         case BitsStep():
             return f"0x{number & field.integer.mask:0{2 * field.integer.size}X}"
         case BytesStep():
-            text = repr(span.raw.decode("ascii", "backslashreplace"))
+            text = repr(field.stripped(span.raw).decode("ascii", "backslashreplace"))
             return text if field.text else f"{len(span.raw)} bytes"
         case ItemsStep():
             number = number if field.packed else len(span.raw) // field.item_size

@@ -309,6 +309,8 @@ class Blob:
     text: bool
     length: Length
     default: bytes = b""
+    #: The byte that fills it up to its constant size; not part of the value. b"": it is not filled up.
+    pad: bytes = b""
     #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
 

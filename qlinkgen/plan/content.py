@@ -127,7 +127,6 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
             pattern = sum(_member_bits(member, values) << member.shift for member in step.members)
             return step.integer.pack(step.integer.signed_value(pattern))
         case BytesStep():
-            _count(step, values[step.name])
             return _octets(step, values[step.name])
         case ItemsStep():
             _count(step, values[step.name])
@@ -184,7 +183,11 @@ def _checked(name: str, number: Scalar, value: object) -> int:
 def _octets(step: BytesStep, value: object) -> bytes:
     if not isinstance(value, bytes) or (step.text and not value.isascii()):
         raise Unsendable(step.name, value)
-    return value
+    padded = step.padded(value)
+    if step.stripped(padded) != value:
+        raise Unsendable(step.name, value)
+    _count(step, padded)
+    return padded
 
 
 def _count(step: RunStep, value: object) -> int:
@@ -279,7 +282,7 @@ def _unpacked(step: Step, data: bytes, counts: Mapping[str, int], at: int) -> di
         case BitsStep():
             return _members(step, _valid(step.name, step.integer, (), data, at), at)
         case BytesStep():
-            taken = data[: counts.get(step.name, step.length.maximum)]
+            taken = step.stripped(data[: counts.get(step.name, step.length.maximum)])
             if step.text and not taken.isascii():
                 raise BadContent("range", step.name, at)
             return {step.name: taken}

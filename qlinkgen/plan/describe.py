@@ -166,7 +166,8 @@ def type_text(step: Step | Member) -> str:
         case CountStep() | BitsStep():
             return integer_text(step.integer)
         case BytesStep():
-            return f"{'text' if step.text else 'bytes'}[{_length_text(step.length)}]"
+            pad = f" padded with {step.pad.hex().upper()}" if step.pad else ""
+            return f"{'text' if step.text else 'bytes'}[{_length_text(step.length)}]{pad}"
         case ItemsStep():
             row = f" in a row of bits, {step.packed} first" if step.packed else ""
             return f"{_scalar_text(step.number)}[{_length_text(step.length)}]{row}"

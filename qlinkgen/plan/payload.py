@@ -152,6 +152,8 @@ class BytesStep:
     text: bool
     length: Length
     default: bytes
+    #: The byte that fills up a shorter value, which does not end with it; b"" if there is none.
+    pad: bytes
     required: bool
 
     #: Bytes of one item.
@@ -165,6 +167,19 @@ class BytesStep:
     def fixed(self) -> bool:
         """Whether the number of bytes is constant."""
         return self.length.fixed
+
+    @property
+    def least(self) -> int:
+        """Minimum number of bytes of the value."""
+        return 0 if self.pad else self.length.minimum
+
+    def padded(self, value: bytes) -> bytes:
+        """The bytes on the wire of a value."""
+        return value.ljust(self.length.maximum, self.pad) if self.pad else value
+
+    def stripped(self, data: bytes) -> bytes:
+        """The value of bytes on the wire."""
+        return data.rstrip(self.pad) if self.pad else data
 
 
 @dataclass(frozen=True)
@@ -488,7 +503,9 @@ class _Planner:
             case Bits():
                 return BitsStep(field.name, place, kind.container.integer, tuple(map(_member, kind.members)))
             case Blob():
-                return BytesStep(field.name, place, kind.text, kind.length, kind.default, kind.required)
+                return BytesStep(
+                    field.name, place, kind.text, kind.length, kind.default, kind.pad, kind.required
+                )
             case Array():
                 return ItemsStep(
                     field.name, place, kind.item.integer, kind.item, kind.length, kind.default, kind.required,

@@ -81,10 +81,26 @@ def build_blob(spec: FieldSpec, text: TypeText, payload_max: int, location: Loca
     length = build_length(text, 8, payload_max, location)
     if length is None:
         return None
+    if spec.pad is not None:
+        return _padded(spec, spec.pad, text, length, location)
     default = _blob_default(spec, text, length, location)
     fill = b" " if text.base == "text" else b"\0"
     required = spec.default is None and length.minimum > 0
-    return Blob(text.base == "text", length, default.ljust(length.minimum, fill), required)
+    return Blob(text.base == "text", length, default.ljust(length.minimum, fill), required=required)
+
+
+def _padded(spec: FieldSpec, pad: bytes, text: TypeText, length: Length, location: Location) -> Blob:
+    """Bytes or text whose value may be shorter than its constant size."""
+    if not length.fixed:
+        hint = f"write a constant size, like {text.base}[16]"
+        location.key_fault(
+            "not-applicable", "pad", f"'pad' has no effect on {text.base} of variable size", hint
+        )
+    if len(pad) != 1 or (text.base == "text" and pad > b"\x7f"):
+        what = "the pad is not one 7-bit character" if text.base == "text" else "the pad is not one byte"
+        location.fault("bad-value", "pad", what, "write one, like 00 or 20")
+    default = _blob_default(spec, text, Length(0, length.maximum), location)
+    return Blob(text.base == "text", length, default.rstrip(pad[:1]), pad[:1])
 
 
 def _blob_default(spec: FieldSpec, text: TypeText, length: Length, location: Location) -> bytes:

@@ -71,7 +71,9 @@ def _holds(kind: FieldType, other: FieldType) -> bool:
     """Whether a type can hold every value of another."""
     match kind:
         case Blob():
-            return isinstance(other, Blob) and kind.text == other.text and _longer(kind.length, other.length)
+            if not isinstance(other, Blob) or kind.text != other.text or kind.pad != other.pad:
+                return False
+            return _longer(kind.length, other.length)
         case Array():
             return (
                 isinstance(other, Array)

@@ -139,6 +139,9 @@ class FieldSpec(Fact):
     parts: list[WholeRange] | None = Field(
         default=None, description="Bit ranges in wire order; each begins a new byte"
     )
+    pad: ByteText | None = Field(
+        default=None, description="Byte that fills up text or bytes of a constant size; not part of the value"
+    )
     as_: Literal["bcd"] | None = Field(
         default=None, alias="as", description="Form of the number: bcd, two decimal digits a byte"
     )

@@ -112,6 +112,7 @@ class TypeBuilder:
             self._note_unbounded(text, location)
             return self._blob(spec, text, location)
         plain = self._scalars.named(text.base, location)
+        location.reject(spec, ("pad",), "numbers")
         if plain is None:
             return None
         if text.count is not None:

@@ -33,9 +33,10 @@ commands:
     id: 1
     request:
       key: {{type: "bytes[1..4]", default: {default}}}
+      name: {{type: "bytes[4]", pad: {pad}}}
     response: {{}}
 """
-USUAL = {"value": "A5 A5", "after": "A5 A5", "insert": "0x00", "default": '"00"'}
+USUAL = {"value": "A5 A5", "after": "A5 A5", "insert": "0x00", "default": '"00"', "pad": "00"}
 
 
 def frame(protocol: Protocol) -> DelimitedFrame:
@@ -55,12 +56,19 @@ def default(protocol: Protocol) -> bytes:
     return kind.default
 
 
+def pad(protocol: Protocol) -> bytes:
+    kind = protocol.message("go.request").fields[1].type
+    assert isinstance(kind, Blob)
+    return kind.pad
+
+
 #: Keys, and their values in the model.
 READ: dict[str, Callable[[Protocol], bytes]] = {
     "value": lambda protocol: frame(protocol).preamble,
     "after": lambda protocol: stuffing(protocol).after,
     "insert": lambda protocol: bytes([stuffing(protocol).insert]),
     "default": default,
+    "pad": pad,
 }
 every_key = pytest.mark.parametrize("key", READ)
 
@@ -108,8 +116,8 @@ def test_what_is_clear(tmp_path: Path, key: str, text: str, meant: str) -> None:
 @every_key
 @pytest.mark.parametrize("text", ["10 10", "'1010'", "1A1B", "0010", "'10 20 30'"])
 def test_pairs(tmp_path: Path, key: str, text: str) -> None:
-    if key == "insert":
-        with pytest.raises(SchemaError, match="bytes cannot be inserted"):
+    if key in ("insert", "pad"):
+        with pytest.raises(SchemaError, match=r"bytes cannot be inserted|the pad is not one byte"):
             loaded(tmp_path, key, text)
     else:
         assert READ[key](loaded(tmp_path, key, text)) == bytes.fromhex(text.strip("'"))

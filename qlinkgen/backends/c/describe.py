@@ -69,7 +69,8 @@ def field_rows(payload: PayloadPlan) -> list[str]:
 def _wire_type(step: Step) -> str:
     match step:
         case BytesStep():
-            return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]"
+            pad = f" padded with {step.pad.hex().upper()}" if step.pad else ""
+            return f"{'text' if step.text else 'bytes'}[{_length(step.length)}]{pad}"
         case ItemsStep():
             order = f" in a row, {step.packed} first" if step.packed else _order(step.item)
             return f"{_integer(step.item)}[{_length(step.length)}]{order}"
@@ -112,6 +113,7 @@ def member_note(value: Value, step: Holder) -> str:
             parts += _facts(step.number)
         case BytesStep():
             parts += ["7-bit characters"] if step.text else []
+            parts += [f"filled up with 0x{step.pad.hex().upper()}"] if step.pad else []
         case RecordStep() | RecordsStep():
             pass
         case _:

@@ -217,12 +217,14 @@ class MessageWriter:
                 items = ", ".join([self._record_init(each)] * max(1, least))
                 return f"{{{items}}}" if each.fixed else f"{least}U, {{{items}}}"
             case BytesStep():
-                octets = [unsigned(byte, 8, hexadecimal=True) for byte in each.default]
+                default: Sequence[int] = each.padded(each.default)
+                octets = [unsigned(byte, 8, hexadecimal=True) for byte in default]
             case ItemsStep():
-                octets = [scalar_literal(each.number, item) for item in each.default]
+                default = each.default
+                octets = [scalar_literal(each.number, item) for item in default]
             case _:
                 assert_never(each)
-        content = f"{{{', '.join(octets)}}}" if any(each.default) else "{0}"
+        content = f"{{{', '.join(octets)}}}" if any(default) else "{0}"
         return content if each.fixed else f"{len(octets)}U, {content}"
 
     def _record_init(self, each: RecordStep | RecordsStep) -> str:

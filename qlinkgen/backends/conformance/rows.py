@@ -200,7 +200,7 @@ def _value(header: Header, value: Value, step: Holder, fields: JsonObject, raw: 
             return number_bytes(number, header.width(step.number))
         case BytesStep():
             assert isinstance(native, bytes | str)
-            items = native.encode("ascii") if isinstance(native, str) else native
+            items = step.padded(native.encode("ascii") if isinstance(native, str) else native)
         case ItemsStep():
             assert isinstance(native, list)
             raws = raw if isinstance(raw, list) else None

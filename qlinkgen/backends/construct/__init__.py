@@ -32,7 +32,7 @@ _PACKAGE_DOC = '''\
 _SUPPORT = {
     "_fields": "ArrayField BitFields Bits Boolean BytesField Clear Count Groups Member Message OpenFlags "
     "Ranged Scaled TextField like",
-    "_packed": "BcdInteger PackedField",
+    "_packed": "BcdInteger PackedField PaddedBytesField PaddedTextField",
     "_frames": "CRC Address AddressBits Cell Check Constant ConstantBits DelimitedFrame Equal Fletcher Id "
     "IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
     "_ended": "Add Cobs Digits EndedFrame Escape Insert Pair",

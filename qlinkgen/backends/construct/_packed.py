@@ -1,4 +1,4 @@
-"""Decimal digits, and arrays of a few bits in a row: classes that only some protocols need.
+"""Decimal digits, padding, and arrays of a few bits in a row: classes that only some protocols need.
 
 Copied next to the modules that need it, unchanged.
 """
@@ -11,13 +11,14 @@ from construct import (
     Construct,
     Container,
     IntegerError,
+    StringError,
     ValidationError,
     stream_read,
     stream_read_entire,
     stream_write,
 )
 
-from ._fields import ArrayField, Row
+from ._fields import ArrayField, BytesField, Row
 
 
 class BcdInteger(Construct):
@@ -38,7 +39,9 @@ class BcdInteger(Construct):
         self, obj: object, stream: BinaryIO, context: Container, path: str
     ) -> object:
         if not isinstance(obj, int) or not 0 <= obj < 100**self.size:
-            raise IntegerError(f"{obj!r} does not have {2 * self.size} digits", path=path)
+            raise IntegerError(
+                f"{obj!r} does not have {2 * self.size} digits", path=path
+            )
         data = bytes.fromhex(f"{obj:0{2 * self.size}d}")[:: self.step]
         stream_write(stream, data, self.size, path)
         return obj
@@ -91,6 +94,42 @@ class PackedField(ArrayField):
             whole |= place.bits << self._shift(index, size)
         data = whole.to_bytes(size, "big" if self.most else "little")
         stream_write(stream, data, size, path)
+        return obj
+
+
+class PaddedBytesField(BytesField):
+    """A byte string of a constant size, filled up with ``pad``, with which the value does not end."""
+
+    def __init__(self, pad: bytes, minimum: int, maximum: int) -> None:
+        super().__init__(minimum, maximum)
+        self.pad = pad
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> bytes | str:
+        data: bytes = stream_read_entire(stream, path).rstrip(self.pad)
+        return data
+
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
+        data = bytes(obj)  # type: ignore[arg-type]
+        if len(data) > self.maximum or data.endswith(self.pad):
+            text = f"{obj!r} is too long, or ends with {self.pad!r}"
+            raise ValidationError(text, path=path)
+        stream_write(stream, data.ljust(self.maximum, self.pad), self.maximum, path)
+        return obj
+
+
+class PaddedTextField(PaddedBytesField):
+    """7-bit text of a constant size, filled up like PaddedBytesField."""
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> str:
+        data: bytes = stream_read_entire(stream, path).rstrip(self.pad)
+        if not data.isascii():
+            raise StringError(f"{data!r} is not 7-bit text", path=path)
+        return data.decode("ascii")
+
+    def _build(self, obj: Row, stream: BinaryIO, context: Container, path: str) -> Row:
+        if not isinstance(obj, str) or not obj.isascii():
+            raise StringError(f"{obj!r} is not 7-bit text", path=path)
+        super()._build(obj.encode("ascii"), stream, context, path)
         return obj
 
 

@@ -217,7 +217,8 @@ class _Field:
                 kind, default = (
                     ("TextField", step.default.decode()) if step.text else ("BytesField", step.default)
                 )
-                return self._run(step, kind, (), default)
+                kind, pad = (f"Padded{kind}", (step.pad,)) if step.pad else (kind, ())
+                return self._run(step, kind, pad, default)
             case ItemsStep():
                 kind, item = ("PackedField", _row(step)) if step.packed else ("ArrayField", ())
                 items = Sequence(tuple(_shown(step.number, each) for each in step.default))

@@ -1,4 +1,4 @@
-"""Rules for floating-point numbers.
+"""Rules for floating-point numbers, lists of any values, and padded values.
 
 Copied next to the modules that need it, unchanged.
 """
@@ -60,3 +60,19 @@ class ListRule(Rule):
         items = [self.item.plain(item) for item in value]
         same = all(new is old for new, old in zip(items, value, strict=True))
         return value if same and value.__class__ is list else items
+
+
+class PaddedRule(Rule):
+    """Bytes or text that are filled up with a byte, with which the value does not end."""
+
+    __slots__ = ("pad", "rule")
+
+    def __init__(self, rule: Rule, pad: bytes) -> None:
+        self.rule = rule
+        self.pad = pad
+        super().__init__(rule.name, f"{rule.legal} that do not end with {pad.hex()}")
+
+    def allows(self, value: Value) -> bool:
+        """Whether the value is legal, and does not end with the byte."""
+        data = value.encode() if isinstance(value, str) else bytes(value)
+        return self.rule.allows(value) and not data.endswith(self.pad)

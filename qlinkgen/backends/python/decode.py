@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from qlinkgen.backends.python import floats, integers, pieces, values
-from qlinkgen.backends.python.layout import WIDTH, indented, slice_of, wrapped
+from qlinkgen.backends.python.layout import WIDTH, indented, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute
 from qlinkgen.backends.python.place import Place
 from qlinkgen.backends.python.structs import format_of, table, tabled
@@ -451,13 +451,16 @@ class Decoder:
 
     def _bytes(self, step: BytesStep, at: Size) -> None:
         target = f"message.{attribute(step.name)}"
-        raw = f"{step.name}_raw" if step.text else target
+        raw = f"{step.name}_raw" if step.text or step.pad else target
         if step.fixed:
             row = self._row(at)
             row.codes.append(f"{step.length.maximum}s")
             row.targets.append(raw)
         else:
             self._slice(step, raw)
+        if step.pad:
+            value = raw if step.text else target
+            self._values.append(f"{value} = {raw}.rstrip({literal(step.pad)})")
         if step.text:
             self._refuse(f"not {raw}.isascii()", step.name, raw, _offset(step))
             self._values.append(f'{target} = {raw}.decode("ascii")')

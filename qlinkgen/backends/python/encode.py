@@ -297,8 +297,12 @@ class Encoder:
     def _bytes(self, step: BytesStep) -> None:
         if step.fixed:
             raw = self._octets(step)
-            self._terms.append(f"len({raw}) == {step.length.maximum}")
-            self._add(f"{step.length.maximum}s", raw)
+            self._terms.append(f"len({raw}) {'<=' if step.pad else '=='} {step.length.maximum}")
+            if step.pad:
+                self._terms.append(f"not {raw}.endswith({literal(step.pad)})")
+            # struct fills up with zeros.
+            filled = f"{raw}.ljust({step.length.maximum}, {literal(step.pad)})"
+            self._add(f"{step.length.maximum}s", filled if step.pad.strip(b"\0") else raw)
         else:
             self._pieces.append(f"{step.name}_raw")
 

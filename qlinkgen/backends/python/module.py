@@ -29,7 +29,7 @@ from qlinkgen.plan.tree import Plan
 _PUBLIC = ("Bus", "CodecError", "Command", "Counters", "DecodeError", "EncodeError", "Fault")
 #: Names of struct and of other modules; all others are imported from the support module.
 _STRUCT = ("Struct", "pack", "unpack", "unpack_from")
-_RULES = ("FloatRule", "ListRule")
+_RULES = ("FloatRule", "ListRule", "PaddedRule")
 _RECORD = "BaseRecord"
 _RECORDS = (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records")
 _ELSEWHERE = ("Decimal", "index", *_STRUCT, *_RULES, *_RECORDS)

@@ -176,7 +176,8 @@ def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
             return [rule for member in step.members for rule in _member_rules(member, place, scales)]
         case BytesStep():
             kind = "TextRule" if step.text else "BytesRule"
-            return [_rule(place, kind, name, step.length.minimum, step.length.maximum)]
+            rule = _rule(place, kind, name, step.least, step.length.maximum)
+            return [Call(place.use("PaddedRule"), [rule.flat, literal(step.pad)]) if step.pad else rule]
         case ItemsStep():
             length, item = step.length, step.number
             inner = _number_rule(step.name, item, place, scales)
@@ -237,7 +238,7 @@ def _facts(each: Holder, place: Place) -> str:
     match each:
         case BytesStep():
             kind = "characters" if each.text else "bytes"
-            return f"{span(each.length.minimum, each.length.maximum)} {kind}"
+            return f"{span(each.least, each.length.maximum)} {kind}"
         case ItemsStep():
             items, facts = span(each.length.minimum, each.length.maximum), _number_facts(each.number, place)
             return f"{items} items, each {facts}" if facts else f"{items} items"

@@ -79,7 +79,8 @@ class Rule:
                         found[member.name] = self._chosen(member.number, bits >> member.shift)
                 case BytesStep():
                     mask = 0x7F if step.text else 0xFF
-                    found[step.name] = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
+                    octets = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
+                    found[step.name] = step.stripped(octets)
                 case ItemsStep():
                     bits, count = self._bits(step.item), self._count(step.length)
                     found[step.name] = [self._chosen(step.number, bits) for _ in range(count)]

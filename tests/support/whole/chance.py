@@ -44,7 +44,9 @@ def _value(kind: Value, rng: random.Random, mark: int) -> Raw:
     if kind.item:
         return [_number(kind.item, rng, mark) for _ in range(count)]
     limit = 0x7F if kind.text else 0xFF
-    return bytes(rng.choice((rng.randint(0, limit), mark & limit, 0, limit)) for _ in range(count))
+    count = rng.randint(0, kind.most) if kind.pad else count
+    value = bytes(rng.choice((rng.randint(0, limit), mark & limit, 0, limit)) for _ in range(count))
+    return value.rstrip(kind.pad) if kind.pad else value
 
 
 def _record(kind: Record, rng: random.Random, mark: int) -> dict[str, Raw]:

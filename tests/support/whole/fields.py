@@ -437,7 +437,13 @@ class FieldMaker:
         roll = rng.random()
         if roll < 0.3 and not self.shape.groups:
             spec: Doc = {"type": f"bytes[{number}]"}
+            if roll < 0.1:
+                spec |= {"pad": rng.choice(("00", "20", "A5"))}
+                return spec | ({"default": "01"} if rng.random() < 0.5 else {}), number
             return spec | ({"default": "01" * number} if rng.random() < 0.5 else {}), number
+        if roll < 0.35 and self.shape.text:
+            spec = {"type": f"text[{number}]", "pad": rng.choice(("00", "20"))}
+            return spec | ({"default": "a"} if rng.random() < 0.5 else {}), number
         if roll < 0.5 and self.shape.text:
             spec = {"type": f"text[{number}]"}
             return spec | ({"default": "a" * number} if rng.random() < 0.5 else {}), number

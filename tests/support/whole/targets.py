@@ -416,6 +416,8 @@ def _words(kind: Value, raw: Any) -> Iterator[str]:
         yield str(len(raw))
         for record in raw:
             yield from _words(kind.record, record)
+    elif isinstance(kind, Run) and kind.pad:
+        yield raw.ljust(kind.most, kind.pad).hex()
     elif isinstance(raw, int):
         yield str(raw)
     else:
@@ -431,7 +433,7 @@ def _raw(kind: Value, words: Iterator[str]) -> Raw:
     if isinstance(kind, Number):
         return int(word)
     if kind.item is None:
-        return _bytes(word)
+        return _bytes(word).rstrip(kind.pad) if kind.pad else _bytes(word)
     return [int(each) for each in word.split(",")] if word != "-" else []
 
 

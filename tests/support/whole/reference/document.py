@@ -91,6 +91,8 @@ class Run:
     default: tuple[int, ...]
     #: Items of a few bits in a row, the first one in these bits.
     packed: str = ""
+    #: The byte that fills up a shorter value.
+    pad: bytes = b""
 
     @property
     def step(self) -> int:
@@ -369,6 +371,8 @@ class Fields:
             text = str(spec["default"])
             default = tuple(text.encode("ascii") if base == "text" else bytes.fromhex(text))
         fill = item.default if item else ord(" ") if base == "text" else 0
+        if "pad" in spec:
+            return Run(item, base == "text", low, high, default, pad=octets(spec["pad"]))
         filled = default + (fill,) * (low - len(default))
         return Run(item, base == "text", low, high, filled, spec.get("packed", ""))
 

@@ -128,6 +128,8 @@ def _number(number: Number, raw: Raw) -> int:
 
 def _encoded_run(kind: Run, given: Raw) -> bytes:
     assert not isinstance(given, int)
+    if kind.pad and isinstance(given, bytes):
+        given = given.ljust(kind.most, kind.pad)
     if not kind.low <= len(given) <= kind.most:
         raise Wrong("range", f"{len(given)} items")
     if kind.item and kind.packed:
@@ -212,6 +214,8 @@ def _decoded_run(kind: Run, data: bytes, number: int) -> Raw:
     if kind.item is None:
         if kind.text and any(each > 0x7F for each in data):
             raise Wrong("range", "text")
+        while kind.pad and data.endswith(kind.pad):
+            data = data[:-1]
         return data
     items = []
     for at in range(0, len(data), kind.step):
