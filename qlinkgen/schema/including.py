@@ -14,7 +14,7 @@ from qlinkgen.schema.source import Data, Path, Position, Source, parse
 _RULE = "bad-include"
 _KEY: Path = ("include",)
 #: Mappings that are taken over, by name; the rest belongs to one protocol.
-_GROUPS = ("enums", "flags", "types", "attributes", "replies", "commands", "messages")
+GROUPS = ("enums", "flags", "types", "attributes", "replies", "commands", "messages")
 #: Frames of the other document.
 _LEFT = "examples"
 
@@ -50,7 +50,7 @@ def include(source: Source, report: Reporter) -> tuple[str, ...]:
 
 def _merge(data: dict[str, Data], other: Mapping[str, Data]) -> None:
     """Add the entries of the groups; keys of an entry in the file replace those of the same entry."""
-    for group in _GROUPS:
+    for group in GROUPS:
         theirs, ours = other.get(group), data.get(group, {})
         if not isinstance(theirs, dict) or not isinstance(ours, dict):
             continue
@@ -71,5 +71,5 @@ def _without_examples(entry: Data) -> Data:
 def _place(ours: dict[Path, Position], theirs: Mapping[Path, Position], file: str) -> None:
     """Add the positions of what was added."""
     for path, position in theirs.items():
-        if path and path[0] in _GROUPS:
+        if path and path[0] in GROUPS:
             ours.setdefault(path, replace(position, file=file))

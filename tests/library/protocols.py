@@ -7,6 +7,7 @@ import importlib
 import importlib.util
 import json
 import random
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from qlinkgen.model.protocol import Protocol as Model
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.schema import find, library, load
+from qlinkgen.schema.including import GROUPS
 from tests.support.random_raw import random_address, random_values
 
 #: A message as `qlinkgen decode` prints it.
@@ -30,10 +32,14 @@ Record = Mapping[str, Any]
 
 #: Protocol to the module that it is held against and its name on PyPI.
 PEERS: Mapping[str, tuple[str, str]] = {
+    "cobs": ("cobs", "cobs"),
     "crsf": ("crsf_parser", "crsf-parser"),
+    "modbus_ascii": ("pymodbus", "pymodbus"),
     "modbus_rtu": ("pymodbus", "pymodbus"),
     "msp": ("yamspy", "yamspy"),
     "pelco_d": ("ptz_control_lib", "pyptzcontroller"),
+    "ppp": ("yahdlc", "python4yahdlc"),
+    "slip": ("sliplib", "sliplib"),
     "ubx": ("pyubx2", "pyubx2"),
     "vesc": ("pyvesc", "pyvesc"),
 }
@@ -102,3 +108,16 @@ def described(name: str) -> Described:
     """A protocol of the library."""
     model = load(find(name))
     return Described(model, plan_of(model), load_module(model))
+
+
+def text_of(name: str) -> str:
+    """The text of a schema, with what it includes: these have no group of blocks in common."""
+    text = find(name).read_text("utf-8")
+    included = re.search(r"^include: (\w+)\.yaml\n", text, re.MULTILINE)
+    if included is None:
+        return text
+    blocks = re.split(r"^(?=\w+:)", find(included[1]).read_text("utf-8"), flags=re.MULTILINE)
+    taken = "".join(block for block in blocks if block.partition(":")[0] in GROUPS)
+    return text.replace(included[0], "") + re.sub(
+        r"^    examples:\n(?:      - .*\n)+", "", taken, flags=re.MULTILINE
+    )

@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from qlinkgen.schema import find
-from tests.library.protocols import NAMES, PEERS, Record, described, peer
+from tests.library.protocols import NAMES, PEERS, Record, described, peer, text_of
 from tests.support.whole.trial import Effort, run_text
 
 #: Random messages of each protocol.
@@ -55,6 +54,6 @@ def _part_of(record: Record, read: Record) -> Record:
 def test_every_output_agrees(name: str, seed: int, require_tool: Callable[..., str]) -> None:
     for compiler in ("gcc", "clang"):
         require_tool(compiler, package=compiler)
-    outcome = run_text(find(name).read_text("utf-8"), seed, effort=Effort(messages=4, streams=24))
+    outcome = run_text(text_of(name), seed, effort=Effort(messages=4, streams=24))
     assert not outcome.refused
     assert not outcome.differences, outcome.report()

@@ -11,10 +11,8 @@ import pytest
 from qlinkgen.errors import SchemaError
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.schema import find, lint, load
+from qlinkgen.schema.including import GROUPS
 from tests.python.protocols import EVERY, SHIPPED, text_of
-
-#: Top-level blocks that are taken over.
-GROUPS = ("enums", "flags", "types", "attributes", "replies", "commands", "messages")
 
 
 def divided(text: str, folder: Path) -> Path:

@@ -1,0 +1,20 @@
+"""Modbus ASCII by pymodbus."""
+
+from __future__ import annotations
+
+from pymodbus.framer import FramerAscii
+
+from qlinkgen.model.message import Direction
+from tests.library.peers.modbus_rtu import UNKNOWN, framer, pdu_of, record_of
+from tests.library.protocols import Record
+
+__all__ = ["UNKNOWN", "build", "read"]
+
+
+def build(record: Record) -> bytes | None:
+    pdu = pdu_of(record)
+    return None if pdu is None else framer(FramerAscii, "request").buildFrame(pdu)
+
+
+def read(wire: bytes, direction: Direction) -> Record | None:
+    return record_of(framer(FramerAscii, direction).handleFrame(wire, 0, 0)[1])
