@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
-from qlinkgen.link import MasterEngine, SlaveEngine
+from qlinkgen.errors import Refused
+from qlinkgen.link import MasterEngine, Refusal, SlaveEngine
 from qlinkgen.transport import PtyPort, open_pty
 from qlinkgen.transport.blocking import BlockingMaster
 from qlinkgen.transport.conversation import timing_of
@@ -79,6 +81,17 @@ def test_our_master_reads_and_writes(master: BlockingMaster) -> None:
     assert master.engine.total.requests == master.engine.total.answers == 5
 
 
+def test_an_exception_ends_a_call_at_once_with_its_code(master: BlockingMaster) -> None:
+    codec: Any = described("modbus_rtu").module
+    begun = time.monotonic()
+    with pytest.raises(Refused) as caught:
+        master.transact(codec.ReadHoldingRegistersRequest(node=NODE, start=99, quantity=2))
+    assert time.monotonic() - begun < 0.5, "the response may take a second, and an attempt more"
+    reply: Any = caught.value.reply
+    assert reply.code == codec.ExceptionCode.ILLEGAL_DATA_ADDRESS
+    assert master.engine.total.requests == 1
+
+
 class Registers:
     """A node with a hundred registers."""
 
@@ -91,6 +104,9 @@ class Registers:
         codec = self._codec
         match request:
             case codec.ReadHoldingRegistersRequest(start=start, quantity=quantity):
+                if start + quantity > len(self.values):
+                    code = codec.ExceptionCode.ILLEGAL_DATA_ADDRESS
+                    raise Refusal(codec.ReadHoldingRegistersException(node=NODE, code=code))
                 return codec.ReadHoldingRegistersResponse(
                     node=NODE, registers=self.values[start : start + quantity]
                 )
@@ -126,6 +142,8 @@ def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers) -> None:
         assert not client.write_register(11, 0xABCD, device_id=NODE).isError()
         assert client.write_registers(20, [7, 8, 9], device_id=NODE).count == 3
         assert slave.values[11] == 0xABCD
+        refused = client.read_holding_registers(99, count=2, device_id=NODE)
+        assert (refused.isError(), refused.exception_code) == (True, 2)
         assert client.read_holding_registers(20, count=3, device_id=NODE).registers == [7, 8, 9]
     finally:
         client.close()  # type: ignore[no-untyped-call]
