@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, assert_never
 
 import pytest
 from construct import ConstructError
 
 from qlinkgen.backends import construct
-from qlinkgen.model.fields import Record, Records
+from qlinkgen.model.fields import Record, Records, Value
 from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Float, Scalar
@@ -47,20 +47,7 @@ class Both:
 
     def natives(self, message: Message, raws: Mapping[str, Raw]) -> dict[str, Any]:
         """Raw values in the types of construct."""
-        found: dict[str, Any] = {}
-        for value in (each for each in message.values if each.name in raws):
-            raw, kind = raws[value.name], value.type
-            if isinstance(kind, Scalar):
-                assert isinstance(raw, int)
-                found[value.name] = native_from_raw(kind, raw)
-            elif isinstance(raw, bytes):
-                assert isinstance(kind, Blob)
-                found[value.name] = raw.decode("ascii") if kind.text else raw
-            else:
-                assert isinstance(kind, Array)
-                assert isinstance(raw, list)
-                found[value.name] = [native_from_raw(kind.item, each) for each in raw]
-        return found
+        return _natives((value for value in message.values if value.name in raws), raws)
 
     def frame(self, message: Message) -> Direction:
         """The direction of the frame of the message."""
@@ -99,15 +86,37 @@ class Both:
         return found["message"], found.get(self.plan.frame.address), plain_numbers(found["fields"])
 
 
+def _natives(values: Iterable[Value], raws: Mapping[str, Raw]) -> dict[str, Any]:
+    return {value.name: _native(value, raws[value.name]) for value in values}
+
+
+def _native(value: Value, raw: Raw) -> Any:
+    kind = value.type
+    match kind:
+        case Scalar():
+            assert isinstance(raw, int)
+            return native_from_raw(kind, raw)
+        case Blob():
+            assert isinstance(raw, bytes)
+            return raw.decode("ascii") if kind.text else raw
+        case Array():
+            assert isinstance(raw, list)
+            return [native_from_raw(kind.item, each) for each in raw if isinstance(each, int)]
+        case Record():
+            assert isinstance(raw, Mapping)
+            return _natives(kind.layout.values, raw)
+        case Records():
+            assert isinstance(raw, list)
+            return [_natives(kind.layout.values, each) for each in raw if isinstance(each, Mapping)]
+        case _:
+            assert_never(kind)
+
+
 @cache
 def both(name: str) -> Both | None:
-    """The pair of a file or of a random schema; None if lint rejects it, or it has records."""
+    """The pair of a file or of a random schema; None if lint rejects it."""
     path = next((path for path in _FILES if path.stem == name), None)
     protocol = load(path) if path else loads(generate(int(name)), "random.yaml")[0]
-    if protocol and any(
-        isinstance(value.type, Record | Records) for each in protocol.messages for value in each.values
-    ):
-        return None
     return Both(protocol) if protocol else None
 
 

@@ -16,7 +16,6 @@ from construct import ConstructError, Container, EnumInteger, EnumIntegerString
 
 from qlinkgen.backends import construct
 from qlinkgen.backends.base import Options
-from qlinkgen.backends.construct._fields import Flags
 from qlinkgen.model.frame import MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
@@ -73,9 +72,10 @@ def plain_numbers(fields: Mapping[str, Any]) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     if isinstance(value, list):
         return [_plain(each) for each in value]
-    if isinstance(value, EnumIntegerString | EnumInteger | Flags):
-        return int(value)
-    return plain_numbers(value) if isinstance(value, Container) else value
+    if not isinstance(value, EnumIntegerString | EnumInteger | Container):
+        return value
+    # Generated modules have their own class of flags, which is known by its number.
+    return int(value) if hasattr(value, "__int__") else plain_numbers(value)
 
 
 class ConstructOutput:

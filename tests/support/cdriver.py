@@ -36,6 +36,7 @@ from qlinkgen.backends.base import Options
 from qlinkgen.model.message import Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Blob, Scalar
+from qlinkgen.plan.content import Raw
 from tests.support.cdriver_source import source
 from tests.support.sharing import made_once
 
@@ -104,7 +105,7 @@ class Driver:
         self.close()
 
 
-def raw_text(value: Value, raw: int | Sequence[int] | bytes) -> str:
+def raw_text(value: Value, raw: Raw) -> str:
     """A raw value in the format of the program."""
     if isinstance(value.type, Scalar):
         assert isinstance(raw, int)
@@ -112,5 +113,5 @@ def raw_text(value: Value, raw: int | Sequence[int] | bytes) -> str:
     if isinstance(value.type, Blob):
         assert isinstance(raw, bytes)
         return raw.hex() or "-"
-    assert not isinstance(raw, int)
+    assert isinstance(raw, list)
     return ",".join(str(item) for item in raw) or "-"

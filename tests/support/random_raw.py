@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Mapping
+from typing import TypeAlias, assert_never
 
-from qlinkgen.model.message import Message, Value
-from qlinkgen.model.types import Array, Blob, Flags, Float, Scalar
+from qlinkgen.model.fields import Layout, Record, Records, Value
+from qlinkgen.model.message import Message
+from qlinkgen.model.types import Array, Blob, Flags, Float, Length, Scalar
 
-Raw = int | list[int] | bytes
+Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | list[Mapping[str, Raw]]"
 
 
 def random_values(message: Message, rng: random.Random) -> list[Raw]:
@@ -46,18 +49,31 @@ def damaged(stream: bytes, rng: random.Random, alphabet: bytes) -> bytes:
 
 def _random(value: Value, rng: random.Random) -> Raw:
     kind = value.type
-    if isinstance(kind, Scalar):
-        return _number(kind, rng)
-    assert isinstance(kind, Array | Blob)
-    low, high = kind.length.minimum, kind.length.maximum
-    size = rng.choice((low, high, rng.randint(low, high), min(high, low + rng.randint(0, 4))))
-    if isinstance(kind, Array):
-        return [_number(kind.item, rng) for _ in range(size)]
-    assert isinstance(kind, Blob)
-    return bytes(
-        rng.choice((rng.randrange(256), 0xA5, 0x00, 0xFF, 0xFD)) & (0x7F if kind.text else 0xFF)
-        for _ in range(size)
-    )
+    match kind:
+        case Scalar():
+            return _number(kind, rng)
+        case Array():
+            return [_number(kind.item, rng) for _ in range(_size(kind.length, rng))]
+        case Blob():
+            return bytes(
+                rng.choice((rng.randrange(256), 0xA5, 0x00, 0xFF, 0xFD)) & (0x7F if kind.text else 0xFF)
+                for _ in range(_size(kind.length, rng))
+            )
+        case Record():
+            return _record(kind.layout, rng)
+        case Records():
+            return [_record(kind.layout, rng) for _ in range(_size(kind.length, rng))]
+        case _:
+            assert_never(kind)
+
+
+def _record(layout: Layout, rng: random.Random) -> Mapping[str, Raw]:
+    return {value.name: _random(value, rng) for value in layout.values}
+
+
+def _size(length: Length, rng: random.Random) -> int:
+    low, high = length.minimum, length.maximum
+    return rng.choice((low, high, rng.randint(low, high), min(high, low + rng.randint(0, 4))))
 
 
 def _number(kind: Scalar, rng: random.Random) -> int:
