@@ -85,6 +85,7 @@ class OtherReply(Protocol):
     """An answer other than the response, of a generated module."""
 
     means: str
+    switch: str
     cases: tuple[tuple[int, int, str], ...]
     within: tuple[float, float] | None
     after: tuple[float, float]
@@ -203,9 +204,14 @@ def address_getter(codec: Codec) -> Callable[[Message], int | None]:
     return attrgetter(name) if name else lambda _message: None
 
 
-def text_of(message: Message) -> str:
-    """Return the fields of a message as text; a single field without its name, no fields as the message."""
-    values = {name: getattr(message, name) for name in message.FIELDS}
+def reason_of(reply: OtherReply, command: Command, message: Message) -> str:
+    """Return why a node refuses: the field of the response that says so, or all fields of another reply."""
+    return text_of(message, [reply.switch] if reply.message is command.response else message.FIELDS)
+
+
+def text_of(message: Message, names: Sequence[str]) -> str:
+    """Return fields of a message as text; a single field without its name, no fields as the message."""
+    values = {name: getattr(message, name) for name in names if name}
     texts = {name: getattr(value, "name", "") or repr(value) for name, value in values.items()}
     if len(texts) == 1:
         return str(*texts.values()).lower()

@@ -23,7 +23,7 @@ from collections.abc import Mapping
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
 from qlinkgen.errors import Refused as RequestRefused
 from qlinkgen.link.attempts import Attempts
-from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, is_message, text_of
+from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, is_message, reason_of
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.echo import PROBE, EchoCanceller, EchoMode, EchoProbe
 from qlinkgen.link.events import (
@@ -317,7 +317,7 @@ class MasterEngine:
             return
         if (
             self._state is WAITING
-            and type(event) is self._pending.command.response
+            and type(event) is self._pending.command.plain
             and now >= self._earliest
             and self._pending.answered_by(event, self._address(event))
         ):
@@ -347,7 +347,7 @@ class MasterEngine:
                 self._line.free_at = max(self._line.free_at, now + self.timing.pause(reply))
                 self._line.await_quiet(now)
             else:
-                self._refused(message, now)
+                self._refused(reply, message, now)
         return True
 
     def _wait_on(self, reply: OtherReply, now: float) -> None:
@@ -358,11 +358,11 @@ class MasterEngine:
             attempts.patient_until = now + self.timing.patience(self._pending.command.definition, reply)
             self._deadline = max(self._deadline, attempts.patient_until)
 
-    def _refused(self, message: Framed, now: float) -> None:
+    def _refused(self, reply: OtherReply, message: Framed, now: float) -> None:
         pending, attempts = self._pending, self._attempts
         self._state = _ANSWERED[self._state]
         pending.count.refusals += 1
-        elapsed, reason = now - attempts.started, text_of(message)
+        elapsed, reason = now - attempts.started, reason_of(reply, pending.command.definition, message)
         node = "" if pending.node is None else f" by node {pending.node}"
         self._outcome = RequestRefused(
             f"{pending.request.NAME}: refused{node}: {reason}; {elapsed * 1e3:.1f} ms",

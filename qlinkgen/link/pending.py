@@ -58,6 +58,8 @@ class Pending:
         reply = self.command.replies.get(type(message))
         if reply is None or not self._from_asked(node):
             return None
+        if self.command.accepts is not None and type(message) is self.command.response:
+            return reply if self.command.accepts(self.request, message) else None
         same = all(getattr(message, name) == getattr(self.request, name) for name in reply.echoes)
         return reply if same else None
 

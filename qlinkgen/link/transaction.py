@@ -48,8 +48,8 @@ class CommandTiming:
     """Response and deadlines of a command, computed once instead of for each transaction."""
 
     __slots__ = (
-        "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "replies",
-        "response", "tries",
+        "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "plain",
+        "replies", "response", "tries",
     )  # fmt: skip
 
     def __init__(self, command: Command, timing: Timing, accepts: Accepts | None) -> None:
@@ -58,6 +58,8 @@ class CommandTiming:
         self.accepts = accepts
         self.echoes = command.echoes
         self.replies = command.replies
+        #: Class of the response if it answers in any case, whatever is in it.
+        self.plain = None if command.response in command.replies else command.response
         self.answers_broadcast = command.addressing == "answered_broadcast"
         self.allowance = timing.gap(command)
         self.answer_time = timing.deadline(command, 0)

@@ -95,5 +95,5 @@ class Protocol:
 
     @cached_property
     def replies(self) -> Mapping[str, Reply]:
-        """Answers other than responses, by the full name of their message."""
-        return {reply.message.name: reply for command in self.commands for reply in command.replies}
+        """Answers other than responses, and responses that may refuse, by the full name of their message."""
+        return {reply.message.name: reply for command in self.commands for reply in command.meant}

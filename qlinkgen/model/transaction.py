@@ -51,7 +51,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """An answer other than the response."""
+    """An answer other than the response, or a response that may refuse the request."""
 
     name: str
     message: Message
@@ -99,6 +99,8 @@ class Command:
     confirmed: bool = True
     #: Answers other than the response.
     replies: tuple[Reply, ...] = ()
+    #: What the response means, None if it always answers the request.
+    outcome: Reply | None = None
     #: Protocol-specific attributes; names and values are declared in the schema.
     attributes: Labels = field(default_factory=lambda: MappingProxyType({}))
 
@@ -106,6 +108,11 @@ class Command:
     def echoes(self) -> tuple[str, ...]:
         """Values of the response that repeat the value of the same name in the request."""
         return self.response.echoes if self.response else ()
+
+    @property
+    def meant(self) -> tuple[Reply, ...]:
+        """All answers that may mean something else than done; the response is the last one."""
+        return self.replies if self.outcome is None else (*self.replies, self.outcome)
 
     @property
     def messages(self) -> tuple[Message, ...]:

@@ -92,6 +92,7 @@ class CommandBuilder:
                 response_within=_allowance(spec.response_within or self._file.bus.response_within),
                 repeat=self._repeat(spec.repeat or defaults.repeat, request, path),
                 replies=self._other_replies(name, response, addressing),
+                outcome=self._replies.outcome(name, response),
                 in_flight=spec.in_flight or defaults.in_flight or 1,
                 doc=spec.doc,
                 section=self._section(spec),

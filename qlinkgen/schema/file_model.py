@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, get_args
 
 from pydantic import (
     BaseModel,
@@ -439,20 +439,50 @@ Addressing = Literal["node", "broadcast", "either", "answered_broadcast", "none"
 NoResponse = Literal["none"]
 
 
+Means = Literal["refused", "again", "pending", "done"]
+
+
+class MeansSpec(_Mapping):
+    """What an answer means, decided by one of its fields."""
+
+    switch: str | None = Field(default=None, description="Field that decides")
+    cases: dict[str | StrictInt, Means] = Field(
+        default_factory=dict, description="Meaning by value: a number, a range first..last, or a name"
+    )
+    default: Means | None = Field(
+        default=None, description="Meaning of all other values; default: refused, of a response done"
+    )
+
+
 class AnswerSpec(_Mapping):
     """The long form of a response: its number and its fields."""
 
     id: AnswerNumber | None = Field(default=None, description="Its number, if it is not that of the request")
     fields: Fields | None = Field(default=None, description="Its fields, in wire order")
+    means: Annotated[MeansSpec, ShortForm("default", "string")] | None = Field(
+        default=None, description="What it means, if one of its fields may refuse the request"
+    )
+    within: Time | None = Field(
+        default=None, description="Time from a pending answer to the last one; default: that of the response"
+    )
+    after: Time | None = Field(
+        default=None, description="Pause before the request is sent again; default: none"
+    )
 
 
 def _is_long(value: Mapping[str, object]) -> bool:
     """Whether a response has the long form: only its keys, and values that no field has."""
-    if not value or not value.keys() <= {"id", "fields"}:
+    if not value or not value.keys() <= AnswerSpec.model_fields.keys():
         return False
     if "fields" in value:
         return isinstance(value["fields"], dict)
-    return _is_answer_id(value["id"])
+    return _is_means(value["means"]) if "means" in value else _is_answer_id(value.get("id"))
+
+
+def _is_means(value: object) -> bool:
+    if isinstance(value, dict):
+        return value.keys() <= MeansSpec.model_fields.keys()
+    return value in get_args(Means)
 
 
 def _is_answer_id(value: object) -> bool:
@@ -486,18 +516,6 @@ Response = Annotated[
     Discriminator(_response_form),
     _AnyForm,
 ]
-
-Means = Literal["refused", "again", "pending", "done"]
-
-
-class MeansSpec(_Mapping):
-    """What a reply means, decided by one of its fields."""
-
-    switch: str | None = Field(default=None, description="Field of the reply that decides")
-    cases: dict[str | StrictInt, Means] = Field(
-        default_factory=dict, description="Meaning by value: a number, a range first..last, or a name"
-    )
-    default: Means = Field(default="refused", description="Meaning of all other values")
 
 
 class ReplySpec(Fact):

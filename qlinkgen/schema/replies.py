@@ -9,7 +9,7 @@ from qlinkgen.model.frame import Frame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
 from qlinkgen.model.types import Enum, Float, Scalar
-from qlinkgen.schema.file_model import MeansSpec, ReplySpec, SchemaFile
+from qlinkgen.schema.file_model import AnswerSpec, Means, MeansSpec, ReplySpec, SchemaFile
 from qlinkgen.schema.messages import MessageBuilder, Written
 from qlinkgen.schema.notation import AnswerId, Duration, shown, whole_range
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -63,6 +63,15 @@ def reply_messages(file: SchemaFile) -> Iterator[tuple[str, Path]]:
                 yield name, each.path
 
 
+class _Meaning(NamedTuple):
+    """What an answer means as written, and otherwise."""
+
+    spec: MeansSpec
+    otherwise: Means
+    within: Duration | None
+    after: Duration | None
+
+
 class ReplyBuilder:
     """Checks what replies mean, and builds them."""
 
@@ -103,7 +112,9 @@ class ReplyBuilder:
                 hint, needs = "remove it, or describe a frame with parts", (written.path, ("frame",))
                 self._report.error(_RULE, written.path, what, hint, of_key=True, needs=needs)
             elif written.name not in _TAKEN:
-                yield self._reply(written, self._message(command, written, addressing))
+                reply, message = written.spec, self._message(command, written, addressing)
+                meaning = _Meaning(reply.means, "refused", reply.within, reply.after)
+                yield self._reply(written.name, message, meaning, written.path)
 
     def _message(self, command: str, written: OfCommand, addressing: Addressing) -> Message:
         if written.shared and written.name in self._shared:
@@ -117,24 +128,34 @@ class ReplyBuilder:
             self._shared[written.name] = message
         return message
 
-    def _reply(self, written: OfCommand, message: Message) -> Reply:
+    def outcome(self, command: str, response: Message | None) -> Reply | None:
+        """What the response of a command means, None if it always answers the request."""
+        own, common = self._file.commands[command].response, self._file.defaults.response
+        for spec, path in ((own, ("commands", command, "response")), (common, ("defaults", "response"))):
+            if isinstance(spec, AnswerSpec) and spec.means is not None and response is not None:
+                means = _Meaning(spec.means, "done", spec.within, spec.after)
+                found = self._reply("response", response, means, path)
+                return found if found.meanings != ("done",) else None
+        return None
+
+    def _reply(self, name: str, message: Message, meaning: _Meaning, path: Path) -> Reply:
         """The reply that a message is."""
-        spec = written.spec
-        path = (*written.path, "means")
+        spec = meaning.spec
         reply = Reply(
-            name=written.name,
+            name=name,
             message=message,
-            means=spec.means.default,
-            switch=spec.means.switch or "",
-            cases=tuple(self._cases(spec.means, message, path)),
-            within=_allowance(spec.within) if spec.within else None,
-            after=_allowance(spec.after) if spec.after else Allowance(),
+            means=spec.default or meaning.otherwise,
+            switch=spec.switch or "",
+            cases=tuple(self._cases(spec, message, (*path, "means"))),
+            within=_allowance(meaning.within) if meaning.within else None,
+            after=_allowance(meaning.after) if meaning.after else Allowance(),
         )
-        for key, means in (("within", "pending"), ("after", "again")):
-            if getattr(spec, key) is not None and means not in reply.meanings:
-                place = (*written.path, key)
-                what = f"{key} has no effect: {written.name} never means {means}"
-                self._report.error(_RULE, place, what, f"remove it, or let it mean {means}", of_key=True)
+        times = {"within": ("pending", meaning.within), "after": ("again", meaning.after)}
+        for key, (means, given) in times.items():
+            if given is not None and means not in reply.meanings:
+                what = f"{key} has no effect: {name} never means {means}"
+                hint = f"remove it, or let it mean {means}"
+                self._report.error(_RULE, (*path, key), what, hint, of_key=True)
         return reply
 
     def _cases(self, spec: MeansSpec, message: Message, path: Path) -> Iterator[Case]:

@@ -174,6 +174,36 @@ def test_done_is_an_answer_of_another_form(pump: ModuleType, engine: MasterEngin
     assert outcome.response == pump.ReadFault(node=3, number=5, reason=4)
 
 
+@pytest.mark.parametrize("form", ["response", "defaults"])
+def test_a_response_refuses_by_one_of_its_fields(form: str) -> None:
+    means = "means: {switch: reason, cases: {busy: again, 1: refused}}"
+    fields = "fields: {reason: reason, value: u16}"
+    text = SCHEMA.replace(
+        "id: request.id + 0x40, fields: {number: {type: u8, echo: true}, value: u16}",
+        f"{fields}, {means}" if form == "response" else fields,
+    )
+    if form == "defaults":
+        text = text.replace("repeat: unsafe}", f"repeat: unsafe, response: {{{means}}}}}")
+        text = text.replace("response: {}", "response: {means: done, fields: {}}")
+    protocol, faults = loads(text, "pump.yaml")
+    assert protocol is not None, faults
+    pump = load_codec(protocol)
+    engine = MasterEngine(pump, Timing.of(pump, host_slack=SLACK))
+
+    def told(reason: int) -> bytes:
+        frame: bytes = pump.ReadResponse(node=3, reason=reason, value=7).to_frame()
+        return frame
+
+    error = run(engine, ask(pump), (0.012, told(1))).error
+    assert isinstance(error, Refused)
+    assert (error.reason, type(error.reply)) == ("wrong", pump.ReadResponse)
+    again = run(engine, ask(pump), (1.012, told(2)), (1.03, told(0)), now=1.0)
+    assert again.response.value == 7
+    assert len(again.sent) == 2
+    set_response = pump.SetResponse(node=3).to_frame()
+    assert run(engine, pump.SetRequest(node=3), (2.012, set_response), now=2.0).reply is not None
+
+
 def test_the_worst_case_has_room_for_patience_and_repeats(pump: ModuleType, engine: MasterEngine) -> None:
     command = pump.COMMANDS["read"]
     worst = engine.timing.worst_case(command)

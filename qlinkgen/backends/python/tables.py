@@ -92,7 +92,7 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     if within.seconds:
         arguments.append(f"response_seconds={_number(within.seconds)}")
     arguments += _repetition(command)
-    replies = [_reply(each, kept[each.message.name]) for each in command.replies if each.message.name in kept]
+    replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
     if replies:
         arguments.append(f"replies={_tuple(replies)}")
     if command.in_flight != 1:

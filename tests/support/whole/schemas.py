@@ -17,6 +17,7 @@ _PLAIN = re.compile(r"[a-z][a-z0-9_]*\Z", re.ASCII)
 _YAML_WORDS = frozenset("true false null yes no on off y n nan inf".split())  # noqa: SIM905
 #: One in this number of schemas has mostly fields of variable size.
 _VARIABLE = 5
+_MEANS = ("refused", "again", "pending", "done")
 #: Mappings below this depth are written on one line.
 _BLOCKS = 4
 
@@ -212,6 +213,8 @@ class _Maker:
             number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None and rng.random() < 0.4:
                 spec["response"] = {"id": number, "fields": spec["response"]}
+                if means := self._means(spec["response"]["fields"]):
+                    spec["response"]["means"] = means
         taken = {*found["commands"], *found["messages"], "request", "response"}
         if answered and rng.random() < 0.7:
             relative = rng.random() < 0.6
@@ -246,14 +249,20 @@ class _Maker:
         rng = self.rng
         fields = maker.fields(Room.of(shape))
         reply: Doc = {"id": number, "fields": fields}
-        plain = [name for name, spec in fields.items() if spec in ("u8", "u16")]
-        kinds = ("refused", "again", "pending", "done")
-        if plain and rng.random() < 0.5:
-            cases = {rng.choice((0, 1, "2..9", 100)): rng.choice(kinds) for _ in range(2)}
-            reply["means"] = {"switch": rng.choice(plain), "cases": cases, "default": rng.choice(kinds)}
+        if means := self._means(fields):
+            reply["means"] = means
         elif rng.random() < 0.5:
-            reply["means"] = rng.choice(kinds)
+            reply["means"] = rng.choice(_MEANS)
         return self._described(reply)
+
+    def _means(self, fields: Doc) -> Doc:
+        """What one of the fields decides, or nothing."""
+        rng = self.rng
+        plain = [name for name, spec in fields.items() if spec in ("u8", "u16")]
+        if not plain or rng.random() < 0.5:
+            return {}
+        cases = {rng.choice((0, 1, "2..9", 100)): rng.choice(_MEANS) for _ in range(2)}
+        return {"switch": rng.choice(plain), "cases": cases, "default": rng.choice(_MEANS)}
 
     def _response(self, shape: Shape, maker: FieldMaker, request: Doc) -> Doc:
         echoes: Doc = {}

@@ -592,7 +592,7 @@ def _answer(own: Any, common: Any) -> Any:
 def _long(given: Any) -> Doc:
     if given == "none":
         return {}
-    is_long = given.keys() <= {"id", "fields"} and (
+    is_long = given.keys() <= {"id", "fields", "means"} and (
         isinstance(given.get("fields"), dict)
         or ("fields" not in given and re.match(r"\d|request", str(given.get("id", ""))))
     )
