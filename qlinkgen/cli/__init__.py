@@ -16,6 +16,7 @@ COMMANDS = {
     "generate": "Write Python, C, construct and vectors for protocols, or check that they are up to date.",
     "lint": "Check schema files; report every error with its line, column, rule and fix.",
     "list": "List the protocols of qlinkgen.",
+    "init": "Write a schema to begin with.",
     "import": "Write a schema from a C header, a table and other formats.",
     "show": "Show a protocol or a message: layout, sizes, transactions.",
     "encode": "Encode values as wire bytes.",
