@@ -9,6 +9,7 @@ from qlinkgen.model.types import Enum, Flags, NamedValue
 from qlinkgen.schema.file_model import EnumSpec, FlagsSpec
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.synonyms import type_hint
 
 #: Maximum width of an integer.
 MAX_BITS = 64
@@ -54,6 +55,7 @@ def _carrier(text: str, path: Path, report: Reporter, *, signed: bool) -> tuple[
     if found is None or (found[1] and not signed):
         kind = "an integer" if signed else "an unsigned integer"
         hint = "use u8, u16, i32 and so on" if signed else "use u8, u16, u24 and so on"
+        hint = type_hint(text) or hint
         report.error("unknown-type", (*path, "type"), f"'{text}' is not {kind} type", hint, needs=(path,))
         report.taint(path)
         return MAX_BITS, False

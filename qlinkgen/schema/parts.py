@@ -14,6 +14,7 @@ from qlinkgen.schema.notation import shown
 from qlinkgen.schema.pieces import PieceBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.synonyms import type_hint
 
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
 _SINGLE_ROLES = ("length", "address", "direction", "payload", "terminator")
@@ -203,7 +204,8 @@ class PartBuilder:
                 self._lacks("type", f"add type: {kinds}", path)
             else:
                 what = f"{shown(spec.type)} is not a type for a part of a frame"
-                self._report.error("unknown-type", (*path, "type"), what, f"use {kinds}")
+                hint = type_hint(spec.type) or f"use {kinds}"
+                self._report.error("unknown-type", (*path, "type"), what, hint)
             self._report.taint((*path, "type"))
             size = 1
         chunks = byte_chunks(size, spec.byteorder or self._file.byteorder)

@@ -27,6 +27,7 @@ from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.numbers import defaulted, quantified
 from qlinkgen.schema.report import did_you_mean
+from qlinkgen.schema.synonyms import type_hint
 
 FIXED = re.compile(r"(?P<sign>u?)fixed(?P<whole>[0-9]{1,2})\.(?P<fraction>[0-9]{1,2})\Z", re.ASCII)
 FLOAT = re.compile(r"f(?P<bits>16|32|64)\Z", re.ASCII)
@@ -79,8 +80,8 @@ class ScalarBuilder:
         #: Names of types in use.
         self.used: set[str] = set()
 
-    def named(self, base: str, location: Location) -> Plain | None:
-        """The type with a name; an unknown one is reported."""
+    def named(self, base: str, location: Location, count: str | None = None) -> Plain | None:
+        """The type with a name; an unknown one is reported. ``count`` is the text of its brackets."""
         self.used.add(base)
         plain = self.plain(base)
         if plain is None:
@@ -96,7 +97,8 @@ class ScalarBuilder:
                 "i32",
                 *KEYWORDS,
             ]
-            hint = did_you_mean(base, known, "define it under types, enums or flags")
+            written = base if count is None else f"{base}[{count}]"
+            hint = type_hint(written) or did_you_mean(base, known, "define it under types, enums or flags")
             places = [(group, base) for group in ("types", "enums", "flags")]
             what = f"unknown type {shown(base)}"
             location.report.error(

@@ -15,10 +15,11 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT
-from qlinkgen.schema.file_model import BRANCH, SchemaFile
+from qlinkgen.schema.file_model import BRANCH, FieldSpec, SchemaFile
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Data, Path
+from qlinkgen.schema.synonyms import key_hint, value_hint
 
 #: Placeholders of required keys, so that the rest of their mapping can be validated.
 _STAND_INS: dict[str, Data] = {
@@ -84,14 +85,17 @@ class _Round:
         """Keys of a mapping of which unknown keys are probably misspellings."""
         unknown = [path for detail, path in self._details if detail["type"] == "extra_forbidden"]
         known = _keys_at(parent)
-        hints = [did_you_mean(str(path[-1]), known) for path in unknown if path[:-1] == parent]
-        return {key for key in known if f"did you mean '{key}'?" in hints}
+        words = [str(path[-1]) for path in unknown if path[:-1] == parent]
+        hints = [key_hint(word, known, field=False) or did_you_mean(word, known) for word in words]
+        meant = {hint.partition(":")[0] for hint in hints}
+        return {key for key in known if meant & {f"did you mean '{key}'?", f"write {key}"}}
 
     def _wrong(self, detail: ErrorDetails, path: Path) -> None:
         kind, seen = detail["type"], detail["input"]
         if kind == "extra_forbidden":
             key, known = str(path[-1]), _keys_at(path[:-1])
-            hint = did_you_mean(key, known, f"known here: {listed(known)}")
+            hint = key_hint(key, known, field=_is_field(path[:-1]))
+            hint = hint or did_you_mean(key, known, f"known here: {listed(known)}")
             self._report.error("unknown-key", path, f"unknown key {shown(key)}", hint, of_key=True, needs=())
             return
         rule, what, hint = _explained(kind, seen, detail)
@@ -119,7 +123,9 @@ def _explained(kind: str, seen: object, detail: ErrorDetails) -> tuple[str, str,
     context = detail.get("ctx", {})
     if kind == "literal_error":
         allowed = [word.strip("'") for word in context["expected"].replace(" or ", ", ").split(", ")]
-        hint = did_you_mean(str(seen), allowed, f"use {listed(allowed, 'or')}")
+        hint = value_hint(str(seen), allowed) or did_you_mean(
+            str(seen), allowed, f"use {listed(allowed, 'or')}"
+        )
         return "bad-value", f"{shown(seen)} is not allowed here", hint
     if kind == CONTROL_CHARACTER:
         return kind, context["seen"], HINT
@@ -195,6 +201,11 @@ def _mapping_type(annotation: object) -> object:
         return annotation
     found = (_mapping_type(part) for part in get_args(annotation))
     return next((each for each in found if each is not None), None)
+
+
+def _is_field(path: Path) -> bool:
+    model = _model_at(path)
+    return model is not None and issubclass(model, FieldSpec)
 
 
 def _keys_at(path: Path) -> list[str]:

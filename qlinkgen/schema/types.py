@@ -111,7 +111,7 @@ class TypeBuilder:
         if text.base in ("bytes", "text"):
             self._note_unbounded(text, location)
             return self._blob(spec, text, location)
-        plain = self._scalars.named(text.base, location)
+        plain = self._scalars.named(text.base, location, text.count)
         location.reject(spec, ("pad",), "numbers")
         if plain is None:
             return None
