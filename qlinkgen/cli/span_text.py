@@ -37,6 +37,7 @@ _AROUND = {
     Around.BEFORE: ("(noise)", "before the frame"),
     Around.LOST: ("(preamble)", "rest of the preamble"),
     Around.INSERTED: ("(stuffing)", "inserted"),
+    Around.UNCLEAR: ("(coded)", "cannot be decoded"),
     Around.EXTRA: ("(extra)", "outside all fields"),
     Around.NEXT: ("(next frame)", "begins inside this one"),
     Around.AFTER: ("(after)", "not part of the frame"),

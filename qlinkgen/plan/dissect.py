@@ -557,67 +557,81 @@ class _EndedWalk(_Walk):
     def _divide(self, front: Sequence[Part]) -> None:
         del front
         assert isinstance(self.frame.end, ByTerminator)
-        last, wire = self.frame.end.part, self.wire
-        lost = self.envelope.parts[0] if self.no_preamble else None
-        start = self.cursor.at - (self.wanted[lost.name] if lost else 0)
-        stop = wire.find(last.data, start + len(self.envelope.preamble))
+        last, wire, start = self.frame.end.part, self.wire, self.cursor.at
+        size = 0 if self.no_preamble else len(self.envelope.preamble)
+        first = min(start + size, len(wire))
+        stop = wire.find(last.data, first)
         end = len(wire) if stop < 0 else min(len(wire), stop + last.size + self.frame.end.after)
-        plain = self._decoded(start, len(wire) if stop < 0 else stop)
-        places = [*plain, *((at, wire[at]) for at in range(len(wire) if stop < 0 else stop, end))]
+        content = self._as_sent(start, first) + self._decoded(first, len(wire) if stop < 0 else stop)
         self.cursor.at = end
-        self._allot(places[max(0, -start) :] if lost else places, whole=stop >= 0)
+        self._allot(content, self._as_sent(stop, end) if stop >= 0 else None)
         self._identify()
-        if stop < 0 and self.kind == "length":
-            self._fault("length", Rule.TERMINATOR, len(wire), last)
         if self.message is not None:
             self.envelope = self.message.envelope
+        limit = start + self.frame.max_wire - self.frame.end.after
+        if self.kind == "length" and not 0 <= stop <= limit - last.size:
+            self._fault("length", Rule.TERMINATOR, len(wire), last)
 
-    def _decoded(self, start: int, stop: int) -> list[tuple[int, int]]:
-        """Offset and value of each byte before the terminator."""
+    def _as_sent(self, first: int, end: int) -> list[tuple[int, int]]:
+        """Offset and value of bytes that are not coded."""
+        return [(at, self.wire[at]) for at in range(first, end)]
+
+    def _decoded(self, first: int, stop: int) -> list[tuple[int, int]]:
+        """Offset and value of each byte from the first constant to the terminator."""
         coded, last = self.frame.transparency, self.frame.end
         assert isinstance(coded, Coded)
         assert isinstance(last, ByTerminator)
-        back = coded.back - last.part.size - last.after
-        first, end = max(start + coded.front, self.cursor.at), max(start + coded.front, stop - back)
-        read = coded.read(self.wire[first:end])
-        before = first
-        found = [(at, self.wire[at]) for at in range(max(start, 0), min(first, stop))]
+        inner = min(stop, first + coded.front - len(self.envelope.preamble))
+        end = max(inner, stop - (coded.back - last.part.size - last.after))
+        read, before, found = coded.read(self.wire[inner:end]), inner, self._as_sent(first, inner)
         for byte, place in zip(read.plain, read.places, strict=True):
             found.append((before, byte))
-            self.units[before] = range(before, first + place + 1)
-            before = first + place + 1
+            self.units[before] = range(before, inner + place + 1)
+            before = inner + place + 1
         if read.wrong is not None:
-            at = first + read.wrong
+            at = inner + read.wrong
             self._fault("stuffing", Rule.STUFFING, at, seen=self.wire[at] if at < end else None)
-            self._around(Around.EXTRA, range(before, end), "stuffing")
-        elif found and before < end:
+        if before < end and (read.wrong is not None or len(found) == inner - first):
+            self._around(Around.UNCLEAR, range(before, end), "stuffing" if read.wrong is not None else "")
+        elif before < end:
             self.units[found[-1][0]] = range(found[-1][0], end)
-        return [*found, *((at, self.wire[at]) for at in range(max(end, first), stop))]
+        return found + self._as_sent(end, stop)
 
-    def _allot(self, places: Sequence[tuple[int, int]], *, whole: bool) -> None:
-        """Give each part its bytes."""
+    def _allot(self, content: Sequence[tuple[int, int]], closing: Sequence[tuple[int, int]] | None) -> None:
+        """Give each part its bytes; ``closing`` is the terminator and what follows it, None without one."""
+        assert isinstance(self.frame.end, ByTerminator)
         parts = [part for part in self.envelope.parts if part.name not in self.cells]
-        fixed = sum(part.size for part in parts)
-        left = len(places) - (fixed if whole else sum(part.size for part in self.envelope.front))
-        size, at = max(0, left), 0
+        last, payload = parts.index(self.frame.end.part), self.envelope.payload
+        before = parts[:last] if closing is not None else parts[: parts.index(payload)]
+        fixed = sum(part.size for part in before)
+        size = max(0, len(content) - fixed)
+        self._give(parts[:last], content, size, whole=closing is not None)
+        self._give(parts[last:], closing or (), size, whole=False)
+        unclear = any(each.rule is Rule.STUFFING for each in self.faults)
+        if closing is not None and not unclear and not payload.least <= len(content) - fixed <= payload.most:
+            places = self._found(payload).places
+            self._fault("length", Rule.SIZE, places[0] if places else self.cursor.at, payload, size)
+
+    def _give(
+        self, parts: Sequence[Part], content: Sequence[tuple[int, int]], size: int, *, whole: bool
+    ) -> None:
+        at = 0
         for part in parts:
             wanted = size if isinstance(part, PayloadPart) else part.size
-            own = places[at : at + wanted]
+            own = content[at : at + wanted]
             at += len(own)
-            offsets = tuple(place for place, _ in own)
-            sent = self._sent(offsets)[1]
-            self.cells[part.name] = Cell(bytes(byte for _, byte in own), offsets, sent)
-            self.wanted[part.name] = wanted if self.wanted_all(whole) else len(own)
-        payload = self.envelope.payload
-        if whole and (left < payload.least or left > payload.most):
-            self._fault("length", Rule.SIZE, places[0][0] if places else self.cursor.at, payload, size)
-
-    def wanted_all(self, whole: bool) -> bool:
-        """Whether missing bytes are reported as such."""
-        return not whole
+            places = tuple(place for place, _ in own)
+            data = bytes(byte for _, byte in own)
+            self.cells[part.name] = Cell(data, places, self._sent(places)[1])
+            self.wanted[part.name] = len(own) if whole else wanted
 
     def _close_cells(self) -> None:
         """Cells have their bytes as sent already."""
+
+    def _displaced(self, part: CheckPart) -> bool:
+        del part
+        incomplete = any(len(self._found(each).data) < each.size for each in self.envelope.parts)
+        return self.no_preamble or incomplete or any(each.rule is Rule.STUFFING for each in self.faults)
 
     def _length(self, part: LengthPart) -> None:
         number, size = self._number_in(part, part.integer), len(self._found(self.envelope.payload).data)

@@ -21,6 +21,8 @@ class Around(Enum):
     LOST = "lost"
     #: An inserted byte.
     INSERTED = "inserted"
+    #: A coded byte that cannot be decoded, or that follows one.
+    UNCLEAR = "unclear"
     #: In the payload, after the last step.
     EXTRA = "extra"
     #: The next frame, which begins before this one is complete.

@@ -15,6 +15,7 @@ from qlinkgen.plan.framing import (
     AddressPart,
     ByLength,
     ByMark,
+    ByTerminator,
     CheckPart,
     ConstantPart,
     IdPart,
@@ -88,9 +89,9 @@ def _check_place(found: Dissection, fault: Fault) -> None:
         case Rule.FIRST:
             assert (fault.at, seen) == (0, len(rest[Around.BEFORE])), what
             assert _begins(found, len(rest[Around.BEFORE])), what
-        case Rule.WHOLE:
+        case Rule.WHOLE | Rule.TERMINATOR:
             assert fault.at == len(wire), what
-            assert seen, what
+            assert seen or fault.rule is Rule.TERMINATOR, what
         case Rule.LAST:
             assert (fault.at, seen) == (rest[Around.AFTER][0], len(rest[Around.AFTER])), what
         case Rule.ALONE:
@@ -99,6 +100,8 @@ def _check_place(found: Dissection, fault: Fault) -> None:
         case Rule.STUFFING if seen is not None:
             assert wire[fault.at] == seen, what
         case Rule.STUFFING | Rule.SIZE:
+            if fault.rule is Rule.STUFFING and isinstance(found.plan.frame.end, ByTerminator):
+                return
             inside = _payload_places(found)
             end = inside[-1:] if fault.rule is Rule.STUFFING else [each - 1 for each in inside[:1]]
             assert end in ([], [fault.at - 1]), what

@@ -11,7 +11,18 @@ from typing import NamedTuple
 from construct import Container
 
 from ._fields import Message
-from ._frames import Address, Constant, Frame, FrameError, Id, Length, Part, Payload, _allowed, _size
+from ._frames import (
+    Address,
+    Constant,
+    Frame,
+    FrameError,
+    Id,
+    Length,
+    Part,
+    Payload,
+    _allowed,
+    _size,
+)
 
 
 class Escape(NamedTuple):
@@ -37,7 +48,9 @@ class Escape(NamedTuple):
             second = run[0] if run else self.escape
             if not run or (not self.mask and second not in plain):
                 raise FrameError("stuffing", f"wrong byte after {self.escape:02x}")
-            head += bytes([second ^ self.mask if self.mask else plain[second]]) + run[1:]
+            head += (
+                bytes([second ^ self.mask if self.mask else plain[second]]) + run[1:]
+            )
         return head
 
 
@@ -55,7 +68,10 @@ class Insert(NamedTuple):
         """The decoded bytes."""
         plain = data.replace(self.after + self.insert, self.after)
         if self.add(plain) != data:
-            raise FrameError("stuffing", f"{self.insert.hex()} does not follow each {self.after.hex()}")
+            raise FrameError(
+                "stuffing",
+                f"{self.insert.hex()} does not follow each {self.after.hex()}",
+            )
         return plain
 
 
@@ -189,9 +205,16 @@ class EndedFrame(Frame):
         for part in self.parts:
             cell = cells[part.name]
             if isinstance(part, Constant) and cell != part.data:
-                raise FrameError("frame", f"{part.name} is {cell.hex()}, not {part.data.hex()}")
-            if isinstance(part, Length) and part.integer.parse(cell) != len(payload) + part.bias:
-                raise FrameError("length", f"{part.name} does not count {len(payload)} bytes")
+                raise FrameError(
+                    "frame", f"{part.name} is {cell.hex()}, not {part.data.hex()}"
+                )
+            if (
+                isinstance(part, Length)
+                and part.integer.parse(cell) != len(payload) + part.bias
+            ):
+                raise FrameError(
+                    "length", f"{part.name} does not count {len(payload)} bytes"
+                )
             if isinstance(part, Id | Address):
                 numbers[type(part)] = part.integer.parse(cell)
                 self._check_begin(numbers)
@@ -203,7 +226,9 @@ class EndedFrame(Frame):
         if self.bare and Id in numbers:
             message = self._known(numbers[Id])
             if Address in numbers and not _allowed(message, numbers[Address]):
-                raise FrameError("range", f"{message.name} cannot have address {numbers[Address]}")
+                raise FrameError(
+                    "range", f"{message.name} cannot have address {numbers[Address]}"
+                )
 
     def _end(self, wire: bytes) -> int:
         """Offset of the end of the frame."""
@@ -231,7 +256,9 @@ class EndedFrame(Frame):
             plain = wire[: self.front] + inner + wire[end:]
         size = len(plain) - sum(self.sizes.values())
         if not self.least <= size <= self.payload.most:
-            text = f"payload of {size} bytes, expected {self.least} to {self.payload.most}"
+            text = (
+                f"payload of {size} bytes, expected {self.least} to {self.payload.most}"
+            )
             raise FrameError("length", text)
         cells, at = {}, 0
         for part in self.parts:
