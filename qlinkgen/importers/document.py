@@ -136,7 +136,12 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A request and its response."""
+    """A request and its response.
+
+    Attributes:
+        keys: Keys before the fields.
+        answer: Keys of the response in its long form, such as an id of its own.
+    """
 
     name: str
     request: tuple[Field, ...]
@@ -144,11 +149,15 @@ class Command:
     line: int = 0
     keys: Mapping[str, Value] = field(default_factory=dict)
     doc: str = ""
+    answer: Mapping[str, Value] = field(default_factory=dict)
 
     @property
     def data(self) -> Value:
         """Its mapping."""
-        fields: dict[str, Value] = {"request": layout(self.request), "response": layout(self.response)}
+        response = layout(self.response)
+        if self.answer:
+            response = {**self.answer, "fields": response}
+        fields: dict[str, Value] = {"request": layout(self.request), "response": response}
         return Block({**self.keys, **documented(self.doc), **fields})
 
 

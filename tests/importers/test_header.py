@@ -218,6 +218,8 @@ def test_bit_fields_of_a_big_endian_machine(tmp_path: Path, imported: Import) ->
         ("FOO(struct b { int x; });\n", 1, "not understood"),
         ("#if A > 3\nstruct b { int x; };\n#endif", 1, "condition 'A > 3' is not evaluated"),
         ("#define F(x) x\n", 1, "macro F is left out"),
+        ("struct b { };\n", 1, "structure b is left out: it has no members"),
+        ("STD_PACKED struct b { int a; };\n", 1, "STD_PACKED is not known and ignored"),
         ("#error no\n", 1, "#error is ignored"),
         ("#pragma pack(banana)\n", 1, "#pragma pack(banana) is not understood"),
         ("#define E \\\n 1 @ \\x\nint a[E];\n", 1, "macro E is left out"),
@@ -242,11 +244,11 @@ def test_notes(imported: Import, text: str, line: int, note: str) -> None:
         ("/* never closed", "a comment begins here and does not end"),
         ("\n struct s { int a;", "2: '{' is not closed"),
         ("struct s { int a) };", "1: ')' does not close an open bracket"),
-        ("struct s { int a; }", "1: the file ends within a declaration"),
         ("{" * 60, "1: brackets are nested more than 50 deep"),
         ("#if 1\nstruct s { int a; };", "an #if is not closed"),
         ("#endif", "1: #endif without #if"),
         ("#if 1\n" * 200, "101: conditions are nested more than 100 deep"),
+        ("struct s { int a; }", "the header has no structure that can be a message"),
         ("\n\\", "2: the character U+005C is not part of C"),
         (b"\x7fELF\0\0", "1: a byte 00: this is not a text file"),
         (b"\xff\xfeab\0", "is not UTF-16"),
@@ -256,6 +258,32 @@ def test_notes(imported: Import, text: str, line: int, note: str) -> None:
 )
 def test_errors(tmp_path: Path, text: str | bytes, error: str) -> None:
     assert error in refused(tmp_path, read_header, text, "x.h")
+
+
+RECORDS = """\
+__BEGIN_DECLS
+typedef struct { int16_t x, y; } point_t;
+/** A part of a path. */
+struct __packed segment { point_t from, to; struct { uint8_t speed; uint8_t key[4]; } how; };
+typedef struct { bool open; struct segment path[3]; enum kind { KIND_A, KIND_B } kind; float f[2]; } route_t;
+__END_DECLS
+"""
+
+
+def test_structures_inside_others(imported: Import) -> None:
+    """They are records, each before those that contain it."""
+    found = imported(read_header, RECORDS, "route.h")
+    assert found.part("types") == {
+        "point": {"fields": {"x": "i16", "y": "i16"}},
+        "segment_how": {"fields": {"speed": "u8", "key": "bytes[4]"}},
+        "segment": {
+            "doc": "A part of a path.",
+            "fields": {"from": "point", "to": "point", "how": "segment_how"},
+        },
+    }
+    assert found.part("messages", "route", "fields") == {
+        "open": "bool", "path": "segment[3]", "kind": "kind", "f": "f32[2]",
+    }  # fmt: skip
 
 
 def test_a_chosen_structure(tmp_path: Path, imported: Import) -> None:

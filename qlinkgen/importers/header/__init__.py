@@ -106,12 +106,12 @@ class _Header:
                 laid.fields,
                 each.line,
                 {"id": number, "confirmed": False},
-                self._comments.above(each.line),
+                self._doc(each),
             )
             for number, (each, laid) in enumerate(messages, 1)
         )
         records = tuple(
-            Record(self._names[each], laid.fields, each.line, self._comments.above(each.line))
+            Record(self._names[each], laid.fields, each.line, self._doc(each))
             for each, laid in self._records(chosen)
         )
         return Document(
@@ -123,6 +123,11 @@ class _Header:
             comment=f"From {self._file}. Message ids are numbered in order: replace them, then remove "
             "`confirmed: false`.",
         )
+
+    def _doc(self, structure: Structure) -> str:
+        """The comment above a structure; of several on one line, that of the outermost."""
+        first = next(each for each in self._structures() if each.line == structure.line)
+        return self._comments.above(structure.line) if first is structure else ""
 
     # Structures -----------------------------------------------------------------------------------------
 

@@ -34,9 +34,9 @@ class Comments:
                 group.append(each)
                 self._above[each.last] = group
 
-    def of(self, line: int) -> str:
+    def of(self, line: int, *, above: bool = True) -> str:
         """The text of the comment after the code of a line, else of the one above it."""
-        return _text(self._after.get(line, [])) or self.above(line)
+        return _text(self._after.get(line, [])) or (self.above(line) if above else "")
 
     def above(self, line: int) -> str:
         """The text of the comment above a line."""

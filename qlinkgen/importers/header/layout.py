@@ -173,6 +173,8 @@ class _Layout:
 
     def laid(self) -> Laid:
         """Place every member. Raises Refused."""
+        if not self._structure.members:
+            raise Refused(self._structure.line, "it has no members")
         for bits, group in groupby(self._structure.members, key=lambda each: each.bits is not None):
             members = tuple(group)
             if bits:
@@ -213,7 +215,7 @@ class _Layout:
 
     def _field(self, member: Member, placed: Placed, counts: tuple[int, ...]) -> Field:
         name = self._names.take(member.name, member.line)
-        doc = self._all.comments.of(member.line)
+        doc = self._doc(member)
         type_, keys = placed.type, dict[str, Value]()
         size = placed.size * prod(counts)
         if (
@@ -231,6 +233,10 @@ class _Layout:
             if kind == "character" and items:
                 keys = {"pad": Notation("00")}
         return Field(name, type_, member.line, keys, doc)
+
+    def _doc(self, member: Member) -> str:
+        """The comment of a member; one above a structure of one line is that of the structure."""
+        return self._all.comments.of(member.line, above=member.line != self._structure.line)
 
     # Places ---------------------------------------------------------------------------------------------
 
@@ -302,7 +308,7 @@ class _Layout:
             self._reserve(size, line)
 
     def _bit(self, member: Member, first: int, width: int) -> Value:
-        doc = self._all.comments.of(member.line)
+        doc = self._doc(member)
         placed = self._all.placed(member.type, member.line)[0]
         at: Value = first if width == 1 else Notation(f"{first}..{first + width - 1}")
         signed = placed.scalar is not None and placed.scalar.signed and width > 1

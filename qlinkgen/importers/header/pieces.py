@@ -14,6 +14,7 @@ _DEEPEST = 50
 _ATTRIBUTES = frozenset({"__attribute__", "__attribute", "__declspec", "_Alignas", "alignas"})
 _PACKED_WORDS = frozenset({"__packed", "_Packed", "__packed__", "PACKED", "__PACKED"})
 _DROPPED = frozenset({"__extension__", "__restrict", "__inline", "__inline__", "__volatile__", "__const"})
+_BEGINNINGS = COMPOUND | {"typedef", "const", "static", "extern", "volatile", *_PACKED_WORDS}
 _OPEN = {"(": ")", "[": "]", "{": "}"}
 _CLOSE = frozenset(_OPEN.values())
 
@@ -74,17 +75,26 @@ class _Divider:
             self._close(token)
         elif text == ";" and not self._opened:
             done, self._waiting = self._waiting, []
-            return _piece(done, self.pack)
+            return _piece(self._without_macros(done), self.pack)
         return None
 
+    def _without_macros(self, tokens: list[Token]) -> list[Token]:
+        """Take away unknown macros before a declaration, such as __BEGIN_DECLS."""
+        while len(tokens) > 1 and tokens[0].kind == "word" and tokens[1].text in _BEGINNINGS:
+            if tokens[0].text in _BEGINNINGS:
+                break
+            if "pack" in tokens[0].text.lower():
+                self.notes.add(tokens[0].line, f"{tokens[0].text} is not known and ignored")
+            tokens = tokens[1:]
+        return tokens
+
     def end(self) -> None:
-        """Raise an error if a declaration is not complete."""
+        """Report what follows the last declaration; raise an error for open brackets."""
         if self._opened:
             raise self.notes.error(self._opened[-1].line, f"'{self._opened[-1].text}' is not closed")
         if self._waiting:
-            raise self.notes.error(
-                self._waiting[-1].line, "the file ends within a declaration; is it complete?"
-            )
+            words = " ".join(each.text for each in self._waiting[:5])
+            self.notes.add(self._waiting[0].line, f"'{words[:60]}' at the end is left out: not a declaration")
 
     def _open(self, token: Token) -> None:
         if _is_linkage(self._waiting):

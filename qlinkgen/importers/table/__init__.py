@@ -23,6 +23,8 @@ from qlinkgen.importers.table.xlsx_file import xlsx_sheets
 
 __all__ = ["KEYS", "Options", "read_csv", "read_xlsx"]
 
+#: What only the row of a field states; other rows are about their message.
+_OF_FIELDS = KEYS.keys() - {"message", "id", "direction", "doc", "section"}
 _REQUESTS = frozenset(
     {"request", "req", "command", "cmd", "query", "write", "set", "master", "host", "master to slave"}
 )
@@ -139,7 +141,7 @@ def _drafts(sheet: str, found: Table, notes: Notes) -> list[_Draft]:
         if draft is None:
             draft = drafts[called, direction] = _Draft(called, record.line, notes, found, direction=direction)
         draft.id = draft.id or number
-        if record.get("name") or len(record.values) > 1 + ("id" in record.values) + ("doc" in record.values):
+        if _OF_FIELDS & record.values.keys() and not cells.is_nothing(record.get("name") or "?"):
             draft.records.append(record)
         elif record.get("doc"):
             draft.doc = record.get("doc")
@@ -215,18 +217,22 @@ class _Messages:
 
     def _command(self, draft: _Draft, answer: _Draft) -> None:
         own, other = cells.integer(draft.id), cells.integer(answer.id)
-        if own is not None and other is not None and own != other:
-            answer.notes.add(
-                answer.line, f"the response of '{draft.raw[:40]}' is a message of its own: its id differs"
-            )
-            self._message(draft)
-            self._message(answer)
-            return
         keys = self._id(draft if own is not None else answer)
         request, response = self._fields(draft), self._fields(answer)
         name = self._names.take(draft.raw, draft.line)
         doc = draft.doc or answer.doc
-        self._commands.append(Command(name, request, response, draft.line, {**keys, "repeat": "unsafe"}, doc))
+        differs = own is not None and other is not None and own != other
+        self._commands.append(
+            Command(
+                name,
+                request,
+                response,
+                draft.line,
+                {**keys, "repeat": "unsafe"},
+                doc,
+                self._id(answer) if differs else {},
+            )
+        )
 
     def _id(self, draft: _Draft) -> dict[str, Value]:
         """The id, which is not confirmed if the table has none."""
