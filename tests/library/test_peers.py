@@ -23,6 +23,7 @@ def test_every_protocol_has_a_peer() -> None:
     assert sorted(PEERS) == list(NAMES)
 
 
+@pytest.mark.slow
 def test_random_messages_are_those_of_the_peer(name: str) -> None:
     other, ours = peer(name), described(name)
     compared: set[str] = set()

@@ -55,10 +55,12 @@ def _random(value: Value, rng: random.Random) -> Raw:
         case Array():
             return [_number(kind.item, rng) for _ in range(_size(kind.length, rng))]
         case Blob():
-            return bytes(
+            size = rng.randint(0, kind.length.maximum) if kind.pad else _size(kind.length, rng)
+            data = bytes(
                 rng.choice((rng.randrange(256), 0xA5, 0x00, 0xFF, 0xFD)) & (0x7F if kind.text else 0xFF)
-                for _ in range(_size(kind.length, rng))
+                for _ in range(size)
             )
+            return data.rstrip(kind.pad) if kind.pad else data
         case Record():
             return _record(kind.layout, rng)
         case Records():

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pyubx2 import GET, POLL, SETPOLL, UBXMessage, UBXReader
@@ -23,6 +24,9 @@ _KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
         "NAV-STATUS",
         pairs("itow=iTOW fix=gpsFix flags=flags differential=fixStat flags2=flags2 ttff=ttff uptime=msss"),
     ),
+    "poll_version.request": ("MON-VER", {}),
+    "poll_version.response": ("MON-VER", pairs("software=swVersion hardware=hwVersion extensions=text")),
+    "nav_sat": ("NAV-SAT", pairs("itow=iTOW satellites=gnssId")),
     "ack": ("ACK-ACK", pairs("class=clsID number=msgID")),
     "nak": ("ACK-NAK", pairs("class=clsID number=msgID")),
     "nav_pvt": (
@@ -37,22 +41,50 @@ _KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
         """),
     ),
 }
+#: List to its records: each field to its attribute, which has the number of the record at its end.
+_RECORDS: Mapping[str, Mapping[str, str]] = {
+    "extensions": pairs("text=extension"),
+    "satellites": pairs(
+        "system=gnssId number=svId strength=cno elevation=elev azimuth=azim residual=prRes flags=flags"
+    ),
+}
+_TEXTS = {"software": 30, "hardware": 10, "text": 30}
+#: Messages that have them.
+_LISTS = frozenset({"nav_sat", "poll_version.response"})
 _BITS = {"flags": 1, "flags2": 1, "flags3": 2, "valid": 1, "fixStat": 1}
 UNKNOWN: frozenset[str] = frozenset()
 
 
 def build(record: Record) -> bytes | None:
     identity, named = _KINDS[record["message"]]
-    given = {named[each]: _given(each, named[each], value) for each, value in record["fields"].items()}
+    if record["fields"].get("extensions"):
+        return None  # it only reads lists without a count
+    given: dict[str, Any] = {}
+    for each, value in record["fields"].items():
+        if isinstance(value, list):
+            given |= _listed(each, value)
+        else:
+            given[named[each]] = _given(each, named[each], value)
+    if record["message"] == "nav_sat":
+        given |= {"version": 1, "numSvs": len(record["fields"]["satellites"])}
     mode = POLL if record["message"].endswith(".request") else GET
     return bytes(UBXMessage(identity[:3], identity, mode, parsebitfield=0, **given).serialize())
 
 
-def _given(field: str, attribute: str, value: Any) -> Any:
+def _listed(name: str, records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    named = _RECORDS[name]
+    return {
+        f"{named[each]}_{number:02}": _given(each, named[each], value, size=4)
+        for number, record in enumerate(records, 1)
+        for each, value in record.items()
+    }
+
+
+def _given(field: str, attribute: str, value: Any, *, size: int = 0) -> Any:
     if attribute in _BITS:
-        return int(value).to_bytes(_BITS[attribute], "little")
+        return int(value).to_bytes(size or _BITS[attribute], "little")
     if isinstance(value, str):
-        return _ENUMS[field].index(value)
+        return _ENUMS[field].index(value) if field in _ENUMS else value.encode().ljust(_TEXTS[field], b"\0")
     # It cuts off what is less than a step.
     return value * (1 + 1e-12) if isinstance(value, float) else value
 
@@ -62,11 +94,29 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     found = UBXReader.parse(wire, msgmode=mode, parsebitfield=0)
     names = [each for each, (identity, _) in _KINDS.items() if identity == found.identity]
     name = next(each for each in names if each.endswith(".request") == (direction == "request"))
-    fields = {each: _read(each, getattr(found, attribute)) for each, attribute in _KINDS[name][1].items()}
+    fields = {
+        each: _records(each, found)
+        if each in _RECORDS and name in _LISTS
+        else _read(each, getattr(found, attribute))
+        for each, attribute in _KINDS[name][1].items()
+    }
     return {"message": name, "fields": fields}
 
 
+def _records(name: str, found: Any) -> list[Mapping[str, Any]]:
+    named = _RECORDS[name]
+    numbers = itertools.count(1)
+    first = next(iter(named.values()))
+    present = itertools.takewhile(lambda number: hasattr(found, f"{first}_{number:02}"), numbers)
+    return [
+        {each: _read(each, getattr(found, f"{attribute}_{number:02}")) for each, attribute in named.items()}
+        for number in present
+    ]
+
+
 def _read(field: str, value: Any) -> Any:
+    if isinstance(value, bytes) and field in _TEXTS:
+        return value.rstrip(b"\0").decode()
     if isinstance(value, bytes):
         return int.from_bytes(value, "little")
     if isinstance(value, float):
