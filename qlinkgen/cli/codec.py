@@ -34,10 +34,14 @@ def load_codec(protocol: Protocol) -> ModuleType:
 
 
 def build(
-    codec: ModuleType, message: Message, given: Mapping[str, Json], address: Mapping[str, int]
+    codec: ModuleType,
+    message: Message,
+    given: Mapping[str, Json],
+    address: Mapping[str, int],
+    beside: Sequence[Value] = (),
 ) -> MessageObject:
-    """Make a message object from values of JSON or a command line."""
-    values = {value.name: value for value in message.values}
+    """Make a message object from values of JSON or a command line; ``beside`` are those of the frame."""
+    values = {value.name: value for value in (*beside, *message.values)}
     for name in given:
         if name not in values:
             raise Failure(_no_field(message, name, list(values)))

@@ -25,7 +25,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_attribute, attribute, record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Means, Reply
-from qlinkgen.model.values import Json
+from qlinkgen.model.values import Json, to_json
 from qlinkgen.plan.framing import frame_plan
 
 CHUNK = 65536
@@ -166,6 +166,8 @@ def message_record(protocol: Protocol, found: Message) -> dict[str, Json]:
     name = protocol.address_name
     if name and message.addresses:
         record[record_key(name)] = getattr(found, address_attribute(name))
+    for value in protocol.frame_values:
+        record[record_key(value.name)] = to_json(value, getattr(found, attribute(value.name)))
     record["fields"] = fields(message, found)
     reply = protocol.replies.get(message.name)
     if reply is not None and means(reply, found) == "refused":

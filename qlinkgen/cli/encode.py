@@ -102,7 +102,7 @@ def compose(
     address = _one(addresses) if addresses else record.address
     warn_unconfirmed(protocol, found)
     codec = codec or load_codec(protocol)
-    return codec, found, build(codec, found, given, _address(protocol, found, address))
+    return codec, found, build(codec, found, given, _address(protocol, found, address), protocol.frame_values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,11 +115,22 @@ class _Record:
 
 
 def _record(protocol: Protocol, given: Mapping[str, Json]) -> _Record:
-    known = {"message", "fields", "refused", "node", "address", record_key(protocol.address_name or "")}
+    beside = {record_key(value.name): value.name for value in protocol.frame_values}
+    known = {
+        "message",
+        "fields",
+        "refused",
+        "node",
+        "address",
+        record_key(protocol.address_name or ""),
+        *beside,
+    }
     message, fields = given.get("message"), given.get("fields")
     if not (isinstance(message, str) and isinstance(fields, Mapping) and set(given) <= known):
         return _Record(given)
-    addresses = [given[name] for name in given if name not in ("message", "fields", "refused")]
+    others = ("message", "fields", "refused", *beside)
+    addresses = [given[name] for name in given if name not in others]
+    fields = {**{beside[key]: value for key, value in given.items() if key in beside}, **fields}
     return _Record(fields, message, _one(tuple(map(str, addresses))) if addresses else None)
 
 

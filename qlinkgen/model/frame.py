@@ -9,6 +9,7 @@ from typing import Literal
 
 from qlinkgen.model.checksum import Checksum as Algorithm
 from qlinkgen.model.coding import Coding
+from qlinkgen.model.fields import Field, Value
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Scalar
@@ -63,7 +64,7 @@ class PartBits:
     """
 
     name: str
-    role: Literal["message", "direction", "address", "constant"]
+    role: Literal["message", "direction", "address", "constant", "value"]
     shift: int
     bits: int
     at: int = 0
@@ -71,6 +72,8 @@ class PartBits:
     constants: tuple[int, ...] = ()
     #: The value for each direction.
     directions: Mapping[str, int] = field(default_factory=dict)
+    #: The number of a value of every frame.
+    type: Scalar | None = None
     doc: Text = ""
 
     @property
@@ -118,6 +121,12 @@ class Part:
     #: Payload only: minimum and maximum size.
     min_size: int = 0
     max_size: int = 0
+
+    @property
+    def field(self) -> Field:
+        """The part as a field, for its values."""
+        assert self.scalar is not None
+        return Field(self.name, self.scalar, self.doc, self.section, self.confirmed)
 
     @property
     def size(self) -> int:
@@ -182,6 +191,16 @@ class DelimitedFrame:
         """The address, None if there is none."""
         found = (bits for part in self.parts for bits in part.bits)
         return next((each for each in found if each.role == "address"), None)
+
+    @cached_property
+    def values(self) -> tuple[Value, ...]:
+        """Values of every frame, in wire order."""
+        return tuple(
+            Value(bits.name, bits.type, bits.doc or part.doc, part.field)
+            for part in self.parts
+            for bits in part.bits
+            if bits.type is not None
+        )
 
     @property
     def payload(self) -> Part:

@@ -91,16 +91,16 @@ _C_LOCALS = frozenset(
     """size payload wire capacity message value from to end check since index sent status id slave master
     listener frame checked request response body buffer start count raw sum crc payload_size
     payload_capacity total trailer covered head place broadcast context byte at direction
-    size_t""".split()  # noqa: SIM905
+    parts received size_t""".split()  # noqa: SIM905
 )
 #: Members of a table of handlers other than functions.
-_C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id", "replying"})
+_C_HANDLERS = frozenset({"node", "address", "broadcast", "context", "id", "parts", "received", "replying"})
 #: Names that the header itself defines, or their beginnings, without the prefix of the protocol.
 _C_STEMS = frozenset(
     """addressing async_master_calls async_node_calls bits bits_per bus check codec_error command crc
     decode decode_buffer decode_error direction enable encode_error encode error event fault first
     frame last listener master master_calls max max_frame max_payload max_wire message node_calls ok
-    receiver repeat repeat_by request response slave slave_handlers status stream_decoder""".split()  # noqa: SIM905
+    parts receiver repeat repeat_by request response slave slave_handlers status stream_decoder""".split()  # noqa: SIM905
 )
 #: Types of the C library that may equal a name with the prefix of a protocol.
 _C_TYPES = frozenset(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import assert_never
 
+from qlinkgen.model.fields import Value
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Direction, Example, Message
 from qlinkgen.model.texts import Text, without_texts
@@ -82,6 +83,11 @@ class Protocol:
                 return None
             case _:
                 assert_never(self.frame)
+
+    @property
+    def frame_values(self) -> tuple[Value, ...]:
+        """Values of every frame, beside those of its message."""
+        return self.frame.values if isinstance(self.frame, DelimitedFrame) else ()
 
     @property
     def part_sections(self) -> dict[str, str]:

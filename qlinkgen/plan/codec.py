@@ -13,7 +13,8 @@ Every target checks a whole frame in this order:
 6. a wrong check value: ``crc``, or ``illegal`` if it signals a refused request;
 7. a message number that the direction does not have: ``unknown``; then a wrong check value that covers an
    attribute of the message: ``crc``;
-8. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address, ``range``.
+8. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address and the values
+   of the frame, ``range``.
 
 A frame that a terminator ends is decoded as a whole. Step 2 is: a wrong first constant is ``frame``; no
 terminator within the longest frame, or nothing before it, is ``length``; a wrong coding is ``stuffing``; a
@@ -56,12 +57,13 @@ from qlinkgen.plan.framing import (
     Rescan,
     Slot,
 )
+from qlinkgen.plan.payload import Member
 from qlinkgen.plan.reading import BadFrame, Incomplete, NoFrame, Taken, read_marked
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
-#: Parts whose bytes do not depend on other parts.
-Unchecked = ConstantPart | Numeric | MarkPart | PayloadPart
+#: Parts of constant size whose bytes do not depend on other parts.
+Sized = ConstantPart | Numeric | MarkPart
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +74,7 @@ class Decoded:
         message: its plan.
         address: the address in its frame, None if the frame has none.
         values: raw values by field name.
+        beside: raw values of the frame by name.
         payload: the unstuffed payload.
     """
 
@@ -79,6 +82,20 @@ class Decoded:
     address: int | None
     values: Mapping[str, Raw]
     payload: bytes
+    beside: Mapping[str, int]
+
+
+_NONE: Mapping[str, Raw] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What parts depend on: size of the payload as sent, message number, address, values of the frame."""
+
+    size: int
+    number: int
+    address: int
+    beside: Mapping[str, Raw]
 
 
 class Codec:
@@ -93,28 +110,41 @@ class Codec:
     def encode(
         self, name: str, values: Mapping[str, Raw], address: int | None = None, request: bytes = b""
     ) -> bytes:
-        """The frame of a message; ``request`` is the packet that it answers. Raises Unsendable."""
+        """The frame of a message; ``request`` is the packet that it answers. Raises Unsendable.
+
+        ``values`` include those of the frame.
+        """
         message = self.plan.message(name)
         if address is None:
             address = message.message.default_address
         if message.allowed is not None and not message.allowed.holds(address):
             raise Unsendable(self.plan.frame.address, address)
-        return self.wrap(name, content.pack(message.payload, values), address, request)
+        return self.wrap(name, content.pack(message.payload, values), address, request, values)
 
-    def wrap(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """A valid frame around a payload, which is not checked."""
+    def wrap(
+        self,
+        name: str,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
+        beside: Mapping[str, Raw] = _NONE,
+    ) -> bytes:
+        """A valid frame around a payload, which is not checked; ``beside`` are values of the frame."""
         message = self.plan.message(name)
-        return self.join(message, self.cells(message, self.sent(payload), address), request)
+        return self.join(message, self.cells(message, self.sent(payload), address, beside), request)
 
     def sent(self, payload: bytes) -> bytes:
         """The payload as a length counts it: with inserted bytes if only the payload is stuffed."""
         transparency = self.plan.frame.transparency
         return transparency.rule.encode(payload) if isinstance(transparency, PayloadStuffing) else payload
 
-    def cells(self, message: MessagePlan, sent: bytes, address: int = 0) -> dict[str, bytes]:
-        """The bytes of each part except the check values, and of the seeds."""
+    def cells(
+        self, message: MessagePlan, sent: bytes, address: int = 0, beside: Mapping[str, Raw] = _NONE
+    ) -> dict[str, bytes]:
+        """The bytes of each part except check values, and of seeds; ``beside`` are values of the frame."""
+        given = Given(len(sent), message.id, address, beside)
         parts = {
-            part.name: _cell(part, sent, message.id, address)
+            part.name: sent if isinstance(part, PayloadPart) else _cell(part, given)
             for part in message.envelope.parts
             if not isinstance(part, CheckPart)
         }
@@ -193,7 +223,7 @@ class Codec:
             raise BadFrame(bad.kind, taken.end, bad.field) from None
         if message.allowed and taken.address is not None and not message.allowed.holds(taken.address):
             raise BadFrame("range", taken.end, self.plan.frame.address)
-        return Decoded(message, taken.address, values, taken.payload)
+        return Decoded(message, taken.address, values, taken.payload, _beside(envelope, taken))
 
     def _verify(
         self,
@@ -223,6 +253,17 @@ class Codec:
         return self.judge(take_packet(message, wire), direction, request)
 
 
+def _beside(envelope: Envelope, taken: Taken) -> Mapping[str, int]:
+    """The values of a frame. Raises BadFrame."""
+    found: dict[str, int] = {}
+    for part, member in envelope.values:
+        bits = part.integer.unpack(taken.cells[part.name]) >> member.shift
+        found[member.name] = number = member.number.integer.signed_value(bits & member.number.integer.mask)
+        if content.broken(member.conditions, number):
+            raise BadFrame("range", taken.end, member.name)
+    return found
+
+
 def take_packet(message: MessagePlan, wire: bytes) -> Taken:
     """The parts of a packet whose message is known."""
     taken = Taken(number=message.id, end=len(wire))
@@ -235,46 +276,46 @@ def take_packet(message: MessagePlan, wire: bytes) -> Taken:
     return taken
 
 
-def _cell(part: Unchecked, payload: bytes, number: int, address: int) -> bytes:
+def _cell(part: Sized, given: Given) -> bytes:
     """The bytes of a part."""
     match part:
         case ConstantPart():
             return part.data
         case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart():
-            return part.integer.pack(_number(part, payload, number, address))
+            return part.integer.pack(_number(part, given))
         case MarkPart():
-            return bytes((part.byte(number, address),))
-        case PayloadPart():
-            return payload
+            return bytes((part.byte(given.number, given.address),))
         case _:
             assert_never(part)
 
 
-def _number(part: Numeric, payload: bytes, number: int, address: int) -> int:
+def _number(part: Numeric, given: Given) -> int:
     """The integer of a part."""
     match part:
         case LengthPart():
-            return len(payload) + part.bias
+            return given.size + part.bias
         case IdPart():
-            return number
+            return given.number
         case AddressPart():
-            return address
+            return given.address
         case CellPart():
-            return sum(_bits(slot, number, address) << slot.shift for slot in part.slots)
+            return sum(_bits(slot, given) << slot.shift for slot in part.slots)
         case EqualPart():
-            return part.value(_number(part.of, payload, number, address))
+            return part.value(_number(part.of, given))
         case _:
             assert_never(part)
 
 
-def _bits(slot: Slot, number: int, address: int) -> int:
+def _bits(slot: Slot, given: Given) -> int:
     """The bits of a slot."""
     match slot:
         case IdSlot():
-            return number >> slot.at & (1 << slot.bits) - 1
+            return given.number >> slot.at & (1 << slot.bits) - 1
         case AddressSlot():
-            return address
+            return given.address
         case ConstantSlot():
             return slot.values[0]
+        case Member():
+            return content.member_bits(slot, {slot.name: slot.number.default, **given.beside})
         case _:
             assert_never(slot)

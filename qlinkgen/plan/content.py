@@ -124,7 +124,7 @@ def _packed(step: Step, values: Mapping[str, Raw], counts: Mapping[str, int]) ->
                 raise Unsendable(step.run, values[step.run])
             return step.integer.pack(number)
         case BitsStep():
-            pattern = sum(_member_bits(member, values) << member.shift for member in step.members)
+            pattern = sum(member_bits(member, values) << member.shift for member in step.members)
             return step.integer.pack(step.integer.signed_value(pattern))
         case BytesStep():
             return _octets(step, values[step.name])
@@ -170,7 +170,8 @@ def unpack_items(step: ItemsStep, data: bytes, number: int) -> list[int]:
     return [step.item.unpack(data[at : at + step.item_size]) for at in starts]
 
 
-def _member_bits(member: Member, values: Mapping[str, Raw]) -> int:
+def member_bits(member: Member, values: Mapping[str, Raw]) -> int:
+    """The bits of a value. Raises Unsendable."""
     return _checked(member.name, member.number, values[member.name]) & member.number.integer.mask
 
 

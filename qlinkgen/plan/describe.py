@@ -375,6 +375,8 @@ def _slot_text(part: CellPart, slot: Slot) -> str:
             return f"{place} address"
         case ConstantSlot():
             return f"{place} {' or '.join(f'0x{value:X}' for value in slot.values)}"
+        case Member():
+            return f"{place} {slot.name}" if slot.name != part.name else f"{place} value"
         case _:
             assert_never(slot)
 

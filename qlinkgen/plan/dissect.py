@@ -15,7 +15,7 @@ from typing import assert_never
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.content import BadContent, MoreNeeded, measure
+from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
 from qlinkgen.plan.fields import Fields
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -405,6 +405,18 @@ class _Walk:
         if isinstance(part, CellPart) and any(bits.part is part for bits in self.envelope.address):
             fault = fault or self._addressed(part)
         self._span(part, number, fault)
+        if number is not None and isinstance(part, CellPart):
+            for member in part.values:
+                self._member(part, member, number)
+
+    def _member(self, part: CellPart, member: Member, number: int) -> None:
+        """Check a value of the frame."""
+        integer, cell = member.number.integer, self._found(part)
+        value = integer.signed_value(number >> member.shift & integer.mask)
+        wrong = broken(member.conditions, value)
+        if wrong:
+            self._fault("range", Rule.VALUE, cell.places[0], member, value)
+        self.spans.append(Span(member, cell.places, cell.data, part.size, value, "range" if wrong else ""))
 
     def _bound(self, part: LengthPart) -> None:
         number = self._number_in(part, part.integer)

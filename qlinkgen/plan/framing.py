@@ -18,6 +18,7 @@ from qlinkgen.model.integer import Chunk, Integer, byte_chunks
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Insertion, stage
+from qlinkgen.plan.payload import Member
 from qlinkgen.plan.transparency import (
     Coded,
     FrameStuffing,
@@ -184,7 +185,8 @@ class ConstantSlot:
         return number >> self.shift & (1 << self.bits) - 1 in self.values
 
 
-Slot = IdSlot | AddressSlot | ConstantSlot
+#: Bits of an integer of a frame; a member is a value of every frame.
+Slot = IdSlot | AddressSlot | ConstantSlot | Member
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,6 +206,11 @@ class CellPart:
     def constants(self) -> tuple[ConstantSlot, ...]:
         """The constants among its bits."""
         return tuple(slot for slot in self.slots if isinstance(slot, ConstantSlot))
+
+    @property
+    def values(self) -> tuple[Member, ...]:
+        """The values among its bits."""
+        return tuple(slot for slot in self.slots if isinstance(slot, Member))
 
 
 @dataclass(frozen=True, slots=True)
@@ -454,6 +461,13 @@ class Envelope:
             done.append(part)
         return tuple(done)
 
+    @cached_property
+    def values(self) -> tuple[tuple[CellPart, Member], ...]:
+        """Values of every frame, each with the part that holds it."""
+        return tuple(
+            (part, member) for part in self.parts if isinstance(part, CellPart) for member in part.values
+        )
+
     def known_at(self, part: Part, pieces: tuple[Bits, ...]) -> bool:
         """Whether a receiver of the header knows all pieces at the end of this part."""
         done = self.front[: self.front.index(part) + 1]
@@ -520,7 +534,7 @@ def _bits_of(part: Part, whole: type[Part], slot: type[Slot]) -> Iterator[Bits]:
         yield from (
             Bits(part, each.shift, each.bits, each.at)
             for each in part.slots
-            if isinstance(each, slot) and not isinstance(each, ConstantSlot)
+            if isinstance(each, slot) and not isinstance(each, ConstantSlot | Member)
         )
 
 
@@ -723,6 +737,9 @@ def _slot(bits: PartBits) -> Slot:
             return AddressSlot(bits.shift, bits.bits)
         case "constant":
             return ConstantSlot(bits.shift, bits.bits, bits.constants)
+        case "value":
+            assert bits.type is not None
+            return Member(bits.name, bits.shift, bits.bits, bits.type)
         case _:
             assert_never(bits.role)
 

@@ -184,7 +184,7 @@ def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, locat
         mask = (1 << (last + 1)) - (1 << first)
         if other := next((member.name for member in members if member.mask & mask), None):
             place.fault("bits-overlap", "", f"{name} overlaps {other}", "use different bits")
-        scalar = _bit_scalar(bit, last + 1 - first, scalars, place)
+        scalar = bit_scalar(bit, last + 1 - first, scalars, place)
         if scalar is not None:
             members.append(BitField(name, first, scalar, bit.doc))
     if not members:
@@ -192,7 +192,8 @@ def build_bits(spec: FieldSpec, container: Scalar, scalars: ScalarBuilder, locat
     return Bits(container, tuple(members))
 
 
-def _bit_scalar(spec: BitSpec, width: int, scalars: ScalarBuilder, location: Location) -> Scalar | None:
+def bit_scalar(spec: BitSpec, width: int, scalars: ScalarBuilder, location: Location) -> Scalar | None:
+    """The number in bits of an integer; None if its type is unknown."""
     meaning = _bit_meaning(spec, width, scalars, location)
     if isinstance(meaning, str) and meaning != "bool":
         return None

@@ -171,8 +171,8 @@ class FieldSpec(Fact):
 PartRole = Literal[
     "constant", "length", "message", "address", "direction", "payload", "checksum", "terminator"
 ]
-#: What a part turns out to be: its role, or an integer whose bits have several, or that follows from another.
-PartKind = PartRole | Literal["bits", "derived"]
+#: What a part turns out to be: its role, an integer with bits of several roles, a derived one, or a value.
+PartKind = PartRole | Literal["bits", "derived", "value"]
 #: The role that a key tells.
 _TELLING: Final[Mapping[str, PartKind]] = {
     "bits": "bits",
@@ -234,16 +234,14 @@ AnyAlgorithm = Annotated[
 ]
 
 
-class PartBitSpec(_Mapping):
-    """Consecutive bits of a part of a frame."""
+class PartBitSpec(BitSpec):
+    """Consecutive bits of a part of a frame: with a role, constant, or a value of every frame."""
 
-    at: WholeRange = Field(description="Bit, or first..last bit; 0 is the least significant")
     role: Literal["message", "address", "direction"] | None = Field(
-        default=None, description="What they hold, unless they are constant"
+        default=None, description="What they hold, unless they are constant or a value"
     )
     const: Consts | None = Field(default=None, description="Legal values, the first of which is sent")
     values: Directions | None = Field(default=None, description="The value for each direction")
-    doc: Text = Field(default="", description="Description, in one sentence")
 
 
 class PartSpec(Fact):
@@ -263,7 +261,15 @@ class PartSpec(Fact):
     equals: str | None = Field(
         default=None, description="Earlier part with the same value; ~PART, PART + N: derived from it"
     )
-    bits: dict[str, PartBitSpec] | None = Field(default=None, description="Roles of the bits of the integer")
+    bits: dict[str, Annotated[PartBitSpec, ShortForm("at", "integer", "string")]] | None = Field(
+        default=None, description="Roles of the bits of the integer"
+    )
+    scale: Rational | None = Field(default=None, description="Of a value: that of one step in the unit")
+    offset: Rational | None = Field(default=None, description="Of a value: that of raw 0 in the unit")
+    unit: Text | None = Field(default=None, description="Unit of a value")
+    range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
+    raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
+    default: ScalarValue | None = Field(default=None, description="Default of a value, in the unit")
     shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
     counts: list[str] | None = Field(default=None, description="Parts whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
@@ -288,7 +294,7 @@ class PartSpec(Fact):
         if self.role is not None:
             return self.role
         given = (role for key, role in _TELLING.items() if getattr(self, key) is not None)
-        return next(given, None)
+        return next(given, None if self.type is None else "value")
 
 
 class _PartForms:

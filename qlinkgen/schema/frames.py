@@ -16,6 +16,7 @@ from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.stuffing import build_stuffing, check_unique
 from qlinkgen.schema.terminators import check_terminator_part
+from qlinkgen.schema.types import TypeBuilder
 
 _KINDS = ("parts", "marked", "packet")
 _PACKET_ROLES = ("message", "payload", "checksum")
@@ -42,13 +43,15 @@ def _main_check(specs: Mapping[str, PartSpec]) -> str:
 class FrameBuilder:
     """Builds the frame of one file."""
 
-    def __init__(self, file: SchemaFile, report: Reporter, crc: str | None = None) -> None:
-        """``crc`` replaces the algorithm in the file."""
+    def __init__(
+        self, file: SchemaFile, report: Reporter, types: TypeBuilder, crc: str | None = None
+    ) -> None:
+        """``types`` are those of values; ``crc`` replaces the algorithm in the file."""
         self._file = file
         self._report = report
-        self._parts = PartBuilder(file, report, crc)
+        self._parts = PartBuilder(file, report, types, crc)
         #: Builds check values whose algorithm ``crc`` does not replace.
-        self._others = PartBuilder(file, report, None)
+        self._others = PartBuilder(file, report, types, None)
 
     def build(self) -> Frame | None:
         """The frame; None after an error that prevents building it."""

@@ -101,13 +101,13 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
     file = check_structure(data, report)
     if file is None:
         return None
-    frame = FrameBuilder(file, report, crc).build()
+    payload_max = payload_bounds(file)[1]
+    types = TypeBuilder(file, report, payload_max)
+    frame = FrameBuilder(file, report, types, crc).build()
     bus = build_bus(file)
     check_types(file, report)
     check_references(file, report, frame)
     check_addresses(frame, bus, report)
-    payload_max = payload_bounds(file)[1]
-    types = TypeBuilder(file, report, payload_max)
     fields = FieldBuilder(file, report, types, payload_max)
     fields.check_records()
     messages = MessageBuilder(file, report, fields, frame, bus)
@@ -116,7 +116,7 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
     check_echoes(file, commands.commands, messages.places, report)
     check_terminator(frame, commands.messages, report)
     types.report_unused()
-    check_names(file, commands.messages, messages.places, report)
+    check_names(file, frame, commands.messages, messages.places, report)
     report_unconfirmed(file, report)
     if frame is None or report.failed:
         return None

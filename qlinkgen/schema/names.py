@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout, Records, Value, layouts_of
+from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake, upper
 from qlinkgen.model.types import Array, Blob, Scalar
@@ -34,7 +35,11 @@ _GLOBAL_MACROS = ("ok", "max_payload_size", "max_wire_size", "enable_float")
 
 
 def check_names(
-    file: SchemaFile, messages: Sequence[Message], places: Mapping[str, Path], report: Reporter
+    file: SchemaFile,
+    frame: Frame | None,
+    messages: Sequence[Message],
+    places: Mapping[str, Path],
+    report: Reporter,
 ) -> None:
     """Check every name of a file: spelling, reserved words, clashes after conversion.
 
@@ -58,9 +63,10 @@ def check_names(
     records = layouts_of(field for message in messages for field in message.fields)
     for c in (False, True):
         for message in messages:
-            check.clashes(_attributes(message.values, places[message.name], address, c=c))
+            beside = () if c else tuple(_beside(frame, address, places[message.name]))
+            check.clashes((*beside, *_attributes(message.values, places[message.name], c=c)))
         for record in records:
-            check.clashes(_attributes(record.values, ("types", record.name, "fields"), None, c=c))
+            check.clashes(_attributes(record.values, ("types", record.name, "fields"), c=c))
     check.clashes(_classes(file))
     check.clashes(_methods(file))
     check.clashes(_macros(file, messages, places))
@@ -136,13 +142,17 @@ def _reply_groups(file: SchemaFile) -> Iterator[tuple[Path, Iterable[str]]]:
     yield from ((("commands", name, "replies"), each.replies) for name, each in file.commands.items())
 
 
-def _attributes(
-    values: Iterable[Value], path: Path, address: str | None, *, c: bool
-) -> Iterator[tuple[str, str, Path]]:
+def _beside(frame: Frame | None, address: str | None, path: Path) -> Iterator[tuple[str, str, Path]]:
+    """Attributes of a message for the address and the values of its frame."""
+    if address is not None:
+        yield naming.address_attribute(address), f"the frame's '{address}'", path
+    for value in frame.values if isinstance(frame, DelimitedFrame) else ():
+        yield naming.attribute(value.name), f"the frame's '{value.name}'", path
+
+
+def _attributes(values: Iterable[Value], path: Path, *, c: bool) -> Iterator[tuple[str, str, Path]]:
     """Attributes of a message or record, or members of its C struct."""
     spelt = naming.member if c else naming.attribute
-    if address is not None and not c:
-        yield naming.address_attribute(address), f"the frame's '{address}'", path
     for value in values:
         inside = ("bits", value.name) if value.bits else ()
         place = (*path, value.field.name, *inside)

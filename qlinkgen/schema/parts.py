@@ -15,14 +15,17 @@ from qlinkgen.schema.pieces import PieceBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.synonyms import type_hint
+from qlinkgen.schema.types import TypeBuilder
 
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
 _SINGLE_ROLES = ("length", "address", "direction", "payload", "terminator")
+_VALUE_KEYS = ("scale", "offset", "unit", "range", "raw_range", "default")
 _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "constant": ("value", "text", "type", "byteorder", "const"),
     "bits": ("type", "byteorder", "bits"),
     "derived": ("type", "byteorder", "equals"),
     "direction": ("type", "byteorder", "values"),
+    "value": ("type", "byteorder", *_VALUE_KEYS),
     "length": ("type", "byteorder", "counts"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
@@ -50,6 +53,7 @@ _KEYS = (
     "only",
     "words",
     "rejected",
+    *_VALUE_KEYS,
 )
 
 
@@ -61,12 +65,12 @@ _DERIVED = re.compile(
 class PartBuilder:
     """Builds the parts of one frame."""
 
-    def __init__(self, file: SchemaFile, report: Reporter, crc: str | None) -> None:
-        """``crc`` replaces the algorithm in the file."""
+    def __init__(self, file: SchemaFile, report: Reporter, types: TypeBuilder, crc: str | None) -> None:
+        """``types`` are those of values; ``crc`` replaces the algorithm in the file."""
         self._file = file
         self._report = report
         self._crc = crc
-        self._pieces = PieceBuilder(report)
+        self._pieces = PieceBuilder(report, types)
 
     def roles_fit(self, specs: Mapping[str, PartSpec], needed: Sequence[str], path: Path) -> bool:
         """Check that every part has a role, that required ones are present, and single ones occur once."""
@@ -106,6 +110,8 @@ class PartBuilder:
             value = self.constant(spec, path)
         elif role == "payload":
             size = self.payload_size(spec, path)
+        elif role == "value":
+            return self._value(name, spec, path)
         elif role == "checksum":
             checksum = self.checksum(spec, names, path)
         else:
@@ -113,7 +119,7 @@ class PartBuilder:
             if role == "length" and not spec.counts:
                 self._lacks("counts", "add counts: [PART, ...]", path)
             self.known(spec.counts or (), names, (*path, "counts"))
-        kind: Role = role if role != "direction" else "bits"
+        kind: Role = "bits" if role == "direction" else role
         whole = self._pieces.whole(name, spec, scalar, path) if scalar else None
         bits = self._pieces.inside(spec.bits or {}, scalar, path) if scalar and role == "bits" else ()
         if role == "constant" and scalar and whole and len(whole.constants) == 1:
@@ -135,6 +141,19 @@ class PartBuilder:
             counts=tuple(spec.counts or ()),
             min_size=size[0],
             max_size=size[1],
+        )
+
+    def _value(self, name: str, spec: PartSpec, path: Path) -> Part:
+        """A part with a value of every frame, or several in its bits."""
+        scalar, bits = self._pieces.value(name, spec, path)
+        return Part(
+            name=name,
+            role="bits",
+            bits=bits,
+            scalar=scalar,
+            doc=spec.doc,
+            section=spec.section,
+            confirmed=spec.confirmed,
         )
 
     def fault(self, rule: str, path: Path, what: str, hint: str) -> None:

@@ -7,22 +7,26 @@ from dataclasses import replace
 
 from qlinkgen.model.frame import DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
-from qlinkgen.model.types import Scalar
-from qlinkgen.schema.file_model import PartBitSpec, PartSpec
-from qlinkgen.schema.notation import StatedId
+from qlinkgen.model.types import Bits, Float, Scalar, byte_chunks
+from qlinkgen.schema.file_model import FieldSpec, PartBitSpec, PartSpec
+from qlinkgen.schema.notation import StatedId, shown
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path
+from qlinkgen.schema.types import TypeBuilder
 
 #: Maximum number of bits of a message id.
 MAX_ID_BITS = 64
+#: Keys of bits with a value of every frame.
+VALUE_KEYS = frozenset({"type", "signed", "scale", "offset", "unit", "range", "raw_range", "default"})
 
 
 class PieceBuilder:
     """Builds the bits of parts."""
 
-    def __init__(self, report: Reporter) -> None:
-        """``report`` collects the errors."""
+    def __init__(self, report: Reporter, types: TypeBuilder) -> None:
+        """``types`` are those of values."""
         self._report = report
+        self._types = types
 
     def whole(self, name: str, spec: PartSpec, scalar: Scalar, path: Path) -> PartBits | None:
         """All bits of a part with one role; None for a role that needs no bits."""
@@ -36,6 +40,33 @@ class PieceBuilder:
             case _:
                 return None
 
+    def value(self, name: str, spec: PartSpec, path: Path) -> tuple[Scalar, tuple[PartBits, ...]]:
+        """The integer of a part without a role, and the values in it."""
+        given = {key: getattr(spec, key) for key in spec.model_fields_set & FieldSpec.model_fields.keys()}
+        kind = self._types.build(FieldSpec.model_construct(_fields_set=set(given), **given), path)
+        match kind:
+            case Bits():
+                found = [(each.name, each.shift, each.type, each.doc) for each in kind.members]
+                bits = tuple(self._number(*each, path) for each in found)
+                return kind.container, bits
+            case Scalar() if kind.settable and kind.meaning != "bool" and not isinstance(kind.meaning, Float):
+                container = _container(kind)
+                return container, (self._number(name, 0, kind, spec.doc, path),)
+            case _:
+                if kind is not None:
+                    what = f"{shown(spec.type)} is not the type of a value of every frame"
+                    self._fault(
+                        "not-applicable", (*path, "type"), what, "use an integer, an enum, flags, or bits"
+                    )
+                self._report.taint(path)
+                return _container(None), ()
+
+    def _number(self, name: str, shift: int, number: Scalar, doc: str, path: Path) -> PartBits:
+        if number.required:
+            what, hint = f"{name} has no default, and 0 is not legal", "add a default"
+            self._report.error("default-out-of-range", path, what, hint, of_key=True)
+        return PartBits(name=name, role="value", shift=shift, bits=number.bits, type=number, doc=doc)
+
     def inside(self, specs: Mapping[str, PartBitSpec], container: Scalar, path: Path) -> tuple[PartBits, ...]:
         """The bits of an integer with several roles."""
         found: list[PartBits] = []
@@ -47,22 +78,30 @@ class PieceBuilder:
                 self._fault("bits-do-not-fit", place, what, f"use bits 0..{container.bits - 1}")
                 continue
             bits = self._inside(name, spec, place)
+            if bits is None:
+                continue
             if other := next((each.name for each in found if each.mask & bits.mask), None):
                 self._fault("bits-overlap", place, f"{name} overlaps {other}", "use different bits")
             found.append(bits)
         return tuple(found)
 
-    def _inside(self, name: str, spec: PartBitSpec, path: Path) -> PartBits:
+    def _inside(self, name: str, spec: PartBitSpec, path: Path) -> PartBits | None:
         first, last = spec.at
         width, role = last + 1 - first, spec.role or ("constant" if spec.const else None)
-        if role is None or (spec.role and spec.const):
-            what = f"{name} has {'a role and a constant' if spec.role else 'neither a role nor a constant'}"
-            self._fault("bad-frame", path, what, "use role: message, address or direction, or const: NUMBER")
+        if role is None:
+            number = self._types.bits(spec, path)
+            return self._number(name, first, number, spec.doc, path) if number else None
+        if spec.role and spec.const:
+            hint = "omit one of them"
+            self._fault("bad-frame", path, f"{name} has a role and a constant", hint)
+        for key in spec.model_fields_set & VALUE_KEYS:
+            what = f"'{key}' has no effect on bits with a role or a constant"
+            self._fault("not-applicable", (*path, key), what, "remove it")
         if spec.values is not None and role != "direction":
             self._fault("not-applicable", (*path, "values"), "'values' has no effect here", "remove it")
         return PartBits(
             name=name,
-            role=role or "constant",
+            role=role,
             shift=first,
             bits=width,
             constants=self._constants(spec, width, path) if role == "constant" else (),
@@ -97,6 +136,12 @@ class PieceBuilder:
 
     def _fault(self, rule: str, path: Path, what: str, hint: str) -> None:
         self._report.error(rule, path, what, hint, of_key=True)
+
+
+def _container(number: Scalar | None) -> Scalar:
+    """The unsigned integer that holds a number; any for None."""
+    bits, chunks = (number.bits, number.chunks) if number else (8, byte_chunks(1, "big"))
+    return Scalar(bits=bits, chunks=chunks, minimum=0, maximum=(1 << bits) - 1)
 
 
 def placed(parts: tuple[Part, ...]) -> tuple[Part, ...]:

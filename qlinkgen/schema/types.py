@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from qlinkgen.model.types import Array, Bits, Blob, Scalar
-from qlinkgen.schema.compounds import build_array, build_bits, build_blob
+from qlinkgen.schema.compounds import bit_scalar, build_array, build_bits, build_blob
 from qlinkgen.schema.constants import INTEGER, build_enum, build_flags
-from qlinkgen.schema.file_model import FieldSpec, RecordSpec, SchemaFile
+from qlinkgen.schema.file_model import BitSpec, FieldSpec, RecordSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
 from qlinkgen.schema.report import Reporter
@@ -69,6 +69,11 @@ class TypeBuilder:
         if self.build(spec, path, (name,)) is None or len(self._report.faults) > before:
             self._report.taint(path)
         self._chain -= 1
+
+    def bits(self, spec: BitSpec, path: Path) -> Scalar | None:
+        """The number in bits of an integer; None if its type is unknown."""
+        location = Location(self._report, path, frozenset(spec.model_fields_set))
+        return bit_scalar(spec, spec.at[1] + 1 - spec.at[0], self._scalars, location)
 
     def use(self, name: str) -> None:
         """Note that a record is used."""

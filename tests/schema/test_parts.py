@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-import pytest
+import json
+from pathlib import Path
 
+import pytest
+from click.testing import CliRunner
+
+from qlinkgen.backends import python
+from qlinkgen.cli import cli
 from qlinkgen.model.frame import DelimitedFrame, Part
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.reading import BadFrame
@@ -183,8 +190,21 @@ def test_each_of_several_constants_is_accepted(wire: str, kind: str) -> None:
         ("head: {type: u8, bits: {a: {at: 8, const: 1}}}", "a extends to bit 8"),
         ("head: {type: u8, bits: {a: {at: 0..1, const: 1}, b: {at: 1, const: 1}}}", "b overlaps a"),
         ("head: {type: u8, bits: {a: {at: 0..1, const: 4}}}", "4 does not fit 2 bits"),
-        ("head: {type: u8, bits: {a: 0}}", "'0' has the wrong type"),
-        ("head: {type: u8, bits: {a: {at: 0}}}", "a has neither a role nor a constant"),
+        (
+            "head: {type: u8, bits: {a: {at: 0..3, range: 1..17}}}",
+            "raw values of 1..17 do not fit 4 unsigned bits",
+        ),
+        ("head: {type: u8, bits: {a: {at: 0..3, range: 1..3}}}", "a has no default, and 0 is not legal"),
+        (
+            "head: {type: u8, bits: {a: {at: 0..3, role: message, range: 1..3}}}",
+            "'range' has no effect on bits with a role or a constant",
+        ),
+        ("more: {type: u8, range: 1..3}", "more has no default, and 0 is not legal"),
+        ("more: {type: f32}", "'f32' is not the type of a value of every frame"),
+        ("more: {type: 'u8[4]'}", "'u8[4]' is not the type of a value of every frame"),
+        ("more: {type: part}", "unknown type 'part'"),
+        ("more: bool", "'bool' is not the type of a value of every frame"),
+        ("value: u8", "'value' and the frame's 'value' both become value"),
         ("head: {type: u8, bits: {a: {at: 0, role: message, const: 1}}}", "a has a role and a constant"),
         ("way: {role: direction, type: u8}", "way has no values"),
         (
@@ -213,3 +233,77 @@ def test_wrong_pieces(part: str, what: str) -> None:
     protocol, faults = loads(text, "sample")
     assert protocol is None
     assert what in [fault.message for fault in faults]
+
+
+VALUES = """\
+qlinkgen: 1
+protocol: {name: sample, revision: "1", source: Made up}
+byteorder: little
+enums: {part: {type: u8, values: {all: 0, motor: 1}}}
+frame:
+  parts:
+    start: FD
+    length: {type: u8, counts: [data]}
+    head:
+      type: u8
+      bits: {signed: 0, level: {at: 1..3, range: 1..5, default: 1}, node: {at: 4..7, role: address}}
+    component: {type: part, default: motor}
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..16}
+    check: {type: u8, algorithm: sum8, over: [length, head, component, code, data]}
+    trim: {type: i8, scale: 1/2, unit: V}
+bus: {kind: master_slave, nodes: 1..7}
+commands: {set: {id: 5, addressing: node, request: {value: u16}, response: {}, repeat: safe}}
+"""
+
+
+def values() -> Protocol:
+    protocol, faults = loads(VALUES, "sample")
+    assert protocol is not None, faults
+    return protocol
+
+
+def test_values_of_every_frame_travel_in_the_interpreter() -> None:
+    codec = Codec(plan_of(values()))
+    given = {"signed": 1, "level": 3, "component": 0, "trim": -3, "value": 7}
+    frame = codec.encode("set.request", given, 3)
+    assert frame.hex(" ") == "fd 02 37 00 05 07 00 45 fd"
+    decoded = codec.decode(frame, "request")
+    assert decoded.beside == {"signed": 1, "level": 3, "component": 0, "trim": -3}
+    assert (decoded.address, decoded.values) == (3, {"value": 7})
+    assert codec.encode("set.response", {}, 3).hex(" ") == "fd 00 32 01 05 38 00"
+    with pytest.raises(BadFrame) as caught:
+        codec.decode(bytes.fromhex("fd 02 3d 00 05 07 00 4b fd"), "request")
+    assert (caught.value.kind, caught.value.field) == ("range", "level")
+
+
+def test_values_of_every_frame_are_attributes_in_python() -> None:
+    module = python.load(values())
+    message = module.SetRequest(node=3, signed=True, level=3, component=module.Part.ALL, trim=-1.5, value=7)
+    assert message.to_frame().hex(" ") == "fd 02 37 00 05 07 00 45 fd"
+    assert module.decode_request(message.to_frame()) == message
+    assert module.SetRequest(node=3, value=7) != message
+    assert "component=Part.ALL" in repr(message)
+    assert module.SetRequest.from_bytes(b"\7\0", 3) == module.SetRequest(node=3, value=7)
+    with pytest.raises(module.EncodeError, match="level: 6 cannot be sent"):
+        module.SetRequest(node=3, level=6, value=7).to_frame()
+
+
+def test_values_of_every_frame_are_keys_beside_the_address(tmp_path: Path) -> None:
+    path = tmp_path / "sample.yaml"
+    path.write_text(VALUES, "utf-8")
+    given = ["set", "--node", "3", "value=7", "component=all", "level=3", "signed=true", "trim=-1.5"]
+    wire = ran("encode", path, *given)
+    line = ran("decode", path, "--direction", "request", wire)
+    assert json.loads(line) == {
+        "message": "set.request", "node": 3, "signed": True, "level": 3, "component": "all", "trim": -1.5,
+        "fields": {"value": 7},
+    }  # fmt: skip
+    assert ran("encode", path, "--json", line) == wire
+    assert ".level      3" in ran("explain", path, wire)
+
+
+def ran(*words: object) -> str:
+    done = CliRunner().invoke(cli, [str(word) for word in words])
+    assert done.exit_code == 0, done.output
+    return done.output.strip()

@@ -82,6 +82,10 @@ class _Source:
             "    int total;",
         )
         self._add("    (void)node;")
+        if self.protocol.frame_values:
+            self._add("    @p@_parts_t parts = @P@_PARTS_INIT;")
+        for value in self.protocol.frame_values:
+            self._add(*(f"    {line}" for line in _parsed(value, "parts.")))
         for value in message.values:
             self._add(*(f"    {line}" for line in _parsed(value, "m.")))
         call = "&m, " if has_struct else ""
@@ -99,7 +103,8 @@ class _Source:
             has_sum = self.header.sum_bits and message.direction == "response"
             return self._filled("@p@_request_sum(bytes_a, from_hex(node, bytes_a)), ") if has_sum else ""
         bits = self.header.address_bits
-        return f"(uint{bits}_t)strtoul(node, NULL, 0), " if bits else ""
+        whom = f"(uint{bits}_t)strtoul(node, NULL, 0), " if bits else ""
+        return f"{whom}&parts, " if self.protocol.frame_values else whom
 
     def _decode(self, message: Message) -> None:
         function, stem = self.names.function(message), self.names.stem(message)
@@ -158,6 +163,11 @@ class _Source:
             f'    printf("ok %llu", (unsigned long long)frame.{address});'
             if address
             else '    printf("ok -");',
+            *(
+                f"    {line}"
+                for value in self.protocol.frame_values
+                for line in _printed(value, "frame.parts.")
+            ),
             shown,
             "}",
         )
@@ -203,6 +213,10 @@ class _Source:
             self._add("            default: break;", "            }", "        }")
         self._add("        if (status != @P@_OK) {", '            printf("%s", kind_of(status));')
         self._add("        } else {", '            printf("message:%s:", name);', f"            {node}")
+        for value in self.protocol.frame_values:
+            assert isinstance(value.type, Scalar)
+            form, cast = ("%lld", "long long") if value.type.signed else ("%llu", "unsigned long long")
+            self._add(f'            printf("{form}:", ({cast})frame.parts.{naming.member(value.name)});')
         self._add("            if (frame.size == 0u) { putchar('-'); }")
         self._add(
             "            put_digits(frame.payload, frame.size);",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.c import crc, framing
+from qlinkgen.backends.c.checks import condition
 from qlinkgen.backends.c.coding import EndedView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.marked import PLACE, MarkedView, Shapes, marked_view, shape
@@ -59,6 +60,7 @@ class DispatchView:
 
     is_broadcast: str
     slave_arguments: str
+    values_right: str
     listener: str
     listener_address: str
     listener_argument: str
@@ -153,10 +155,13 @@ class FrameSection:
         """Properties of the frame for the dispatch template."""
         name, protocol = self.view.address, self.plan.protocol
         broadcast = protocol.bus.broadcast is not None
+        values = self.plan.frame.envelope.values
+        refused = list(framing.address_of(self.plan, name).refused)
         summed = f"{protocol.name}_frame_sum(frame), " if self.request_sum else ""
         return DispatchView(
             is_broadcast=f"frame->{name} == {protocol.name.upper()}_BROADCAST" if broadcast else "false",
-            slave_arguments=f"slave->{name}, " if name else summed,
+            slave_arguments=(f"slave->{name}, " if name else summed) + ("&slave->parts, " if values else ""),
+            values_right=f"!({condition(refused)})" if refused else "",
             listener="listener" if protocol.directions == ("message",) else "master",
             listener_address=f", {self.view.address_type} {name}" if name else "",
             listener_argument=f", frame->{name}" if name else "",

@@ -4,30 +4,40 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from qlinkgen.backends.c.checks import condition, refused_when_received
 from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import size_terms
 from qlinkgen.model.message import Message
+from qlinkgen.model.naming import member
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import ByMark, FramePlan
-from qlinkgen.plan.tree import MessagePlan
+from qlinkgen.plan.tree import MessagePlan, Plan
 
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """The address of a frame in C: its name, "" if there is none, and its bits."""
+    """The address of a frame in C: its name, "" if there is none, and its bits; and the values of the frame.
+
+    Attributes:
+        values_type: type of the values of the frame, "" if there are none.
+        refused: conditions that hold if a value of ``frame`` is out of range.
+    """
 
     name: str
     bits: int
+    values_type: str = ""
+    refused: tuple[str, ...] = ()
 
     @property
     def parameter(self) -> str:
-        """The address as a parameter of a function."""
-        return f"{unsigned_type(self.bits)} {self.name}, " if self.name else ""
+        """Both as parameters of a function."""
+        parts = f"const {self.values_type} *parts, " if self.values_type else ""
+        return (f"{unsigned_type(self.bits)} {self.name}, " if self.name else "") + parts
 
     @property
     def argument(self) -> str:
-        """The address as an argument of a call."""
-        return f"{self.name}, " if self.name else ""
+        """Both as arguments of a call."""
+        return (f"{self.name}, " if self.name else "") + ("parts, " if self.values_type else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,12 +154,25 @@ def expected(names: Names, address: Address, message: MessagePlan) -> Expected:
         function=names.function(message.message),
         has_struct=bool(message.message.values),
         has_bytes=bool(message.message.fields),
-        allowed=allowed(message.allowed, address.name and f"frame->{address.name}", address.bits),
+        allowed=_both(
+            allowed(message.allowed, address.name and f"frame->{address.name}", address.bits),
+            f"!({condition(list(address.refused))})" if address.refused else "",
+        ),
         address_allowed=allowed(message.allowed, address.name, address.bits),
     )
 
 
-def address_of(frame: FramePlan, name: str) -> Address:
+def _both(first: str, second: str) -> str:
+    return f"({first}) && {second}" if first and second else first or second
+
+
+def address_of(plan: Plan, name: str) -> Address:
     """The address of the frames of a protocol; one that shares a byte has the type of a byte."""
-    found = frame.envelope.address
-    return Address(name, found[0].bits if found else 8)
+    envelope = plan.frame.envelope
+    refused = [
+        test
+        for _, each in envelope.values
+        for test in refused_when_received(each.number, f"frame->parts.{member(each.name)}")
+    ]
+    kind = f"{plan.protocol.name}_parts_t" if envelope.values else ""
+    return Address(name, envelope.address[0].bits if envelope.address else 8, kind, tuple(refused))

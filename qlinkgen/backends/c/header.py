@@ -16,7 +16,7 @@ from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
 from qlinkgen.backends.c.frames import FrameSection, frame_section
 from qlinkgen.backends.c.layout import Helper, Layouts
-from qlinkgen.backends.c.messages import MessageWriter, Rounding, nearest_helpers
+from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.parts import in_hex
 from qlinkgen.backends.c.sizes import SizeView, size_view
@@ -96,7 +96,7 @@ class Header:
         self._writer = MessageWriter(self._names, self._layouts, self._types)
         self._kept = tuple(each.message for each in plan.messages)
         self._section = frame_section(plan, self._layouts)
-        self._address = framing.address_of(plan.frame, self._section.view.address)
+        self._address = framing.address_of(plan, self._section.view.address)
         self._wide = any(map(framing.is_wide, plan.messages))
 
     def text(self) -> str:
@@ -104,7 +104,7 @@ class Header:
         plan = self._plan
         sections = [
             self._check_value(),
-            self._place("frame_common", f=self._section.view),
+            self._place("frame_common", f=self._section.view, beside=self._beside()),
             *self._directions(),
             *[self._frame_part(name) for name in self._section.templates],
             *[self._record(layout) for layout in plan.layouts],
@@ -136,6 +136,12 @@ class Header:
             judgement=section.judgement,
             **section.views,
         )
+
+    def _beside(self) -> Beside | None:
+        """The struct of the values of every frame, None without any."""
+        held = {member.name: member for _, member in self._plan.frame.envelope.values}
+        stated = self._protocol.frame_values
+        return self._writer.beside([(held[each.name], each) for each in stated]) if held else None
 
     def _address_groups(self) -> list[framing.AddressGroup]:
         """Sets of legal addresses of the encoded messages."""

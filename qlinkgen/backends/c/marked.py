@@ -56,7 +56,7 @@ def marked_view(plan: Plan) -> MarkedView:
     end, check = plan.frame.end, plan.frame.check
     assert isinstance(end, ByMark)
     assert end.end.end_id is not None
-    header, size, sender = end.header, check.size if check else 0, sender_of(plan.frame)
+    header, size, sender = end.header, check.size if check else 0, sender_of(plan.frame, plan.protocol.name)
     most = plan.frame.max_payload + size
     return MarkedView(
         marker=in_hex(header.marker),

@@ -14,7 +14,7 @@ from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.model import naming
-from qlinkgen.model.fields import Layout
+from qlinkgen.model.fields import Layout, Value
 from qlinkgen.plan.payload import (
     BytesStep,
     Holder,
@@ -65,6 +65,14 @@ class MessageView:
     decode_parameters: str
     size_text: str
     comment_ends_at_head: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """The struct of the values of every frame."""
+
+    members: list[StructMember]
+    initialiser: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +138,11 @@ class MessageWriter:
             size_text=_size_text(payload.least, payload.most),
             comment_ends_at_head=not payload.steps and len(head) == 1,
         )
+
+    def beside(self, held: Sequence[tuple[Member, Value]]) -> Beside:
+        """The struct of the values of every frame."""
+        members = [m for each, value in held for m in self._members(each, member_note(value, each))]
+        return Beside(members, ", ".join(self._initialiser(each) for each, _ in held))
 
     def _same(self, what: str, shape: object, plan: MessagePlan) -> str:
         """The first message with the same shape, "" if this is the first."""

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import assert_never
 
+from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_before_sending
 from qlinkgen.backends.c.crc import CheckView, render
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import grouped, unsigned, unsigned_type
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.frame import ATTRIBUTE
-from qlinkgen.model.naming import address_member
+from qlinkgen.model.naming import address_member, member
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -36,31 +37,39 @@ from qlinkgen.plan.framing import (
     Seed,
     Slot,
 )
+from qlinkgen.plan.payload import Member
 from qlinkgen.plan.transparency import FrameStuffing
 
 
 @dataclass(frozen=True, slots=True)
 class Sender:
-    """Message number and address of a frame: their C names and types."""
+    """Message number, address and values of a frame: their C names and types; "" without them."""
 
     id: str
     id_type: str
     address: str
     address_type: str
+    values_type: str
 
     @property
-    def parameters(self) -> str:
-        """Both as parameters."""
+    def identity(self) -> str:
+        """Message number and address as parameters."""
         address = f", {self.address_type} {self.address}" if self.address else ""
         return f"{self.id_type} {self.id}{address}"
 
     @property
+    def parameters(self) -> str:
+        """All as parameters."""
+        return f"{self.identity}, const {self.values_type} *parts" if self.values_type else self.identity
+
+    @property
     def arguments(self) -> str:
-        """Both as arguments."""
-        return f"{self.id}, {self.address}" if self.address else self.id
+        """All as arguments."""
+        parts = ("parts",) if self.values_type else ()
+        return ", ".join((self.id, *((self.address,) if self.address else ()), *parts))
 
 
-def sender_of(frame: FramePlan) -> Sender:
+def sender_of(frame: FramePlan, prefix: str) -> Sender:
     """The sender of a frame; names are "id" and that of the address, changed if taken."""
     envelope = frame.envelope
     address = address_member(frame.address)
@@ -70,6 +79,7 @@ def sender_of(frame: FramePlan) -> Sender:
         unsigned_type(sum(bits.bits for bits in envelope.id) or 8),
         address,
         address_type if address else "",
+        f"{prefix}_parts_t" if envelope.values else "",
     )
 
 
@@ -152,8 +162,11 @@ class PartWriter:
 
     @property
     def reads_tail(self) -> bool:
-        """Whether message id or address follow the payload."""
-        return any(bits.part in self.envelope.back for bits in (*self.envelope.id, *self.envelope.address))
+        """Whether message id, address or a value follow the payload."""
+        held = [bits.part for bits in (*self.envelope.id, *self.envelope.address)]
+        return any(
+            part in self.envelope.back for part in (*held, *(part for part, _ in self.envelope.values))
+        )
 
     def _put(self, part: Part, place: str, header: str, sent: str) -> list[str]:
         at = self._at(part)
@@ -193,10 +206,31 @@ class PartWriter:
                 shifted = self.sender.address
             case ConstantSlot():
                 return f"({kind}){unsigned(slot.values[0], slot.bits, hexadecimal=True)}"
+            case Member():
+                shifted = as_unsigned(slot.number, f"parts->{member(slot.name)}")
             case _:
                 assert_never(slot)
         mask = unsigned((1 << slot.bits) - 1, slot.bits, hexadecimal=True)
         return f"({kind})({shifted} & {mask})"
+
+    def refused_values(self, owner: str = "parts->") -> list[str]:
+        """Conditions that hold if a value of the frame cannot be sent."""
+        return [
+            test
+            for _, each in self.envelope.values
+            for test in refused_before_sending(each.number, f"{owner}{member(each.name)}")
+        ]
+
+    def get_values(self) -> list[str]:
+        """Statements that read the values of a received frame."""
+        lines = []
+        for part, each in self.envelope.values:
+            kind = unsigned_type(each.bits)
+            found = self._taken(self.get(part), each, whole=each.bits == part.integer.bits)
+            raw = found if each.number.meaning == "bool" else f"({kind}){found}"
+            value = from_unsigned(each.number, raw, self.layouts)
+            lines.append(f"frame->parts.{member(each.name)} = {value};")
+        return lines
 
     def put_check(self, place: str, value: str) -> list[str]:
         """Statements that write the check value; the payload ends at ``place``."""

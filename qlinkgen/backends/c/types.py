@@ -98,7 +98,8 @@ class Types:
         Fields may narrow a type; the most frequent variant becomes the C type.
         """
         found: dict[str, Counter[Scalar]] = {}
-        for number in self.numbers():
+        beside = (member.number for _, member in self._plan.frame.envelope.values)
+        for number in (*beside, *self.numbers()):
             if number.type_name and not isinstance(number.meaning, Enum | Flags) and number.meaning != "bool":
                 found.setdefault(number.type_name, Counter())[_kept(number)] += 1
         return {name: self._kind(name, counts.most_common(1)[0][0]) for name, counts in found.items()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
@@ -34,8 +35,10 @@ class FrameView:
     id_type: str
     address: str
     address_type: str
+    identity: str
     parameters: str
     arguments: str
+    has_values: bool
     needs_direction: bool
     scan_direction: str
     init_direction: str
@@ -54,7 +57,11 @@ def frame_view(
     plan: Plan, *, body_size: int = 0, check_optional: bool = False, max_wire: int = 0
 ) -> FrameView:
     """What every frame has."""
-    prefix, sender, receiver = plan.protocol.name, sender_of(plan.frame), plan.frame.receiver
+    prefix, sender, receiver = (
+        plan.protocol.name,
+        sender_of(plan.frame, plan.protocol.name),
+        plan.frame.receiver,
+    )
     ring, directed = plan.protocol.directions == ("message",), _directed(plan)
     answered = "request_check" if isinstance(receiver, InStep) else "request_check or _response_check"
     return FrameView(
@@ -62,8 +69,10 @@ def frame_view(
         id_type=sender.id_type,
         address=sender.address,
         address_type=sender.address_type,
+        identity=sender.identity,
         parameters=sender.parameters,
         arguments=sender.arguments,
+        has_values=bool(sender.values_type),
         needs_direction=directed,
         scan_direction=f"{prefix}_direction_t direction, " if directed else "",
         init_direction=f", {prefix}_direction_t direction" if directed else "",
@@ -116,6 +125,8 @@ class PartsView:
         judges: statements that verify them.
         identified_late: message id or address follow the payload.
         unused: the parameter for the message id if frames have none, otherwise "".
+        refused_values: conditions that hold if a value of the frame cannot be sent.
+        get_values: statements that read the values of a received frame.
     """
 
     late_insert: bool
@@ -134,12 +145,19 @@ class PartsView:
     judges: list[str]
     identified_late: bool
     unused: str
+    refused_values: list[str]
+    get_values: list[str]
 
     @property
     def reads_tail(self) -> bool:
         """Whether bytes after the payload are read."""
-        judged = any("end[" in line for line in self.judges)
+        judged = _name("end", self.judges)
         return bool(self.wrong_tail or self.check_differs or self.identified_late or judged)
+
+
+def _name(variable: str, lines: Sequence[str]) -> bool:
+    """Whether statements use a variable."""
+    return any(re.search(rf"\b{variable}\b", line) for line in lines)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +175,7 @@ class PlainView:
     @property
     def writes_end(self) -> bool:
         """Whether bytes after the payload are written here."""
-        return any("end[" in line for line in (*self.put_trailer, *self.put_check, *self.fills))
+        return _name("end", (*self.put_trailer, *self.put_check, *self.fills))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +205,7 @@ class StuffedView:
     @property
     def writes_end(self) -> bool:
         """Whether bytes after the payload are written before the pass over them."""
-        return any("trailer[" in line for line in (*self.put_trailer, *self.put_check, *self.fills))
+        return _name("trailer", (*self.put_trailer, *self.put_check, *self.fills))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,9 +268,8 @@ class PartsViews:
 def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
     """The views of a delimited frame."""
     seeds = plan.messages[0].message.seeds if plan.messages else ()
-    writer = PartWriter(
-        plan.protocol.name, plan.frame, sender_of(plan.frame), layouts, seeds, directed=_directed(plan)
-    )
+    sender = sender_of(plan.frame, plan.protocol.name)
+    writer = PartWriter(plan.protocol.name, plan.frame, sender, layouts, seeds, directed=_directed(plan))
     envelope, receiver, transparency = plan.frame.envelope, plan.frame.receiver, plan.frame.transparency
     rule, body_size = None, 0
     match transparency:
@@ -308,6 +325,8 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
         judges=writer.judges("body", "end", f"payload + {writer.head}U"),
         identified_late=writer.reads_tail,
         unused="" if envelope.id else writer.sender.id,
+        refused_values=writer.refused_values(),
+        get_values=writer.get_values(),
     )
 
 

@@ -8,7 +8,7 @@ from qlinkgen.backends.base import banner
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import numbers, wrapped
 from qlinkgen.backends.conformance.messages import ERRORS, Entries, Entry
-from qlinkgen.backends.conformance.rows import Right, kinds_in, most_values, rows_of
+from qlinkgen.backends.conformance.rows import Right, held, kinds_in, most_values, rows_of
 from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.naming import file_stem
@@ -53,6 +53,8 @@ class KitView:
     P: str
     id: str
     address: str
+    has_values: bool
+    store: str
     directed: bool
     unpacks: bool
     listener: str
@@ -115,7 +117,7 @@ class Kit:
         most_wire = max(len(row.wire) for row in self._every)
         members = max(len(each.members) for each in entries)
         records = any(each.payload.records for each in self._plan.messages)
-        values = max(most_values(header, each.payload) for each in self._plan.messages)
+        values = max(most_values(header, held(each)) for each in self._plan.messages)
         printed = max(tests, most_wire, (1 << header.address_bits) - 1)
         return KitView(
             about=[piece for line in banner(self._plan.protocol) for piece in wrapped(line)],
@@ -124,6 +126,8 @@ class Kit:
             P=header.upper,
             id=header.id,
             address=header.address,
+            has_values=bool(self._plan.frame.envelope.values),
+            store=self._entries.store,
             directed=header.directed,
             unpacks=header.unpacks,
             listener=header.listener,

@@ -126,6 +126,11 @@ class Entries:
         found = [each.events for each in self._streams.values() if each]
         return max((len(events) for each in found for events in each if events is not None), default=0)
 
+    @property
+    def store(self) -> str:
+        """The place of the messages."""
+        return "store.message." if self._plan.frame.envelope.values else "store."
+
     def views(self) -> list[Entry]:
         """The views of all messages."""
         return [self._view(message) for message in self._plan.messages]
@@ -157,8 +162,9 @@ class Entries:
         framed = plan.decoded and not (self._plan.frame.needs_request and plan.direction == "response")
         refused = self._unsent(plan) if plan.encoded else []
         function, stem = header.function(message), naming.member(header.stem(message))
-        store = f"&store.{stem}, " if message.values else ""
+        store = f"&{self.store}{stem}, " if message.values else ""
         address = "address, " if header.address else ""
+        address += "&store.parts, " if self._plan.frame.envelope.values else ""
         part = "request_sum, " if header.sum_bits and plan.direction == "response" else ""
         decode = f"decode({store}" if framed else f"from_frame({store}{part}"
         handled, called = self._has_handler(plan), self._has_callback(plan)
@@ -204,7 +210,10 @@ class Entries:
         return list(unsent(self._header, message, right))
 
     def _members(self, message: MessagePlan) -> list[str]:
-        return self._rows_of(f"{self._header.function(message.message)}_t", "", message.payload)
+        values = [
+            line for _, each in message.envelope.values for line in self._member("store_t", "parts.", each)
+        ]
+        return values + self._rows_of(f"{self._header.function(message.message)}_t", "", message.payload)
 
     def _rows_of(self, struct: str, inside: str, payload: PayloadPlan) -> list[str]:
         """The rows of the values of a message or a record."""
@@ -241,7 +250,7 @@ class Entries:
     def _lines(self, row: Row, found: Stream | None, index: int) -> list[str]:
         """A row of the table, with a comment if its first byte does not describe it."""
         pieces = [self._head(row)]
-        if isinstance(row, Right) and row.message.values:
+        if isinstance(row, Right) and (row.message.values or self._plan.frame.envelope.values):
             pieces.append(self._sized(row.values))
         if self._header.sum_bits and row.message.direction == "response":
             pieces.append(self._sized(row.request))

@@ -12,7 +12,7 @@ from qlinkgen.model.fields import Record, Records, Value
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.values import Native, default_of, from_json, raw_number
-from qlinkgen.plan import Plan
+from qlinkgen.plan import MessagePlan, Plan
 from qlinkgen.plan.payload import (
     BytesStep,
     Holder,
@@ -102,7 +102,8 @@ def _right(plan: Plan, header: Header, entry: JsonObject) -> Right:
         message=message,
         kinds=kinds,
         address=entry.get(record_key(plan.frame.address), message.default_address),
-        values=_values(header, message.values, planned.payload, entry["fields"], entry.get("raw", {})),
+        values=_beside(plan, header, entry)
+        + _values(header, message.values, planned.payload, entry["fields"], entry.get("raw", {})),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),
         request=bytes.fromhex(entry.get("request", "")),
@@ -129,15 +130,31 @@ def _source(entry: JsonObject) -> str:
 # Values
 
 
-def most_values(header: Header, payload: PayloadPlan) -> int:
-    """Maximum size of the values of a payload."""
-    return sum(_most(header, step) for step in payload.settable)
+def held(message: MessagePlan) -> Sequence[Holder]:
+    """What a vector has values of: the frame, then the message."""
+    return (*(member for _, member in message.envelope.values), *message.payload.settable)
 
 
-def value_sizes(header: Header, payload: PayloadPlan, values: bytes) -> list[int]:
+def _beside(plan: Plan, header: Header, entry: JsonObject) -> bytes:
+    """The values of the frame."""
+    found = b""
+    members = {member.name: member for _, member in plan.frame.envelope.values}
+    for value in plan.protocol.frame_values:
+        number, key = members[value.name].number, record_key(value.name)
+        native = from_json(value, entry[key]) if key in entry else default_of(value)
+        found += number_bytes(raw_number(value.name, number, native), header.width(number))
+    return found
+
+
+def most_values(header: Header, holders: Sequence[Holder]) -> int:
+    """Maximum size of these values in a vector."""
+    return sum(_most(header, step) for step in holders)
+
+
+def value_sizes(header: Header, holders: Sequence[Holder], values: bytes) -> list[int]:
     """Size of each value in a vector."""
     sizes: list[int] = []
-    for step in payload.settable:
+    for step in holders:
         match step:
             case ValueStep() | Member() | RecordStep():
                 sizes.append(_most(header, step))
@@ -156,7 +173,7 @@ def _most(header: Header, step: Holder) -> int:
         case ValueStep() | Member():
             return header.width(step.number)
         case RecordStep():
-            return most_values(header, step.record.payload)
+            return most_values(header, step.record.payload.settable)
         case BytesStep() | ItemsStep() | RecordsStep():
             return _counted(header, step) + _item(header, step) * step.length.maximum
         case _:
@@ -176,7 +193,7 @@ def _item(header: Header, run: RunStep) -> int:
         case ItemsStep():
             return header.width(run.number)
         case RecordsStep():
-            return most_values(header, run.record.payload)
+            return most_values(header, run.record.payload.settable)
         case _:
             assert_never(run)
 

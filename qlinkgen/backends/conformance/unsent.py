@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from qlinkgen.backends.conformance.rows import Right, number_bytes, value_sizes
+from qlinkgen.backends.conformance.rows import Right, held, number_bytes, value_sizes
 from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Float, Scalar
 from qlinkgen.plan import MessagePlan
-from qlinkgen.plan.payload import Member, PayloadPlan, RecordStep, ValueStep
+from qlinkgen.plan.payload import Holder, Member, RecordStep, ValueStep
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,22 +25,22 @@ class Unsent:
 
 def unsent(header: Header, message: MessagePlan, right: Right) -> Iterator[Unsent]:
     """A valid vector once with each number, and the address, out of range by one."""
-    for what, values in _spoilt(header, message.payload, right.values):
+    for what, values in _spoilt(header, held(message), right.values):
         yield Unsent(what, right.address, values)
     for address in _addresses(header, message.message):
         yield Unsent(f"sent to {address}", address, right.values)
 
 
-def _spoilt(header: Header, payload: PayloadPlan, values: bytes) -> Iterator[tuple[str, bytes]]:
+def _spoilt(header: Header, holders: Sequence[Holder], values: bytes) -> Iterator[tuple[str, bytes]]:
     """The values once with each number out of range."""
     at = 0
-    for step, size in zip(payload.settable, value_sizes(header, payload, values), strict=True):
+    for step, size in zip(holders, value_sizes(header, holders, values), strict=True):
         own, after = values[at : at + size], values[at + size :]
         if isinstance(step, ValueStep | Member):
             for number in _outside(step.number, size):
                 yield f"{step.name} is {number}", values[:at] + number_bytes(number, size) + after
         if isinstance(step, RecordStep):
-            for what, inner in _spoilt(header, step.record.payload, own):
+            for what, inner in _spoilt(header, step.record.payload.settable, own):
                 yield f"{step.name}.{what}", values[:at] + inner + after
         at += size
 

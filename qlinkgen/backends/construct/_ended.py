@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from construct import Container
 
-from ._fields import Message
+from ._fields import Message, Values
 from ._frames import (
     Address,
     Constant,
@@ -187,9 +187,11 @@ class EndedFrame(Frame):
         address: int = 0,
         request: bytes = b"",
         number: int | None = None,
+        *,
+        beside: Values | None = None,
     ) -> bytes:
         """See Frame."""
-        plain = super().wrap(message, payload, address, request, number)
+        plain = super().wrap(message, payload, address, request, number, beside=beside)
         end = len(plain) - self.back
         inner = plain[self.front : end]
         for coding in self.coding:
@@ -202,12 +204,11 @@ class EndedFrame(Frame):
         cells = self._cells(wire[:end])
         payload = cells[self.payload.name]
         numbers: dict[type, int] = {}
+        found: dict[str, bytes] = {}
+        self._identify(found, numbers)
         for part in self.parts:
-            cell = cells[part.name]
-            if isinstance(part, Constant) and cell != part.data:
-                raise FrameError(
-                    "frame", f"{part.name} is {cell.hex()}, not {part.data.hex()}"
-                )
+            cell = found[part.name] = cells[part.name]
+            self._refuse(part, found)
             if (
                 isinstance(part, Length)
                 and part.integer.parse(cell) != len(payload) + part.bias
@@ -215,8 +216,9 @@ class EndedFrame(Frame):
                 raise FrameError(
                     "length", f"{part.name} does not count {len(payload)} bytes"
                 )
-            if isinstance(part, Id | Address):
-                numbers[type(part)] = part.integer.parse(cell)
+            known = len(numbers)
+            self._identify(found, numbers)
+            if len(numbers) > known and self.payload.name not in found:
                 self._check_begin(numbers)
         if len(wire) != end:
             raise FrameError("length", f"{len(wire) - end} bytes follow the frame")

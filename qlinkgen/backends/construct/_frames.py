@@ -20,7 +20,7 @@ from construct import (
     stream_write,
 )
 
-from ._fields import Message, Values
+from ._fields import BitFields, Message, Values
 
 
 class FrameError(ConstructError):
@@ -181,15 +181,18 @@ class ConstantBits(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """An integer whose bits have several roles."""
+    """An integer whose bits have several roles; ``values`` are those of every frame in them."""
 
     name: str
     integer: Construct
     slots: Sequence[IdBits | AddressBits | ConstantBits]
+    values: BitFields | None = None
 
-    def number(self, number: int, address: int) -> int:
-        """The integer for a message id and an address."""
+    def number(self, number: int, address: int, beside: Values) -> int:
+        """The integer for a message id, an address and values of the frame."""
         whole = 0
+        if self.values:
+            whole = int(self.integer.parse(self.values.build(beside)))
         for slot in self.slots:
             whole |= slot.value(number, address) << slot.shift
         return whole
@@ -207,7 +210,8 @@ class Equal(NamedTuple):
 
     def number(self, other: int) -> int:
         """The integer for a value of the other."""
-        return ((~other if self.inverted else other) + self.added) & (1 << self.bits) - 1
+        number = ~other if self.inverted else other
+        return (number + self.added) & (1 << self.bits) - 1
 
 
 class Mark(NamedTuple):
@@ -382,13 +386,22 @@ class Frame(Construct):
         address: int = 0,
         request: bytes = b"",
         number: int | None = None,
+        *,
+        beside: Values | None = None,
     ) -> bytes:
-        """A frame around a payload, which is not checked; ``number`` replaces the message id."""
+        """A frame around a payload, which is not checked; ``number`` replaces the message id.
+
+        ``beside`` has values of the frame.
+        """
         stuffing, shown = self.stuffing, message.id if number is None else number
         sent = stuffing.add(payload) if stuffing and not stuffing.over else payload
         cells: dict[str, bytes] = {}
         for part in self.parts:
-            cells[part.name] = self._cell(part, shown, sent, address, cells)
+            if isinstance(part, Cell):
+                whole = part.number(shown, address, beside or {})
+                cells[part.name] = bytes(part.integer.build(whole))
+            else:
+                cells[part.name] = self._cell(part, shown, sent, address, cells)
         cells |= message.seeds
         left = self.checks if message.checksum else []
         while left:  # a check value may cover others
@@ -421,15 +434,13 @@ class Frame(Construct):
                 return bytes(part.integer.build(number))
             case Address():
                 return bytes(part.integer.build(address))
-            case Cell():
-                return bytes(part.integer.build(part.number(number, address)))
             case Equal():
                 return self._equal(part, before)
             case Mark():
                 return part.byte(number, address)
             case Payload():
                 return payload
-            case Check():
+            case Cell() | Check():
                 return b""
 
     def _equal(self, part: Equal, cells: Mapping[str, bytes]) -> bytes:
@@ -454,7 +465,8 @@ class Frame(Construct):
                 path=path,
             )
         payload = message.build(obj.get("fields") or {})
-        wire = self.wrap(message, payload, address, context._params.get("request", b""))
+        request = context._params.get("request", b"")
+        wire = self.wrap(message, payload, address, request, beside=obj)
         stream_write(stream, wire, len(wire), path)
         return obj
 
@@ -477,6 +489,37 @@ class Frame(Construct):
             raise FrameError(
                 kind, f"received {sent.hex()}, expected {expected.hex()}"
             )
+
+    def _identify(self, cells: Mapping[str, bytes], found: dict[type, int]) -> None:
+        """Set message id and address if all of their parts are known."""
+        for kind, bits in ((Id, IdBits), (Address, AddressBits)):
+            pieces = [each for part in self.parts for each in _pieces(part, kind, bits)]
+            known = all(part.name in cells for part, *_ in pieces)
+            if known and (pieces or kind is Id):
+                found[kind] = 0
+            for part, shift, size, at in pieces if known else ():
+                number = int(part.integer.parse(cells[part.name])) >> shift
+                found[kind] |= (number & (1 << size) - 1) << at
+
+    def _refuse(self, part: Part, cells: Mapping[str, bytes]) -> None:
+        """Check a constant, or a derived number."""
+        seen, wrong = cells[part.name], False
+        match part:
+            case Constant():
+                wrong = seen != part.data
+            case Cell():
+                number = part.integer.parse(seen)
+                wrong = any(
+                    number >> slot.shift & (1 << slot.bits) - 1 not in slot.values
+                    for slot in part.slots
+                    if isinstance(slot, ConstantBits)
+                )
+            case Equal():
+                wrong = seen != self._equal(part, cells)
+            case _:
+                pass
+        if wrong:
+            raise FrameError("frame", f"{part.name} is {seen.hex()}")
 
     def _known(self, number: int) -> Message:
         if number not in self.by_id:
@@ -514,6 +557,12 @@ class Frame(Construct):
                 "range", f"{message.name} cannot have {self.address} {address}"
             )
         place = {self.address: address} if self.address else {}
+        for part in self.parts:
+            if isinstance(part, Cell) and part.values:
+                try:
+                    place |= part.values.parse(cells[part.name])
+                except ConstructError as error:
+                    raise FrameError("range", f"{part.name}; {error}") from None
         return Container(message=message.name, **place, fields=fields)
 
 
@@ -647,38 +696,6 @@ class DelimitedFrame(Frame):
                 raise FrameError(
                     "range", f"{message.name} cannot have address {numbers[Address]}"
                 )
-
-    def _identify(
-        self, cells: Mapping[str, bytes], numbers: dict[type, int]
-    ) -> None:
-        """Set message id and address if all of their parts are known."""
-        for kind, bits in ((Id, IdBits), (Address, AddressBits)):
-            pieces = [each for part in self.parts for each in _pieces(part, kind, bits)]
-            if all(part.name in cells for part, *_ in pieces) and (pieces or kind is Id):
-                numbers[kind] = sum(
-                    (part.integer.parse(cells[part.name]) >> shift & (1 << size) - 1) << at
-                    for part, shift, size, at in pieces
-                )
-
-    def _refuse(self, part: Part, cells: Mapping[str, bytes]) -> None:
-        """Check a constant, or a derived number."""
-        seen, wrong = cells[part.name], False
-        match part:
-            case Constant():
-                wrong = seen != part.data
-            case Cell():
-                number = part.integer.parse(seen)
-                wrong = any(
-                    number >> slot.shift & (1 << slot.bits) - 1 not in slot.values
-                    for slot in part.slots
-                    if isinstance(slot, ConstantBits)
-                )
-            case Equal():
-                wrong = seen != self._equal(part, cells)
-            case _:
-                pass
-        if wrong:
-            raise FrameError("frame", f"{part.name} is {seen.hex()}")
 
     def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
         numbers[Payload] = 0

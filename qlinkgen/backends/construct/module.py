@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import assert_never
 
-from qlinkgen.backends.construct.payload import Names, Types, comment, fields, integer, record
+from qlinkgen.backends.construct.payload import Names, Types, beside, comment, fields, integer, record
 from qlinkgen.backends.construct.tree import Call, Definition, Node, Ref, Sequence, hexadecimal
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.integer import Integer
@@ -32,8 +32,8 @@ from qlinkgen.plan.framing import (
     Part,
     PayloadPart,
     Rescan,
-    Slot,
 )
+from qlinkgen.plan.payload import Member
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -67,7 +67,7 @@ def _definitions(plan: Plan) -> Iterator[Definition]:
         again = message.command == command
         yield Definition(messages[each.name], _message(each, types), "" if again else said, again)
         command = message.command
-    yield from _frames(plan, messages)
+    yield from _frames(plan, messages, types)
 
 
 def _message(message: MessagePlan, types: Types) -> Call:
@@ -88,17 +88,17 @@ def _message(message: MessagePlan, types: Types) -> Call:
 # Frames
 
 
-def _frames(plan: Plan, messages: Mapping[str, str]) -> Iterator[Definition]:
+def _frames(plan: Plan, messages: Mapping[str, str], types: Types) -> Iterator[Definition]:
     frame = plan.frame
     for algorithm, name in _algorithms(frame.envelope).items():
         yield Definition(name, _algorithm(algorithm), algorithm.name)
     stated = plan.protocol.frame
     if not frame.needs_request:
-        yield Definition("LAYOUT", _layout(frame.envelope), comment(stated.doc, stated.section))
+        yield Definition("LAYOUT", _layout(frame.envelope, types), comment(stated.doc, stated.section))
     frames = []
     for direction in plan.protocol.directions:
         name = "FRAME" if direction == "message" else f"{direction.upper()}_FRAME"
-        layout = _layout(frame.envelopes[direction]) if frame.needs_request else Ref("LAYOUT")
+        layout = _layout(frame.envelopes[direction], types) if frame.needs_request else Ref("LAYOUT")
         chosen = Sequence(tuple(Ref(messages[each.name]) for each in plan.received(direction)))
         frames.append(Ref(name))
         yield Definition(name, _frame(frame, layout, chosen))
@@ -146,11 +146,11 @@ def _crc(algorithm: catalogue.Algorithm) -> Call:
     )
 
 
-def _layout(envelope: Envelope) -> Sequence:
-    return Sequence(tuple(_part(part, envelope) for part in envelope.parts))
+def _layout(envelope: Envelope, types: Types) -> Sequence:
+    return Sequence(tuple(_part(part, envelope, types) for part in envelope.parts))
 
 
-def _part(part: Part, envelope: Envelope) -> Call:
+def _part(part: Part, envelope: Envelope, types: Types) -> Call:
     match part:
         case ConstantPart():
             return Call("Constant", (part.name, part.data))
@@ -162,7 +162,9 @@ def _part(part: Part, envelope: Envelope) -> Call:
         case AddressPart():
             return Call("Address", (part.name, integer(part.integer)))
         case CellPart():
-            return Call("Cell", (part.name, integer(part.integer), Sequence(tuple(map(_slot, part.slots)))))
+            slots = tuple(_slot(slot) for slot in part.slots if not isinstance(slot, Member))
+            values = (("values", beside(part, types)),) if part.values else ()
+            return Call("Cell", (part.name, integer(part.integer), Sequence(slots)), values)
         case EqualPart():
             settings: dict[str, Node] = {"inverted": True} if part.inverted else {}
             settings |= {"added": part.added} if part.added else {}
@@ -180,7 +182,7 @@ def _part(part: Part, envelope: Envelope) -> Call:
             assert_never(part)
 
 
-def _slot(slot: Slot) -> Call:
+def _slot(slot: IdSlot | AddressSlot | ConstantSlot) -> Call:
     match slot:
         case IdSlot():
             return Call("IdBits", (slot.shift, slot.bits, slot.at))

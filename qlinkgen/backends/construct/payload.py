@@ -14,9 +14,11 @@ from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Message
+from qlinkgen.model.naming import record_key
 from qlinkgen.model.types import Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
+from qlinkgen.plan.framing import CellPart
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -136,6 +138,7 @@ class Types:
         return Definition(self._names[group.name], node, comment(group.doc, group.section))
 
     def _numbers(self) -> Iterator[tuple[Scalar, Node]]:
+        yield from ((member.number, _bits(member)) for _, member in self._plan.frame.envelope.values)
         payloads = [message.payload for message in self._plan.messages]
         payloads += [record.payload for record in all_records(payloads)]
         for step in (step for payload in payloads for step in payload.steps):
@@ -152,6 +155,10 @@ class Types:
                     pass
                 case _:
                     assert_never(step)
+
+    def value(self, number: Scalar, raw: Node) -> Node:
+        """The adapter with a default."""
+        return Call("Default", (self.of(number, raw), _shown(number, number.default)))
 
     def of(self, number: Scalar, raw: Node) -> Node:
         """The adapter from an integer to the native value."""
@@ -187,6 +194,12 @@ def record(layout: Layout, types: Types) -> Call:
     """The structure of a record."""
     steps = record_plan(layout).payload.steps
     return Call("Record", (layout.name, *(_Field(layout, types).of(step) for step in steps)))
+
+
+def beside(part: CellPart, types: Types) -> Call:
+    """The structure of the values of every frame in a part."""
+    members = (Named(record_key(each.name), types.value(each.number, _bits(each))) for each in part.values)
+    return Call("BitFields", (integer(part.integer), *members))
 
 
 class _Field:
@@ -246,7 +259,7 @@ class _Field:
         return Named(member.name, self._value(member.number, bits), self._inner[member.name])
 
     def _value(self, number: Scalar, raw: Node) -> Node:
-        return Call("Default", (self._types.of(number, raw), _shown(number, number.default)))
+        return self._types.value(number, raw)
 
 
 def _count(step: CountStep) -> Call:

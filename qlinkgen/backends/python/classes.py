@@ -169,7 +169,8 @@ class ClassBuilder:
         encoder = Encoder(message, self._place, title, number, scales)
         decoder = Decoder(message, self._place, title, scales)
         name = "" if self._place.envelope is None else "body"
-        names = sorted((attribute(each.name) for each in message.payload.settable), key=natural)
+        held = (*self._place.beside, *message.payload.settable)
+        names = sorted((attribute(each.name) for each in held), key=natural)
         return replace(
             head,
             slots=listing("__slots__ = (", [f'"{name}"' for name in names], ")", 4),
@@ -215,7 +216,7 @@ class ClassBuilder:
     def _scales_of(self, message: MessagePlan) -> dict[str, str]:
         """The constant that converts each scaled value, named after its type or else its field."""
         found = {}
-        for each in message.payload.settable:
+        for each in (*self._place.beside, *message.payload.settable):
             if isinstance(each, ValueStep | Member | ItemsStep) and each.number.scaling is not None:
                 found[each.name] = self._scale(each.name, each.number)
         return found
@@ -247,9 +248,10 @@ class ClassBuilder:
         spans = {end for span in message.message.addresses for end in span}
         default = f" = {message.message.default_address}" if len(spans) == 1 else ""
         arguments = [f"{address}: int{default}"] if address else []
-        arguments += [values.argument(each, place) for each in message.payload.settable]
+        held = (*place.beside, *message.payload.settable)
+        arguments += [values.argument(each, place) for each in held]
         body = [f"self.{address} = {address}"] if address else []
-        body += [values.assignment(each, place) for each in message.payload.settable]
+        body += [values.assignment(each, place) for each in held]
         taken = ["self", "*", *arguments] if arguments else ["self"]
         return [*wrapped("def __init__(", taken, ") -> None:", 4), *indented(body or ["pass"])]
 

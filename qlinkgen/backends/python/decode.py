@@ -143,15 +143,30 @@ class Decoder:
         test = f"len({place.data}) == {place.overhead}" if place.overhead else f"not {place.data}"
         lines: list[str] = []
         if place.envelope and (address := place.envelope.address):
-            raw = f"{address[0].part.name}_part"
+            raw = f"{place.address}_part"
             lines = [f"{raw} = {pieces.number(place.envelope, address, place.data, place.skipped)}"]
             lines += self._address_check(address[0].part, raw, _INDENT + 4)
             chosen = [f"{place.address}={raw}", *chosen]
         elif place.address and self.message.allowed is not None:
             # The caller sets the real address.
             chosen = [f"{place.address}={self.message.message.default_address}", *chosen]
-        lines += wrapped("return cls(", chosen, ")", _INDENT + 4)
-        return [f"if {test}:", *indented(lines)]
+        if not place.beside:
+            lines += wrapped("return cls(", chosen, ")", _INDENT + 4)
+            return [f"if {test}:", *indented(lines)]
+        lines += wrapped("message = cls(", chosen, ")", _INDENT + 4)
+        return [f"if {test}:", *indented([*lines, *self._alone(), "return message"])]
+
+    def _alone(self) -> list[str]:
+        """The statements that read the values of a frame with an empty payload."""
+        place = self.place
+        assert place.envelope is not None
+        reader = Decoder(self.message, place, self.title, self.scales)
+        for part, member in place.envelope.values:
+            seen = pieces.read(place.envelope, part, place.data, place.skipped)
+            shifted = f"{seen} >> {member.shift}" if member.shift else seen
+            taken = f"{shifted} & 0x{(1 << member.bits) - 1:X}" if member.bits < part.integer.bits else seen
+            reader._member(member, taken, self._place_of(part), place.data)  # its own class
+        return reader._values
 
     # Parts of the frame
 
@@ -159,8 +174,8 @@ class Decoder:
         match part:
             case AddressPart():
                 self._address(part, at)
-            case CellPart() if any(isinstance(slot, AddressSlot) for slot in part.slots):
-                self._address(part, at)
+            case CellPart() if part.values or any(isinstance(slot, AddressSlot) for slot in part.slots):
+                self._cell(part, at)
             case LengthPart() if self.place.unique:
                 # The receiver relies on this comparison of length and size.
                 number = self._size(part.integer, f"{part.name}_part", at)
@@ -172,23 +187,42 @@ class Decoder:
             case _:
                 assert_never(part)
 
-    def _address(self, part: AddressPart | CellPart, at: Size) -> None:
-        local = f"{part.name}_part"
-        number = self._get(part.integer, local, at)
+    def _address(self, part: AddressPart, at: Size) -> None:
+        number = self._get(part.integer, f"{part.name}_part", at)
         self._put_together(part.integer, number)
-        for slot in part.slots if isinstance(part, CellPart) else ():
-            if isinstance(slot, AddressSlot) and slot.bits < part.integer.bits:
-                shifted = f"{number} >> {slot.shift}" if slot.shift else number
-                self._values.append(f"{local} = {shifted} & 0x{(1 << slot.bits) - 1:X}")
-                number = local
         self._values += self._address_check(part, number, _INDENT)
         self._values.append(f"message.{self.place.address} = {number}")
 
+    def _cell(self, part: CellPart, at: Size) -> None:
+        """Read address and values in the bits of a part."""
+        whole = f"{part.name}_part"
+        self._get(part.integer, whole, at)
+        self._put_together(part.integer, whole)
+        for slot in part.slots:
+            shifted = f"{whole} >> {slot.shift}" if slot.shift else whole
+            taken = f"{shifted} & 0x{(1 << slot.bits) - 1:X}" if slot.bits < part.integer.bits else whole
+            if isinstance(slot, AddressSlot):
+                number = f"{part.name}_address"
+                self._values.append(f"{number} = {taken}")
+                self._values += self._address_check(part, number, _INDENT)
+                self._values.append(f"message.{self.place.address} = {number}")
+            elif isinstance(slot, Member):
+                self._member(slot, taken, self._place_of(part), self.place.data)
+
+    def _place_of(self, part: Part) -> str:
+        """The offset of a part in the argument, negative from its end."""
+        envelope = self.place.envelope
+        assert envelope is not None
+        trails = part in envelope.back
+        return str(-envelope.from_end(part) if trails else envelope.offset(part) - self.place.skipped)
+
     def _needed_back(self) -> Sequence[Part]:
-        """Parts after the payload up to the address."""
+        """Parts after the payload up to the last one with the address or a value."""
         envelope = self.place.envelope
         back = envelope.back if envelope else ()
-        found = [back.index(bits.part) for bits in envelope.address if bits.part in back] if envelope else []
+        holding = [bits.part for bits in envelope.address] if envelope else []
+        holding += [part for part, _ in envelope.values] if envelope else []
+        found = [back.index(part) for part in holding if part in back]
         return back[: max(found) + 1] if found else ()
 
     def _length(self, part: LengthPart) -> str:
@@ -371,10 +405,10 @@ class Decoder:
             case _:
                 assert_never(step)
 
-    def _refuse(self, test: str, name: str, seen: str, offset: str) -> None:
+    def _refuse(self, test: str, name: str, seen: str, offset: str, data: str = "") -> None:
         call = wrapped(
             f"raise {self.place.use('illegal')}(",
-            ["cls", f'"{name}"', seen, offset, self.place.payload],
+            ["cls", f'"{name}"', seen, offset, data or self.place.payload],
             ")",
             _INDENT + 4,
         )
@@ -435,7 +469,7 @@ class Decoder:
             taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
             self._member(member, taken, _offset(step))
 
-    def _member(self, member: Member, taken: str, offset: str) -> None:
+    def _member(self, member: Member, taken: str, offset: str, data: str = "") -> None:
         raw, target = f"{member.name}_raw", f"message.{attribute(member.name)}"
         if member.number.signed:
             taken = integers.sign_extended(f"({taken})", member.bits)
@@ -444,7 +478,7 @@ class Decoder:
             return
         self._values.append(f"{raw} = {taken}")
         for rule in member.conditions:
-            self._refuse(integers.broken(rule, raw), member.name, raw, offset)
+            self._refuse(integers.broken(rule, raw), member.name, raw, offset, data)
         self._values += assigned(target, member.number, raw, self.scales.get(member.name, ""), self.place)
 
     # Runs

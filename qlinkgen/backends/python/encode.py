@@ -190,6 +190,8 @@ class Encoder:
                 bits = self._addressed()
             case ConstantSlot():
                 bits = f"0x{slot.values[0]:02X}"
+            case Member():
+                return self._member(slot)
             case _:
                 assert_never(slot)
         return f"{bits} << {slot.shift}" if slot.shift else bits

@@ -9,7 +9,7 @@ from typing import assert_never
 from qlinkgen.backends.python import integers, pieces
 from qlinkgen.backends.python.coding import CodingView, coding_view
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
-from qlinkgen.backends.python.names import class_name
+from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.message import Direction
@@ -251,6 +251,7 @@ class PartsView:
     bare: bool
     verified: bool
     head_checks: Sequence[HeadCheck]
+    values: Sequence[str]
     tail_tests: Sequence[str]
 
     template = "delimited"
@@ -414,7 +415,10 @@ def _address_view(plan: Plan) -> AddressView | None:
         return None
     nodes = plan.protocol.bus.nodes
     bits = next(iter(plan.frame.envelope.address), None)
-    placed = f"(number << {bits.shift})" if bits and bits.shift else "number"
+    placed = f"number << {bits.shift}" if bits and bits.shift else "number"
+    if bits and (others := _blank_number(bits.part)):
+        placed = f"{placed} | 0x{others:X}"
+    placed = placed if placed == "number" else f"({placed})"
     return AddressView(
         name=address_attribute(plan.frame.address),
         parameter=address_argument(plan.frame.address),
@@ -430,16 +434,38 @@ def _blank_header(envelope: Envelope, start: int, address: AddressView | None) -
 
 
 def _blank(envelope: Envelope, parts: Sequence[Part], address: AddressView | None, start: int = 0) -> str:
-    """Zeros for adjacent parts from an offset on, with the address in its place."""
-    size = sum(part.size for part in parts) - start
+    """Adjacent parts from an offset on: defaults of values, the address in its place, zeros."""
+    numbers = (
+        (part.size, part.integer.pack(_blank_number(part)) if isinstance(part, CellPart) else b"")
+        for part in parts
+    )
+    data = b"".join(packed or bytes(size) for size, packed in numbers)[start:]
     part = next((bits.part for bits in envelope.address if bits.part in parts), None)
     if part is None or address is None:
-        return f"bytes({size})"
+        return _zeros(data)
     before = sum(each.size for each in parts[: parts.index(part)]) - start
-    after = size - before - part.size
-    terms = [f"bytes({before})"] if before else []
-    terms.append(f"_address(cls, {address.parameter})")
-    return " + ".join([*terms, f"bytes({after})"] if after else terms)
+    return " + ".join(
+        filter(
+            None,
+            (
+                _zeros(data[:before]),
+                f"_address(cls, {address.parameter})",
+                _zeros(data[before + part.size :]),
+            ),
+        )
+    )
+
+
+def _zeros(data: bytes) -> str:
+    """Bytes as an expression, "" without any."""
+    return (literal(data) if any(data) else f"bytes({len(data)})") if data else ""
+
+
+def _blank_number(part: Part) -> int:
+    """The integer of a part with the defaults of its values, and without anything else."""
+    if not isinstance(part, CellPart):
+        return 0
+    return sum((each.number.default & each.number.integer.mask) << each.shift for each in part.values)
 
 
 def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> UniqueView:
@@ -530,15 +556,22 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         max_frame=plan.frame.longest,
         max_payload=envelope.payload.most,
         blank_header=_blank_header(envelope, 0, address),
-        blank_trailer=_blank(envelope, envelope.back, address) if _trails(envelope) else "bytes(_TRAILER)",
+        blank_trailer=_blank_trailer(envelope, address),
         id_start=_id_start(envelope),
         id_of=pieces.number(envelope, envelope.id, "head"),
         address_of=pieces.number(envelope, envelope.address, "head") if _leads(envelope) else "",
         bare=receiver.bare,
         verified=receiver.verified,
         head_checks=list(_head_checks(plan, envelope, bare=receiver.bare)),
+        values=[attribute(member.name) for _, member in envelope.values],
         tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
     )
+
+
+def _blank_trailer(envelope: Envelope, address: AddressView | None) -> str:
+    """A trailer for decoding a payload."""
+    holds = any(isinstance(part, CellPart) and part.values for part in envelope.back)
+    return _blank(envelope, envelope.back, address) if holds or _trails(envelope) else "bytes(_TRAILER)"
 
 
 def _trails(envelope: Envelope) -> bool:
@@ -611,11 +644,6 @@ def _ended_checks(envelope: Envelope, *, bare: bool) -> Iterator[tuple[str, str]
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
-
-
-def _number_at(envelope: Envelope, part: LengthPart | IdPart | AddressPart, source: str = "head") -> str:
-    start = envelope.offset(part)
-    return integers.read(part.integer, source, lambda more: str(start + more))
 
 
 def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:

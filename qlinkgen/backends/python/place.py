@@ -10,6 +10,7 @@ from qlinkgen.backends.python.names import named_classes
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_attribute
 from qlinkgen.plan.framing import CheckPart, Envelope, Hunt, InStep, Marks, Part, Rescan
+from qlinkgen.plan.payload import Member
 from qlinkgen.plan.tree import Plan
 
 
@@ -80,6 +81,11 @@ class Place:
         """Parts after the payload that an encoder packs; a check value at the end is added later."""
         back = self.envelope.back if self.envelope else ()
         return back[:-1] if back and isinstance(back[-1], CheckPart) else back
+
+    @property
+    def beside(self) -> tuple[Member, ...]:
+        """Values of every frame."""
+        return tuple(member for _, member in self.envelope.values) if self.envelope else ()
 
     @property
     def data(self) -> str:

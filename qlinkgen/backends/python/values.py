@@ -148,11 +148,13 @@ def scale_arguments(number: Scalar, place: Place) -> str:
 
 
 def rules(message: MessagePlan, place: Place, scales: Mapping[str, str]) -> list[Call]:
-    """The rules of a message, the address first."""
+    """The rules of a message, those of address and values of its frame first."""
     found: list[Call] = []
     if message.allowed is not None and place.address:
         bounds = [str(bound) for each in message.allowed.ranges for bound in (each.low, each.high)]
         found.append(_rule(place, "IntRule", place.address, *bounds))
+    for member in place.beside:
+        found += _member_rules(member, place, scales)
     for step in message.payload.steps:
         found += _rules(step, place, scales)
     return found

@@ -66,15 +66,17 @@ class _Vectors:
         direction = self._codec.plan.direction_of(message)
         found = self._codec.decode(example.wire, direction, example.after)
         payload = pack(message.payload, found.values)
-        return Good(message, found.address, dict(found.values), payload, example.wire, example.after)
+        values, beside = dict(found.values), dict(found.beside)
+        return Good(message, found.address, values, beside, payload, example.wire, example.after)
 
     def _one(self, message: MessagePlan, kind: str) -> Good:
         chance = Chance(f"{self._protocol.name} {message.name} {kind}")
         values = _values(message, kind, chance)
         address = _address(message, kind, chance)
+        beside = _beside(message, kind, chance)
         request = self._request(message, kind)
-        wire = self._codec.encode(message.name, values, address, request)
-        return Good(message, address, values, pack(message.payload, values), wire, request)
+        wire = self._codec.encode(message.name, {**values, **beside}, address, request)
+        return Good(message, address, values, beside, pack(message.payload, values), wire, request)
 
     def _request(self, message: MessagePlan, kind: str) -> bytes:
         """The request of a response, b"" if its frame does not depend on it."""
@@ -107,6 +109,11 @@ class _Vectors:
         row: dict[str, Json] = {"message": good.message.name, "kinds": [*named]}
         if good.address is not None:
             row[record_key(self._codec.plan.frame.address)] = good.address
+        steps = {member.name: member for _, member in good.message.envelope.values}
+        for value in self._protocol.frame_values:
+            row[record_key(value.name)] = to_json(
+                value, native_of(steps[value.name], good.beside[value.name])
+            )
         row |= _shown(good)
         if good.request:
             row["request"] = good.request.hex()
@@ -173,6 +180,13 @@ def _values(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:
     if kind == "defaults":
         return choice.defaults(message.payload)
     return (_RULES.get(kind) or choice.random(chance)).values(message.payload)
+
+
+def _beside(message: MessagePlan, kind: str, chance: Chance) -> dict[str, Raw]:
+    """The values of a frame."""
+    if kind == "defaults":
+        return {member.name: member.number.default for _, member in message.envelope.values}
+    return (_RULES.get(kind) or choice.random(chance)).beside(message.envelope)
 
 
 def _address(message: MessagePlan, kind: str, chance: Chance) -> int | None:

@@ -10,6 +10,7 @@ from qlinkgen.model.integer import Integer, unpack_chunks
 from qlinkgen.model.types import Float, Length, Scalar
 from qlinkgen.plan.content import Raw, broken, default_of
 from qlinkgen.plan.expr import Clear
+from qlinkgen.plan.framing import Envelope
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,
@@ -94,6 +95,13 @@ class Rule:
                 case _:
                     assert_never(step)
         return found
+
+    def beside(self, envelope: Envelope) -> dict[str, Raw]:
+        """The raw values of a frame."""
+        return {
+            member.name: self._chosen(member.number, self._bits(part.integer) >> member.shift)
+            for part, member in envelope.values
+        }
 
     def _bits(self, integer: Integer) -> int:
         if not integer.chunks:  # in a row of bits

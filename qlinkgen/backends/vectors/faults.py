@@ -42,6 +42,7 @@ from qlinkgen.plan.payload import (
     ConstantStep,
     CountStep,
     ItemsStep,
+    Member,
     RecordPlan,
     RecordsStep,
     RecordStep,
@@ -62,6 +63,8 @@ class Good:
     message: MessagePlan
     address: int | None
     values: Mapping[str, Raw]
+    #: Values of the frame.
+    beside: Mapping[str, Raw]
     payload: bytes
     wire: bytes
     #: The packet that it answers, b"" if it does not depend on one.
@@ -145,7 +148,8 @@ class _Frame:
             yield self._envelope.parts[-1].name, "a byte follows the frame", wire + b"\1"
 
     def _made(self, payload: bytes) -> dict[str, bytes]:
-        return self._codec.cells(self._message, self._codec.sent(payload), self._good.address or 0)
+        good = self._good
+        return self._codec.cells(self._message, self._codec.sent(payload), good.address or 0, good.beside)
 
     def _derived(self, cells: dict[str, bytes], changed: Part) -> Mapping[str, bytes]:
         """The parts, those that are derived from others computed again."""
@@ -211,6 +215,12 @@ class _Frame:
                 wrong = itertools.islice(unused, 1)
             case AddressSlot():
                 wrong = _outside(self._message.allowed, 0, mask)
+            case Member():
+                integer = slot.number.integer
+                outside = (
+                    n for rule in slot.conditions for n in _outside(rule, integer.minimum, integer.maximum)
+                )
+                wrong = [number & mask for number in outside]
             case _:
                 assert_never(slot)
         yield from (now & ~(mask << slot.shift) | bits << slot.shift for bits in wrong)

@@ -46,6 +46,9 @@ class Mixture:
         if has_length:
             self.length = "size"
             parts["size"] = {"counts": ["data"], "type": rng.choice(("u8", "u8", "u16"))}
+        for name in ("component", "status"):
+            if rng.random() < 0.3:
+                parts[name] = self._value()
         self._place(parts, may_trail=has_length)
         self._derive()
         self._measure()
@@ -70,6 +73,17 @@ class Mixture:
             self.directed = True
         return parts
 
+    def _value(self) -> Doc:
+        """A value of every frame."""
+        rng = self.rng
+        spec: Doc = {"type": rng.choice(("u8", "u8", "u16", "i8", "i24", "u32", "u40"))}
+        if rng.random() < 0.4:
+            low = rng.choice((0, 1, 3))
+            spec |= {"range": f"{low}..{low + rng.choice((0, 4, 100))}", "default": low}
+        elif rng.random() < 0.4:
+            spec |= {"scale": "1/2"} if rng.random() < 0.5 else {"default": rng.choice((0, 1, 5))}
+        return spec
+
     def _type(self) -> str:
         return self.rng.choices(("u8", "u16", "u24", "u32", "u40", "u48"), (30, 5, 1, 2, 1, 1))[0]
 
@@ -78,6 +92,8 @@ class Mixture:
         rng = self.rng
         if rng.random() < 0.5 or not bits:
             bits["fixed"] = {"const": 0}
+        if rng.random() < 0.4:
+            bits["grade"] = rng.choice(({}, {"signed": True}, {"range": "1..2", "default": 1}))
         names, width = list(bits), rng.choice((8, 8, 16, 16, 24))
         rng.shuffle(names)
         room, at, inside = width - 2 * len(names), rng.choice((0, 0, 1)), dict[str, Doc]()
@@ -111,19 +127,23 @@ class Mixture:
         for name in names:
             spec = parts[name]
             text = str(spec)
-            identifies = "message" in text or "direction" in text
+            identifies = "'message'" in text or "'direction'" in text
             late = self.rng.random() < 0.25 and name != self.length and (may_trail or not identifies)
             (self.back if late else self.front)[name] = spec
 
     def _derive(self) -> None:
         """Perhaps a number that follows from an earlier one."""
         rng = self.rng
-        sources = [name for name, spec in {**self.front, **self.back}.items() if not _constant(spec)]
+        every = {**self.front, **self.back}.items()
+        sources = [name for name, spec in every if not _constant(spec)]
         if not sources or rng.random() < 0.6:
             return
         name = rng.choice(sources)
         form = rng.choice(("{}", "~{}", "~ {}", "{} + 1", "{} - 3", "~{} + 200"))
-        spec = {"type": {**self.front, **self.back}[name]["type"], "equals": form.format(name)}
+        spec = {
+            "type": {**self.front, **self.back}[name]["type"].replace("i", "u"),
+            "equals": form.format(name),
+        }
         group = self.back if name in self.back or rng.random() < 0.4 else self.front
         names = list(group)
         first = names.index(name) + 1 if name in group else 0
@@ -137,6 +157,8 @@ class Mixture:
         for name, spec in {**self.front, **self.back}.items():
             for each, inner in {name: spec, **spec.get("bits", {})}.items():
                 first, _, last = str(inner.get("at", "")).partition("..")
+                if inner.get("role") not in ("message", "address"):
+                    continue
                 size = int(last or first) + 1 - int(first) if first else int(inner["type"][1:])
                 if inner.get("role") == "message":
                     self.pieces.append((each, size))

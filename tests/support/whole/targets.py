@@ -268,6 +268,7 @@ class InterpreterTarget(Target):
 
     def _seen(self, decoded: Decoded) -> Seen:
         found = decoded.values
+        found = {**decoded.beside, **found}
         shape = self.reference.by_name[decoded.message.name]
         values = {name: told(kind, found[name]) for name, kind in shape.values()}
         return Seen(shape.name, decoded.address, values)
@@ -301,7 +302,8 @@ class ConstructTarget(Target):
     ) -> tuple[bytes, bytes]:
         """See Target."""
         natives = self.natives(message, given)
-        whole: dict[str, Any] = {"message": message.name, "fields": natives}
+        beside = {naming.record_key(name): natives.pop(name) for name, _ in message.beside}
+        whole: dict[str, Any] = {"message": message.name, **beside, "fields": natives}
         if self.reference.address_name:
             whole[naming.record_key(self.reference.address_name)] = address
         try:
@@ -316,8 +318,9 @@ class ConstructTarget(Target):
             found = self._live.parse(self.reference.direction_of(message), wire, request)
         except ConstructError as error:
             raise Wrong(getattr(error, "kind", ""), str(error)) from None
-        fields = found["fields"]
-        values = self.raws(self.reference.by_name[found["message"]], lambda each: fields[each])
+        message = self.reference.by_name[found["message"]]
+        fields = {**found["fields"], **{name: found[naming.record_key(name)] for name, _ in message.beside}}
+        values = self.raws(message, lambda each: fields[each])
         name = self.reference.address_name
         return Seen(found["message"], found[naming.record_key(name)] if name else None, values)
 
@@ -392,9 +395,11 @@ class CTarget(Target):
         at, kind, *rest = word.split(":")
         if kind != "message":
             return Heard(int(at), kind)
-        name, address, payload = rest
+        name, address, *numbers, payload = rest
+        message = self.reference.by_name[name]
+        beside = {each: int(word) for (each, _), word in zip(message.beside, numbers, strict=True)}
         try:
-            values = str(decode_payload(self.reference.by_name[name], _bytes(payload)))
+            values = str({**beside, **decode_payload(message, _bytes(payload))})
         except Wrong as wrong:
             values = f"{payload}, which is refused: {wrong}"
         return Heard(int(at), kind, name, None if address == "-" else int(address), values)

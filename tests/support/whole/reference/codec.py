@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tests.support.whole.reference import document, values
 from tests.support.whole.reference.document import Direction, Fields, Message, part_doc, whole_span
@@ -54,6 +54,8 @@ class Reference:
             self.frame.seeds = {
                 message.number: document.seeds(data, message.name) for message in self.messages
             }
+        if isinstance(self.frame, Frame) and self.frame.beside:
+            self.messages = tuple(replace(each, beside=self.frame.beside) for each in self.messages)
         self.by_name = {message.name: message for message in self.messages}
         used = {message.direction for message in self.messages}
         self.directions: tuple[Direction, ...] = (
@@ -76,13 +78,24 @@ class Reference:
         if not message.allows(address):
             raise Wrong("range", "address")
         payload = values.encode(message, given)
-        return payload, self.wrap(name, payload, address, request)
+        for each, kind in message.beside:
+            raw = given[each]
+            assert isinstance(raw, int)
+            values.check(kind, raw)
+        return payload, self.wrap(name, payload, address, request, given)
 
-    def wrap(self, name: str, payload: bytes, address: int = 0, request: bytes = b"") -> bytes:
-        """A frame around a payload, which is not checked."""
+    def wrap(
+        self,
+        name: str,
+        payload: bytes,
+        address: int = 0,
+        request: bytes = b"",
+        given: Mapping[str, Raw] | None = None,
+    ) -> bytes:
+        """A frame around a payload, which is not checked; `given` are values of the frame."""
         message, frame = self.by_name[name], self.frame
         if isinstance(frame, Frame):
-            return frame.wrap(message.number, payload, address)
+            return frame.wrap(message.number, payload, address, given or {})
         if isinstance(frame, Marked):
             return frame.wrap(message, payload, address)
         return frame.wrap(message, payload, request)

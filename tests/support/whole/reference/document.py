@@ -226,10 +226,13 @@ class Message:
     default_address: int
     empty_is_default: bool = False
     checked: bool = True
+    #: Values of its frame.
+    beside: tuple[tuple[str, Number], ...] = ()
 
     def values(self) -> Iterator[tuple[str, Value]]:
-        """Values in wire order."""
-        return _values(self.slots)
+        """Values in wire order, those of the frame first."""
+        yield from self.beside
+        yield from _values(self.slots)
 
     @property
     def sizes(self) -> tuple[int, int]:
@@ -280,6 +283,10 @@ def octets(given: object) -> bytes:
     return bytes.fromhex(str(given))
 
 
+def _doc(given: Any) -> Doc:
+    return given if isinstance(given, dict) else {"at": given}
+
+
 def part_doc(given: object) -> Doc:
     """A part of a frame with its role; a short form becomes a mapping."""
     if not isinstance(given, dict):
@@ -321,6 +328,21 @@ class Fields:
 
     def _slots(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
         return tuple(self._slot(name, self._resolved(spec)) for name, spec in fields.items())
+
+    def beside(self, name: str, given: Any) -> tuple[Slot, tuple[tuple[str, int, Number], ...]]:
+        """A part of a frame with values: its integer, and the name, lowest bit and number of each."""
+        spec = part_doc(given)
+        if "bits" in spec:
+            inner = {
+                key: each for key, each in spec["bits"].items() if not set(_doc(each)) & {"role", "const"}
+            }
+            members = tuple(self._member(*each) for each in inner.items())
+            return Slot(name, self._number(spec["type"], spec)), members
+        slot = self._slot(name, self._resolved({key: each for key, each in spec.items() if key != "role"}))
+        if isinstance(slot.kind, Packed):
+            return slot, slot.kind.members
+        assert isinstance(slot.kind, Number)
+        return slot, ((name, 0, slot.kind),)
 
     def _resolved(self, spec: Any) -> Doc:
         """A field merged with its named types."""
@@ -495,9 +517,11 @@ def bits_of(spec: Doc) -> Iterator[tuple[str, str, int, int, Doc]]:
     spec = part_doc(spec)
     if spec["role"] in ("message", "address", "direction", "constant") and "type" in spec:
         yield "", spec["role"], 0, int(spec["type"][1:]), spec
-    for name, inner in spec.get("bits", {}).items():
+    for name, given in spec.get("bits", {}).items():
+        inner = _doc(given)
         first, last = whole_span(inner["at"])
-        yield name, inner.get("role", "constant"), first, last + 1 - first, inner
+        role = inner.get("role", "constant" if "const" in inner else "value")
+        yield name, role, first, last + 1 - first, inner
 
 
 def numbered(document: Doc, given: Any, direction: Direction) -> int:

@@ -12,8 +12,10 @@ from tests.support.whole.reference import checks
 from tests.support.whole.reference.codings import codings
 from tests.support.whole.reference.document import (
     Doc,
+    Fields,
     Message,
     Number,
+    Packed,
     Records,
     Run,
     bits_of,
@@ -23,7 +25,8 @@ from tests.support.whole.reference.document import (
     size_of,
     whole_span,
 )
-from tests.support.whole.reference.values import Wrong, get, items_of, put
+from tests.support.whole.reference.values import Raw, Wrong, get, items_of, put
+from tests.support.whole.reference.values import check as check_range
 
 
 class NeedMore(Exception):
@@ -56,6 +59,8 @@ class Part:
     pieces: tuple[tuple[int, int], ...] = ()
     #: Role, lowest bit and number of bits of what its integer holds, and their mapping.
     bits: tuple[tuple[str, int, int, Doc], ...] = ()
+    #: Name, lowest bit and number of the values in it.
+    values: tuple[tuple[str, int, Number], ...] = ()
 
     @property
     def mask(self) -> int:
@@ -96,9 +101,13 @@ class Stuffing:
         return plain + rest
 
 
-def part_of(name: str, spec: object, order: str) -> Part:
+def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
     """A part from its mapping."""
     spec = part_doc(spec)
+    if spec["role"] == "value":
+        slot, values = fields.beside(name, spec)
+        assert isinstance(slot.kind, Number | Packed)
+        return Part(name, "bits", len(slot.kind.pieces), spec, pieces=slot.kind.pieces, values=values)
     if spec["role"] == "terminator" or (spec["role"] == "constant" and "type" not in spec):
         constant = spec["text"].encode("ascii") if "text" in spec else octets(spec["value"])
         return Part(name, spec["role"], len(constant), spec, constant)
@@ -111,8 +120,18 @@ def part_of(name: str, spec: object, order: str) -> Part:
     if spec["role"] == "constant" and len(_several(spec["const"])) == 1:
         data = put(pieces, _several(spec["const"])[0])
         return Part(name, "constant", len(data), spec, data)
+    values = fields.beside(name, spec)[1] if "bits" in spec else ()
     role = "bits" if spec["role"] in ("constant", "direction", "message", "address") else spec["role"]
-    return Part(name, role, len(pieces), spec, pieces=pieces, bits=bits)
+    return Part(name, role, len(pieces), spec, pieces=pieces, bits=bits, values=values)
+
+
+def _bits_of_values(part: Part, given: Mapping[str, Raw]) -> int:
+    raw = 0
+    for name, shift, kind in part.values:
+        number = given.get(name, kind.default)
+        assert isinstance(number, int)
+        raw |= (number & (1 << kind.bits) - 1) << shift
+    return raw
 
 
 def _several(given: Any) -> list[int]:
@@ -125,7 +144,8 @@ class Frame:
     def __init__(self, document: Doc) -> None:
         """Read the parts."""
         frame, order = document["frame"], document.get("byteorder", "big")
-        self.parts = [part_of(name, spec, order) for name, spec in frame["parts"].items()]
+        fields = Fields(document, 0)
+        self.parts = [part_of(name, spec, order, fields) for name, spec in frame["parts"].items()]
         self.by_role: Mapping[str, Part] = {part.role: part for part in self.parts[::-1]}
         #: Bytes of attributes of messages, by number of the message.
         self.seeds: dict[int, Mapping[str, bytes]] = {}
@@ -236,6 +256,8 @@ class Frame:
         # Message number and address are whole parts.
         alone = [part.bits[0] for part in self.parts if len(part.bits) == 1 and "at" not in part.bits[0][3]]
         kinds = sorted((role, bits if role == "message" else 0) for role, _, bits, _ in alone)
+        if any(part.values for part in self.parts):
+            return False
         if len(alone) < roles.count("bits") or kinds not in (
             [("message", 8)],
             [("address", 0), ("message", 8)],
@@ -261,22 +283,20 @@ class Frame:
 
     # Building
 
-    def wrap(self, number: int, payload: bytes, address: int) -> bytes:
-        """A frame around a payload, which is not checked."""
+    def wrap(self, number: int, payload: bytes, address: int, given: Mapping[str, Raw]) -> bytes:
+        """A frame around a payload, which is not checked; `given` are values of the frame."""
         if self.stuffing and self.stuffing.payload_alone:
             payload = self.stuffing.stuff(payload)
         cut: dict[str, bytes] = {}
-        left = sum(bits for _, _, bits, _ in self.id_bits())
-        rest = {}
-        for name, shift, bits, _ in self.id_bits():
-            left -= bits
-            rest[name, shift] = number >> left & (1 << bits) - 1
+        rest = self._id_pieces(number)
         for part in self.parts:
             if part.role == "length":
                 cut[part.name] = put(part.pieces, self.bias + len(payload))
             elif part.role == "bits":
-                raw = 0
+                raw = _bits_of_values(part, given)
                 for role, shift, _, spec in part.bits:
+                    if role == "value":
+                        continue
                     fixed = {"address": address, "constant": _several(spec.get("const"))[0]}
                     raw |= (rest[part.name, shift] if role not in fixed else fixed[role]) << shift
                 cut[part.name] = put(part.pieces, raw)
@@ -289,6 +309,30 @@ class Frame:
             for check in self.checks:
                 cut[check.name] = put(check.pieces, self.check_value(check, cut))
         return self._stuffed(cut)
+
+    def _id_pieces(self, number: int) -> dict[tuple[str, int], int]:
+        """The pieces of a message number by part and lowest bit."""
+        left, found = sum(bits for _, _, bits, _ in self.id_bits()), {}
+        for name, shift, bits, _ in self.id_bits():
+            left -= bits
+            found[name, shift] = number >> left & (1 << bits) - 1
+        return found
+
+    @property
+    def beside(self) -> tuple[tuple[str, Number], ...]:
+        """Values of every frame."""
+        return tuple((name, kind) for part in self.parts for name, _, kind in part.values)
+
+    def values(self, cut: Mapping[str, bytes]) -> dict[str, Raw]:
+        """The values of a frame. Raises Wrong."""
+        found: dict[str, Raw] = {}
+        for part in self.parts:
+            for name, shift, kind in part.values:
+                raw = get(part.pieces, cut[part.name]) >> shift & (1 << kind.bits) - 1
+                raw -= (raw >> kind.bits - 1) << kind.bits if kind.signed else 0
+                check_range(kind, raw)
+                found[name] = raw
+        return found
 
     def id_bits(self) -> list[tuple[str, int, int, str]]:
         """The pieces of the message number, the most significant first: part, lowest bit, bits, role."""
@@ -513,7 +557,7 @@ class Splitter:
                 raise Refused("length", cursor.at)
         if part.role in ("bits", "derived") and frame.wrong(part, cut):
             raise Refused("frame", cursor.at, told=False)
-        if frame.bare and any(role != "constant" for role, *_ in part.bits):
+        if frame.bare and any(role not in ("constant", "value") for role, *_ in part.bits):
             number, address = frame.number("message", cut), frame.number("address", cut)
             if number is None:
                 return

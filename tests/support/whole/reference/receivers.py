@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from tests.support.whole.reference import values
 from tests.support.whole.reference.document import Message
@@ -57,6 +58,8 @@ class Receiver:
         payload: Callable[[], bytes],
         offset: int,
         raw: bytes,
+        *,
+        beside: Callable[[], Mapping[str, Raw]] = dict,
     ) -> Event:
         """The message of an intact frame, or the fault in its contents."""
         if message is None:
@@ -65,6 +68,7 @@ class Receiver:
             found = values.decode(message, payload())
             if address is not None and not message.allows(address):
                 raise Wrong("range")
+            found = {**beside(), **found}
         except Wrong as wrong:
             return Event(wrong.kind, self.at, offset, raw)
         return Event("message", self.at, offset, raw, message.name, address, found)
@@ -268,7 +272,8 @@ class Searcher(Receiver):
         seeds = self.frame.seeds[message.number] if message else {}
         if self.frame.check_fails(cut.parts, seeds):
             return Event("crc", self.at, self.start, raw)
-        return self.carried(message, address, lambda: payload, self.start, raw)
+        beside = partial(self.frame.values, cut.parts)
+        return self.carried(message, address, lambda: payload, self.start, raw, beside=beside)
 
 
 class MarkedReceiver(Receiver):

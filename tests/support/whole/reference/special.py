@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tests.support.whole.reference import checks
-from tests.support.whole.reference.document import Doc, Message, part_doc, whole_span
+from tests.support.whole.reference.document import Doc, Fields, Message, part_doc, whole_span
 from tests.support.whole.reference.frames import part_of
 from tests.support.whole.reference.values import Wrong, put
 
@@ -20,7 +20,8 @@ class Marked:
         self._address, self._message = (whole_span(spec["header"][key]) for key in ("address", "message"))
         self._end: int = spec["end"]
         self.most = whole_span(spec["payload"])[1]
-        self._check = part_of("checksum", spec["checksum"], order) if "checksum" in spec else None
+        fields = Fields(document, 0)
+        self._check = part_of("checksum", spec["checksum"], order, fields) if "checksum" in spec else None
         self.check_size = self._check.size if self._check else 0
 
     def _bits(self, byte: int, where: tuple[int, int]) -> int:
@@ -76,7 +77,9 @@ class Packets:
         parts = document["frame"]["packet"]
         order = document.get("byteorder", "big")
         found = [
-            part_of(name, spec, order) for name, spec in parts.items() if part_doc(spec)["role"] == "checksum"
+            part_of(name, spec, order, Fields(document, 0))
+            for name, spec in parts.items()
+            if part_doc(spec)["role"] == "checksum"
         ]
         self._check = found[0] if found else None
 
