@@ -27,7 +27,7 @@ UNKNOWN = frozenset(
         *(f"{each}.request" for each in ("up_right", "up_left", "down_right", "down_left")),
         *(f"{each}.request" for each in ("zoom_tele", "zoom_wide", "focus_far", "focus_near")),
         *(f"{each}.request" for each in ("iris_open", "iris_close")),
-        "zoom",
+        "query_zoom.response",
     }
 )
 ptz_controller.time = SimpleNamespace(sleep=lambda seconds: None)  # between its questions
@@ -59,6 +59,7 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     controller._send_command = lambda command, read_response_bytes: wire
     pan, tilt = controller.get_position()
     if pan is not None:
-        return {"message": "pan", "fields": {"angle": pan}}
+        return {"message": "query_pan.response", "fields": {"angle": pan}}
     # It takes angles above 180 degrees for positive ones.
-    return {"message": "tilt", "fields": {"angle": round(-tilt if tilt <= 0 else 360 - tilt, 2)}}
+    angle = -tilt if tilt <= 0 else 360 - tilt
+    return {"message": "query_tilt.response", "fields": {"angle": round(angle, 2)}}
