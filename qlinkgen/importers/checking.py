@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from qlinkgen.errors import Fault
 from qlinkgen.importers.document import Document, Item
 from qlinkgen.importers.notes import Notes
@@ -31,7 +33,16 @@ def written(document: Document, notes: Notes, file: str = "schema") -> str:
         faults = [each for each in loads(result.text, file)[1] if each.severity == "error"]
         if not faults:
             return result.text
-        document = document.without(_refused(document, result, faults, notes))
+        if document.other_frame is not None and (fault := _of_frame(result, faults)) is not None:
+            notes.add(0, f"the frame is an assumption: {fault.message} [{fault.rule}]")
+            document = replace(document, frame=document.other_frame, other_frame=None)
+        else:
+            document = document.without(_refused(document, result, faults, notes))
+
+
+def _of_frame(result: Written, faults: list[Fault]) -> Fault | None:
+    """The first fault outside of all items."""
+    return next((each for each in faults if result.item_at(each.line) is None), None)
 
 
 def _refused(document: Document, result: Written, faults: list[Fault], notes: Notes) -> set[tuple[str, str]]:

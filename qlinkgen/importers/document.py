@@ -7,7 +7,7 @@ Values of a mapping are plain data; `Block` and `Commented` say how a value is l
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 Value: TypeAlias = "bool | int | str | Notation | list[Value] | dict[str, Value] | Commented"
@@ -173,6 +173,7 @@ class Document:
         frame: The frame, or `frames` if `frame_key` says so.
         sections: The parts of the file that list things by name: `enums`, `types`, `messages` and so on.
         comment: What a reader should know, at the beginning of the file.
+        other_frame: The frame to write if lint refuses the first one.
     """
 
     protocol: Mapping[str, Value]
@@ -183,6 +184,7 @@ class Document:
     attributes: Mapping[str, Value] = field(default_factory=dict)
     defaults: Mapping[str, Value] = field(default_factory=dict)
     comment: str = ""
+    other_frame: Value | None = None
 
     def without(self, gone: Iterable[tuple[str, str]]) -> Document:
         """A copy without some items, given by section and name."""
@@ -191,16 +193,7 @@ class Document:
             section: tuple(each for each in items if (section, each.name) not in left)
             for section, items in self.sections.items()
         }
-        return Document(
-            self.protocol,
-            self.byteorder,
-            self.frame,
-            self.bus,
-            sections,
-            self.attributes,
-            self.defaults,
-            self.comment,
-        )
+        return replace(self, sections=sections)
 
 
 def typed(name: str) -> dict[str, Value]:

@@ -21,9 +21,13 @@ from tests.importers.conftest import refused, survives
 
 FILES = sorted((Path(__file__).parent / "ksy").glob("*.ksy"))
 #: Files of which nothing can be taken.
+#: What lint refuses of a file.
+REFUSED = {
+    "expressions": ["expressions.ksy:42: note: message scaled is left out: 'scale' has no effect on a count"]
+}
 EMPTY = {"calculated_endian", "imported_types", "processed"}
 #: Files that need parts of the language which are not built yet.
-WAITING = {"arrays", "can_frame", "conditions", "gnss", "serial_frame", "strings", "switch_field", "until"}
+WAITING = {"can_frame", "conditions", "gnss", "serial_frame", "strings", "switch_field", "until"}
 
 
 def taken(file: Path) -> str:
@@ -57,7 +61,8 @@ def test_what_is_written_passes_lint(file: Path) -> None:
     protocol, faults = loads(written(document, notes), "x.yaml")
     assert protocol is not None
     assert {each.rule for each in faults} <= {"unconfirmed", "unused-type"}
-    assert notes.found[before:] == []
+    more = [str(each).partition(" [")[0] for each in notes.found[before:]]
+    assert more == REFUSED.get(file.stem, [])
 
 
 LAUGHS = "meta: {id: x}\na0: &a0 [1]\n" + "".join(

@@ -108,7 +108,7 @@ def fields(found: Imported) -> str:
         ("a,UINT16,;b,unsigned int,4;c,,3;d,S8,;e,signed,2", "a u16, b u32, c u24, d i8, e i16"),
         ("a,WORD,;b,DINT,;c,UDINT,;d,Boolean,", "a u16, b i32, c u32, d bool"),
         ("a,u16,32;b,u32,32;c,u8,4", "a u16[16], b u32, c bytes[4]"),
-        ("a,u16,16 bit;b,string,20;c,char(3),;d,raw,", "a u16, b text[20], c text[3], d bytes"),
+        ("a,u16,16 bit;b,string,20;c,char(3),;d,raw,", "a u16, b text[20] 00, c text[3] 00, d bytes"),
         ("a,u16[3],6;b,uint8[],", "a u16[3], b bytes"),
         ("a,,12;b,double,", "a bytes[12], b f64"),
         ("reserved,u8,;Spare 2,,11", "reserved u8 True, spare_2 u64 True, spare_2_2 u24 True"),

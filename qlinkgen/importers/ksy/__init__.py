@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from qlinkgen.importers.document import Block, Document, Message, Record, Value, between
+from qlinkgen.importers.document import Block, Document, Message, Notation, Record, Value, between
+from qlinkgen.importers.frames import assumed
+from qlinkgen.importers.ksy.bounds import bounded, size_of
 from qlinkgen.importers.ksy.enums import Enums
-from qlinkgen.importers.ksy.fields import Layout, Shared
+from qlinkgen.importers.ksy.fields import Layout, Shared, is_open
 from qlinkgen.importers.ksy.frame import LARGEST, Framed, framed, stream_of
 from qlinkgen.importers.ksy.tree import Refused, Type, read_tree
 from qlinkgen.importers.names import Names, schema_name
@@ -39,6 +41,8 @@ def read_ksy(path: Path | str, notes: Notes, *, name: str = "") -> Document:
     called = (meta.text("id") if meta else "") or file.stem
     messages = _messages(frame, inside, called, shared)
     records = _records(shared)
+    parts = _parts(frame, messages)
+    messages = _bounded(messages, records, shared)
     protocol: dict[str, Value] = {"name": name or schema_name(called, "protocol")}
     if meta and meta.text("title"):
         protocol["title"] = meta.text("title")
@@ -48,15 +52,21 @@ def read_ksy(path: Path | str, notes: Notes, *, name: str = "") -> Document:
     return Document(
         protocol=protocol,
         byteorder=order,
-        frame=Block({"parts": Block(frame.parts if frame else {"data": _payload()})}),
+        frame=parts,
         bus={"kind": "master_slave"},
         sections={"enums": shared.enums.all, "types": records, "messages": messages},
+        other_frame=_assumed(messages),
         comment="" if frame else f"The file does not limit the payload; {LARGEST} bytes are an assumption.",
     )
 
 
-def _payload() -> Value:
-    return {"role": "payload", "size": between(0, LARGEST)}
+def _parts(frame: Framed | None, messages: tuple[Message, ...]) -> Value:
+    """The frame that was found; without one the payload alone, if its size follows from its fields."""
+    if frame is not None:
+        return Block({"parts": Block(frame.parts)})
+    if any(is_open(each.fields) for each in messages):
+        return _assumed(messages)
+    return Block({"parts": Block({"data": {"role": "payload", "size": between(0, LARGEST)}})})
 
 
 def _frame(inside: Type, notes: Notes) -> Framed | None:
@@ -84,8 +94,26 @@ def _messages(frame: Framed | None, inside: Type, called: str, shared: Shared) -
             shared.notes.add(error.line, f"message {name[:60]} is left out: {error.text}")
             continue
         doc = type_.doc if type_.outer else ""
-        found.append(Message(names.take(name, type_.line), fields, type_.line, keys, doc))
+        numbered: dict[str, Value] = (
+            {"id": 1, "confirmed": False} if frame is None and is_open(fields) else {}
+        )
+        found.append(Message(names.take(name, type_.line), fields, type_.line, {**keys, **numbered}, doc))
     return tuple(found)
+
+
+def _assumed(messages: tuple[Message, ...]) -> Value:
+    ids = [each.keys.get("id") for each in messages]
+    greatest = max((int(each.text, 0) for each in ids if isinstance(each, Notation)), default=1)
+    return assumed("A Kaitai Struct file", LARGEST, greatest)
+
+
+def _bounded(
+    messages: tuple[Message, ...], records: tuple[Record, ...], shared: Shared
+) -> tuple[Message, ...]:
+    sizes = {each.name: int(each.type[1:]) // 8 for each in shared.enums.all}
+    for record in records:  # each after those that it contains
+        sizes[record.name] = size_of(record.fields, sizes)
+    return tuple(bounded(each, sizes, LARGEST) for each in messages)
 
 
 def _records(shared: Shared) -> tuple[Record, ...]:

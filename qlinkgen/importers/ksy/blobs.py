@@ -56,7 +56,7 @@ def blob(attribute: Attribute, encoding: str, notes: Notes) -> tuple[str, dict[s
     size = expressions.count(text) if text else None
     end = "0" if attribute.type == "strz" else attribute.text("terminator")
     if isinstance(size, int):
-        return _fixed(attribute, base, size, attribute.text("pad-right") or end, notes)
+        return _fixed(attribute, base, size, attribute.text("pad-right") or end)
     if text and size is None:
         raise Refused(attribute.line, f"{attribute.id[:60]}: the size '{text[:60]}' is not a field or number")
     if end and size is None:
@@ -76,17 +76,10 @@ def _base(attribute: Attribute, encoding: str, notes: Notes) -> str:
     return "bytes"
 
 
-def _fixed(
-    attribute: Attribute, base: str, size: int, padding: str, notes: Notes
-) -> tuple[str, dict[str, Value]]:
+def _fixed(attribute: Attribute, base: str, size: int, padding: str) -> tuple[str, dict[str, Value]]:
     if not 0 < size <= MOST:
         raise Refused(attribute.line, f"{attribute.id[:60]}: {size} bytes are not between 1 and {MOST}")
-    if not padding:
-        return f"{base}[{size}]", {}
-    if base == "text":
-        return f"{base}[{size}]", {"pad": _byte(attribute, padding)}
-    notes.add(attribute.line, f"the padding of {attribute.id[:60]} is part of its bytes")
-    return f"{base}[{size}]", {}
+    return f"{base}[{size}]", {"pad": _byte(attribute, padding)} if padding else {}
 
 
 def _byte(attribute: Attribute, text: str) -> Value:

@@ -300,3 +300,14 @@ class Layout:
         if attribute.doc:
             keys["doc"] = attribute.doc
         return keys if len(keys) > 1 else at
+
+
+def is_open(fields: Sequence[Field]) -> bool:
+    """Whether the size of fields follows from nothing that they state."""
+    counted = {each.keys["counts"] for each in fields if "counts" in each.keys}
+    return any(
+        (each.type in ("bytes", "text") or each.type.endswith("[]"))
+        and each.name not in counted
+        and not each.keys.keys() & {"until", "terminator"}
+        for each in fields
+    )

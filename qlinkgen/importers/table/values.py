@@ -64,6 +64,8 @@ class Values:
             keys |= self._float(record) if found.base == "f" else self._range(record, whole, scaled)
         if found.count is None and found.base != "f":
             keys |= self._fixed(record, whole, scaled, named)
+        if found.base == "text" and found.count:
+            keys["pad"] = Notation("00")
         if record.get("section"):
             keys["section"] = record.get("section")
         return type_, keys

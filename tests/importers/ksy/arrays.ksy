@@ -12,12 +12,6 @@ seq:
     type: point
     repeat: expr
     repeat-expr: num_points
-  - id: num_pairs
-    type: u2
-  - id: pairs
-    type: s4
-    repeat: expr
-    repeat-expr: num_pairs * 2
   - id: values
     type: f8
     repeat: eos

@@ -21,6 +21,7 @@ types:
             2: divided
             3: parents
             4: fine
+            5: scaled
   masked:
     seq:
       - id: flags
@@ -38,6 +39,14 @@ types:
     seq:
       - id: data
         size: _parent.len - 1
+  scaled:
+    seq:
+      - id: num_pairs
+        type: u2
+      - id: pairs
+        type: s4
+        repeat: expr
+        repeat-expr: num_pairs * 2
   fine:
     seq:
       - id: data
