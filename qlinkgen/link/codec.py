@@ -110,6 +110,7 @@ class Command(Protocol):
     response_seconds: float
     repeat_safe: bool
     echoes: tuple[str, ...]
+    sizes: tuple[tuple[str, str], ...]
 
     @property
     def request(self) -> type[Framed]:
@@ -223,10 +224,20 @@ def meanings(reply: OtherReply) -> set[str]:
     return {reply.means, *(means for _, _, means in reply.cases)}
 
 
+def wrong_size(command: Command, request: Message, response: Message) -> str:
+    """Return the first field of a response with another number of items than the request says, "" if none."""
+    for name, asked in command.sizes:
+        if len(getattr(response, name)) != getattr(request, asked):
+            return name
+    return ""
+
+
 def answers(command: Command, request: Message, response: Message) -> bool:
-    """Whether an answer has a right class for a request and equal echoed fields."""
+    """Whether an answer has a right class for a request, equal echoed fields and the sizes asked for."""
     if type(response) is command.response:
         echoes = command.echoes
+        if command.sizes and wrong_size(command, request, response):
+            return False
     elif reply := command.replies.get(type(response)):
         echoes = reply.echoes
     else:

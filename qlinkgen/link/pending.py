@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from qlinkgen.link.codec import Framed, OtherReply
+from qlinkgen.link.codec import Framed, OtherReply, wrong_size
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.transaction import CommandTiming
 
@@ -49,6 +49,8 @@ class Pending:
         for name in command.echoes:
             if getattr(response, name) != getattr(request, name):
                 return False
+        if command.sizes and wrong_size(command.definition, request, response):
+            return False
         if command.accepts is not None:
             return command.accepts(request, response)
         return node == self.node or (self.to_all and command.answers_broadcast)
@@ -60,6 +62,9 @@ class Pending:
             return None
         if self.command.accepts is not None and type(message) is self.command.response:
             return reply if self.command.accepts(self.request, message) else None
+        sizes = self.command.sizes if type(message) is self.command.response else ()
+        if sizes and wrong_size(self.command.definition, self.request, message):
+            return None
         same = all(getattr(message, name) == getattr(self.request, name) for name in reply.echoes)
         return reply if same else None
 

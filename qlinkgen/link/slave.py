@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, Protocol
 
-from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message
+from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message, wrong_size
 from qlinkgen.link.echo import EchoCanceller
 
 
@@ -106,6 +106,7 @@ class SlaveEngine:
         self._answering = {
             command.request: command.addressing == "answered_broadcast" for command in codec.COMMANDS.values()
         }
+        self._sized = {command.request: command for command in codec.COMMANDS.values() if command.sizes}
         self._decoder = codec.StreamDecoder("request")
         self._turnaround = turnaround
         speed = baud or codec.BUS.baud
@@ -148,9 +149,22 @@ class SlaveEngine:
             return
         self._request = request
         if response is not None:
+            self._check(request, response)
             self._answer = self._encode(response)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
+
+    def _check(self, request: Framed, response: Message) -> None:
+        """Refuse a response of another size than the request asks for, which a master would not accept."""
+        command = self._sized.get(type(request))
+        if command is None or type(response) is not command.response:
+            return
+        if name := wrong_size(command, request, response):
+            asked = dict(command.sizes)[name]
+            raise ValueError(
+                f"{response.NAME}: {name} has {len(getattr(response, name))} items; "
+                f"{asked} of the request asks for {getattr(request, asked)}"
+            )
 
     def _handled(self, request: Framed, now: float) -> Message | None:
         try:
@@ -161,6 +175,7 @@ class SlaveEngine:
     def answer(self, request: Framed, response: Message, now: float) -> None:
         """Send the answer to a request that its handler did not answer; too late after another request."""
         if request is self._request:
+            self._check(request, response)
             self._answer = self._encode(response)
             self._due = max(self._due, now)
         else:

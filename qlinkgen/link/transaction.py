@@ -49,7 +49,7 @@ class CommandTiming:
 
     __slots__ = (
         "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "plain",
-        "replies", "response", "tries",
+        "replies", "response", "sizes", "tries",
     )  # fmt: skip
 
     def __init__(self, command: Command, timing: Timing, accepts: Accepts | None) -> None:
@@ -57,6 +57,7 @@ class CommandTiming:
         self.response = command.response
         self.accepts = accepts
         self.echoes = command.echoes
+        self.sizes = command.sizes
         self.replies = command.replies
         #: Class of the response if it answers in any case, whatever is in it.
         self.plain = None if command.response in command.replies else command.response

@@ -118,6 +118,11 @@ class Field:
                 assert_never(self.type)
 
     @property
+    def most(self) -> int:
+        """Maximum number of items, 1 for a single value."""
+        return self.type.length.maximum if isinstance(self.type, Blob | Array | Records) else 1
+
+    @property
     def quantity(self) -> str:
         """Suffix for the name of its number of items, "" for one value."""
         return self.type.quantity if isinstance(self.type, Blob | Array | Records) else ""

@@ -99,6 +99,8 @@ class Command:
     confirmed: bool = True
     #: Answers other than the response.
     replies: tuple[Reply, ...] = ()
+    #: Fields of the response, and the fields of the request that say how many items they have.
+    sizes: tuple[tuple[str, str], ...] = ()
     #: What the response means, None if it always answers the request.
     outcome: Reply | None = None
     #: Protocol-specific attributes; names and values are declared in the schema.

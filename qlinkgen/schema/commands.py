@@ -25,6 +25,7 @@ from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.seeds import is_number
+from qlinkgen.schema.sizes import sized
 from qlinkgen.schema.source import Path
 
 
@@ -59,6 +60,7 @@ class CommandBuilder:
         self._frame = frame
         self._bus = bus
         self._replies = ReplyBuilder(file, report, messages, frame)
+        self._sizes: dict[str, tuple[tuple[str, str], ...]] = {}
         self.messages: list[Message] = []
         self.commands: list[Command] = []
 
@@ -92,6 +94,7 @@ class CommandBuilder:
                 response_within=_allowance(spec.response_within or self._file.bus.response_within),
                 repeat=self._repeat(spec.repeat or defaults.repeat, request, path),
                 replies=self._other_replies(name, response, addressing),
+                sizes=self._sizes.get(name, ()),
                 outcome=self._replies.outcome(name, response),
                 in_flight=spec.in_flight or defaults.in_flight or 1,
                 doc=spec.doc,
@@ -137,7 +140,11 @@ class CommandBuilder:
         self.messages.append(asked)
         if response is None or response == "none":
             return asked, None
-        answered = build(name, spec, answers, addressing=addressing, section=section)
+        found = sized(answers.fields, asked, answers.path, self._report)
+        self._sizes[name] = found.sizes
+        answered = build(
+            name, spec, answers._replace(fields=found.fields), addressing=addressing, section=section
+        )
         self.messages.append(answered)
         return asked, answered
 

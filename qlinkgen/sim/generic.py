@@ -17,6 +17,12 @@ _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the modul
     "TextRule": lambda rule: " " * rule.fewest,
     "ScaledRule": lambda rule: min(rule.scale.value(rule.scale.low), rule.scale.value(rule.scale.high)),
 }
+#: Name of a rule class to as many smallest items as asked for.
+_REPEATED: Mapping[str, Callable[[Any, int], object]] = {  # Any: as above
+    "ArrayRule": lambda rule, count: [rule.item.ranges[0][0]] * count,
+    "BytesRule": lambda _, count: bytes(count),
+    "TextRule": lambda _, count: " " * count,
+}
 
 
 class GenericNode:
@@ -49,10 +55,19 @@ class GenericNode:
             return None
         values = dict(self._required[command.response])
         values.update({name: getattr(request, name) for name in command.echoes})
+        for name, asked in command.sizes:
+            values |= _items(command.response, name, getattr(request, asked))
         if address := command.response.ADDRESS:
             values[address] = self.number
         make: Callable[..., Message] = command.response
         return make(**values)
+
+
+def _items(message: type[Message], name: str, count: int) -> dict[str, object]:
+    """Return as many items of a field as asked for; nothing for records, which have no smallest value."""
+    rule = next((rule for rule in getattr(message, "RULES", ()) if rule.name == name), None)
+    make = _REPEATED.get(type(rule).__name__)
+    return {name: make(rule, count)} if make else {}
 
 
 def required_values(message: type[Message]) -> dict[str, object]:

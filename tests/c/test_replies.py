@@ -21,6 +21,7 @@ frame:
   parts:
     node: {role: address, type: u8}
     code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
     data: {role: payload, size: 0..8}
     crc: {type: u16, algorithm: crc-16/modbus, over: [node, code, data]}
 bus: {kind: master_slave, nodes: 1..9, broadcast: 0}
@@ -31,6 +32,7 @@ replies:
 commands:
   read: {id: 0x10, request: {number: u8}, response: {id: request.id + 0x40, fields: {value: u16}}}
   set: {id: 0x11, request: {value: u16}, response: {}, addressing: either}
+  log: {id: 0x13, request: {many: {type: u8, range: 0..3}}, response: {values: "u16[request.many]"}}
   start: {id: 0x12, request: {}, response: none, addressing: broadcast}
 """
 PROGRAM = r"""
@@ -52,6 +54,13 @@ static bool on_set(pump_slave_t *slave, const pump_set_request_t *request)
     return (request->value == 0U) ? true : pump_nak_answer(slave);
 }
 
+static bool on_log(pump_slave_t *slave, const pump_log_request_t *request, pump_log_response_t *response)
+{
+    (void)slave;
+    response->values[0] = request->many;
+    return true;
+}
+
 int main(int count, char **asked)
 {
     static pump_slave_t slave;
@@ -59,6 +68,7 @@ int main(int count, char **asked)
     slave.node = 3U;
     slave.read = on_read;
     slave.set = on_set;
+    slave.log = on_log;
     for (int at = 1; at < count; ++at) {
         uint8_t bytes[32];
         size_t size = 0;
@@ -108,6 +118,8 @@ def test_a_function_answers_with_a_reply(
         (pump.ReadRequest(node=4, number=5), b""),
         (pump.SetRequest(node=3, value=0), pump.SetResponse(node=3).to_frame()),
         (pump.SetRequest(node=3, value=1), pump.Nak(node=3).to_frame()),
+        (pump.LogRequest(node=3, many=2), pump.LogResponse(node=3, values=[2, 0]).to_frame()),
+        (pump.LogRequest(node=3, many=0), pump.LogResponse(node=3, values=[]).to_frame()),
         (pump.SetRequest(node=0, value=1), b""),  # a broadcast is not answered
     ]
     program = built(tmp_path, compiler, "-O1", "-std=c99")

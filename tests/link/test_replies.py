@@ -15,6 +15,7 @@ from qlinkgen.link.events import Failed, OtherAnswer, Stray
 from qlinkgen.link.monitor import Replied, Unanswered
 from qlinkgen.schema import loads
 from qlinkgen.sim import VirtualPort, Wire
+from qlinkgen.sim.generic import GenericNode
 from qlinkgen.transport.blocking import BlockingMaster
 from tests.link.line import Arrivals, Run, drive
 
@@ -276,3 +277,54 @@ def test_a_monitor_knows_replies(pump: ModuleType) -> None:
     replied = [event.response for event in monitor.heard if isinstance(event, Replied)]
     assert [type(each).NAME for each in replied] == ["read.fault", "read.response", "read.fault"]
     assert not [event for event in monitor.heard if isinstance(event, Unanswered)]
+
+
+SIZED = """\
+qlinkgen: 1
+protocol: {name: log, title: Log, revision: "1", source: Manual}
+frame:
+  parts:
+    node: {role: address, type: u8}
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    data: {role: payload, size: 0..8}
+    crc: {type: u16, algorithm: crc-16/modbus, over: [node, code, length, data]}
+bus: {kind: master_slave, nodes: 1..9, baud: 9600, response_within: 10 ms}
+defaults: {addressing: node, repeat: safe}
+commands:
+  read: {id: 1, request: {many: {type: u8, range: 0..4, default: 1}}, response: {values: "u16[request.many]"}}
+"""
+
+
+@pytest.fixture(scope="module")
+def log() -> ModuleType:
+    protocol, faults = loads(SIZED, "log.yaml")
+    assert protocol is not None, faults
+    return load_codec(protocol)
+
+
+def test_an_answer_of_another_size_than_asked_for_is_wrong(log: ModuleType) -> None:
+    engine = MasterEngine(log, Timing.of(log, host_slack=SLACK))
+    answers = [log.ReadResponse(node=3, values=[7] * many).to_frame() for many in (3, 2)]
+    assert run(engine, log.ReadRequest(node=3, many=2), (0.012, answers[1])).response.values == [7, 7]
+    outcome = run(engine, log.ReadRequest(node=3, many=2), (1.012, answers[0]), now=1.0, attempts=1)
+    assert isinstance(outcome.error, BadReply)
+
+
+def test_a_slave_is_held_to_the_size(log: ModuleType) -> None:
+    class Node:
+        number = 3
+
+        def handle(self, request: Any, now: float) -> Any:
+            return log.ReadResponse(node=3, values=[1, 2])
+
+    slave = SlaveEngine(log, Node(), baud=9600)
+    slave.receive(log.ReadRequest(node=3, many=2).to_frame(), 0.0)
+    assert slave.bytes_to_send(1.0)
+    with pytest.raises(ValueError, match=r"values has 2 items; many of the request asks for 3"):
+        slave.receive(log.ReadRequest(node=3, many=3).to_frame(), 2.0)
+
+
+def test_a_simulated_node_answers_with_the_size(log: ModuleType) -> None:
+    node = GenericNode(log, 3)
+    assert node.handle(log.ReadRequest(node=3, many=3), 0.0) == log.ReadResponse(node=3, values=[0, 0, 0])

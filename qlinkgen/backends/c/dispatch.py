@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from qlinkgen.backends.c.framing import Address, Expected, expected
-from qlinkgen.backends.c.names import Names
+from qlinkgen.backends.c.names import Names, count_type
 from qlinkgen.model.message import Message
-from qlinkgen.model.naming import handler, snake
+from qlinkgen.model.naming import handler, member, snake
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Allowance, Bus, Command, Repeat
 from qlinkgen.plan.tree import MessagePlan
@@ -36,6 +36,7 @@ class SlaveEntry:
         right: condition for a valid payload.
         unless_silent: term of a condition that prevents a response to a broadcast.
         replies: functions of other answers.
+        sizes: number of items of a field of the response, and the expression with which it begins.
     """
 
     name: str
@@ -52,6 +53,7 @@ class SlaveEntry:
     right: str
     unless_silent: str
     replies: list[str]
+    sizes: list[tuple[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +162,18 @@ def _entry(
         right=decoded if message.fields else "frame->size == 0U",
         unless_silent=" && !slave->broadcast" if answer and addressing == "either" else "",
         replies=replies,
+        sizes=_sizes(names.command_of(message)) if answer else [],
     )
+
+
+def _sizes(command: Command | None) -> list[tuple[str, str]]:
+    """Members of the response, and those of the request, in the type of the former."""
+    fields = {field.name: field for field in command.response.fields} if command and command.response else {}
+    return [
+        (f"{name}_{fields[name].quantity}", f"({count_type(fields[name].most)})request.{member(asked)}")
+        for name, asked in (command.sizes if command else ())
+        if not fields[name].fixed
+    ]
 
 
 def slave_groups(entries: list[SlaveEntry], prefix: str) -> list[SlaveGroup]:

@@ -723,6 +723,7 @@ class Command:
         repeat_safe: whether the request may be repeated after a missing response.
         repeat_counter: field that distinguishes a repeat from a new request, "" if there is none.
         echoes: fields of the response that repeat the field of the same name in the request.
+        sizes: fields of the response, and those of the request with their number of items.
         replies: answers other than the response, by class.
         in_flight: maximum number of outstanding requests.
         section: section of the source document.
@@ -733,6 +734,7 @@ class Command:
     __slots__ = (
         "addressing", "attributes", "confirmed", "echoes", "id", "in_flight", "name", "repeat_counter",
         "repeat_safe", "replies", "request", "response", "response_byte_times", "response_seconds", "section",
+        "sizes",
     )  # fmt: skip
 
     def __init__(
@@ -748,6 +750,7 @@ class Command:
         repeat_safe: bool = False,
         repeat_counter: str = "",
         echoes: tuple[str, ...] = (),
+        sizes: tuple[tuple[str, str], ...] = (),
         replies: tuple[OtherReply, ...] = (),
         in_flight: int = 1,
         section: str = "",
@@ -764,6 +767,7 @@ class Command:
         self.repeat_safe = repeat_safe
         self.repeat_counter = repeat_counter
         self.echoes = echoes
+        self.sizes = sizes
         by_class = {each.message: each for each in replies}
         self.replies: Mapping[MessageClass, OtherReply] = by_class
         self.in_flight = in_flight

@@ -92,6 +92,9 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     if within.seconds:
         arguments.append(f"response_seconds={_number(within.seconds)}")
     arguments += _repetition(command)
+    sizes = [f'("{attribute(name)}", "{attribute(asked)}")' for name, asked in command.sizes]
+    if sizes:
+        arguments.append(f"sizes={_tuple(sizes)}")
     replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
     if replies:
         arguments.append(f"replies={_tuple(replies)}")

@@ -209,6 +209,8 @@ class _Maker:
         used |= {("response", number) for number in self._ids}
         answered = {name: spec for name, spec in found["commands"].items() if spec["response"] != "none"}
         for spec in answered.values():
+            if shape.has_length and not shape.least and shape.most > 8 and rng.random() < 0.8:
+                self._size_from_request(spec)
             asked = [shape.number(spec["id"])]
             number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None and rng.random() < 0.4:
@@ -228,6 +230,16 @@ class _Maker:
             number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None:
                 spec["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
+
+    def _size_from_request(self, command: Doc) -> None:
+        """Let a field of the request say how many items the response has."""
+        request, rng = command["request"], self.rng
+        plain = [name for name, spec in request.items() if re.fullmatch(r"[ui]\d+", str(spec))]
+        if plain and "empty_request" not in command:
+            name, kind = rng.choice(plain), rng.choice(("u8", "i16", "bytes", "text"))
+            unsigned = request[name].replace("i", "u")
+            request[name] = {"type": unsigned, "range": rng.choice(("0..2", "1..3"))}
+            command["response"] = {self.words.name(set()): f"{kind}[request.{name}]"}
 
     def _answer_id(
         self, shape: Shape, asked: list[int], used: set[tuple[str, int]], *, relative: bool

@@ -594,7 +594,8 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
             number, written = _number(document, written.get("id"), number), written["fields"]
         else:
             number = numbered(document, number, direction)
-        slots = fields.build(written)
+        asked = {value: number for slot in fields.build(spec["request"]) for value, number in _numbers(slot)}
+        slots = fields.build({key: _from_request(each, asked) for key, each in written.items()})
         yield Message(
             f"{name}.{direction}",
             number,
@@ -605,6 +606,21 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
             empty,
             _checked(document, name),
         )
+
+
+def _numbers(slot: Slot) -> Iterator[tuple[str, Number]]:
+    if isinstance(slot.kind, Number):
+        yield slot.name, slot.kind
+
+
+def _from_request(spec: Any, asked: Mapping[str, Number]) -> Any:
+    """A field with the range of the field of the request that has its number of items."""
+    text = spec["type"] if isinstance(spec, dict) else spec
+    if not (match := re.search(r"\[request\.(\w+)\]", text)):
+        return spec
+    number = asked[match[1]]
+    text = text.replace(match[0], f"[{number.low}..{number.high}]")
+    return {**spec, "type": text} if isinstance(spec, dict) else text
 
 
 def _answer(own: Any, common: Any) -> Any:
