@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import TYPE_CHECKING, cast
 
-from qlinkgen.model.message import Example, Message
+from qlinkgen.model.message import Example, Message, Value
 from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import BadValue, Json, default_of, from_json, to_json
@@ -17,6 +17,8 @@ from qlinkgen.schema.source import Path
 
 if TYPE_CHECKING:
     from qlinkgen.plan.codec import Codec, Decoded
+    from qlinkgen.plan.content import Raw
+    from qlinkgen.plan.payload import Holder
 
 _RULE = "wrong-example"
 
@@ -59,8 +61,13 @@ class _Checker:
         if decoded is None:
             return None
         parts = {each: value for each, value in spec.parts.items() if each != key}
-        self._compare_header(message, decoded, parts, path)
-        self._compare(message, decoded, values, (*path, key))
+        self._compare_address(message, decoded, parts, path)
+        beside = {member.name: member for _, member in decoded.message.envelope.values}
+        names = {record_key(value.name): (value, beside[value.name]) for value in self._protocol.frame_values}
+        self._compare("the frame", names, decoded.beside, parts, path)
+        steps = zip(message.values, decoded.message.payload.settable, strict=True)
+        inside = {value.name: (value, step) for value, step in steps}
+        self._compare(message.name, inside, decoded.values, values, (*path, key))
         return Example(message.name, spec.wire, spec.after, decode_only=spec.decode_only)
 
     def _error(self, path: Path, what: str, hint: str, *, of_key: bool = False) -> None:
@@ -110,47 +117,49 @@ class _Checker:
         if found != message.name:
             self._error(place, f"this is a frame of {found}", f"move the example to {found}")
             return None
-        sent = self._codec.encode(found, decoded.values, decoded.address, spec.after)
+        values = {**decoded.values, **decoded.beside}
+        sent = self._codec.encode(found, values, decoded.address, spec.after)
         if sent != spec.wire and not spec.decode_only:
             what = f"an encoder sends these values as {sent.hex(' ').upper()}"
             self._error(place, what, "correct one of both, or add decode_only: true")
         return decoded
 
-    def _compare_header(
-        self, message: Message, decoded: Decoded, given: Mapping[str, object], path: Path
+    def _compare_address(
+        self, message: Message, decoded: Decoded, given: dict[str, object], path: Path
     ) -> None:
-        """Compare the address."""
+        """Compare the address, and remove it from the values given."""
         name = self._protocol.address_name if message.addresses else None
-        known = [record_key(name)] if name else []
-        for key in given:
-            if key not in known:
-                hint = did_you_mean(key, ("wire", "after", *known), f"known here: {listed(known)}")
-                self._error((*path, key), f"unknown key {shown(key)}", hint, of_key=True)
-        if name and given.get(record_key(name), message.default_address) != decoded.address:
+        if name and given.pop(record_key(name), message.default_address) != decoded.address:
             place = (*path, record_key(name))
             self._error(place, f"{name} is {decoded.address} in these bytes", "correct one of both")
 
-    def _compare(self, message: Message, decoded: Decoded, given: Mapping[str, Json], path: Path) -> None:
-        """Compare the values; those that are left out have their default."""
+    def _compare(
+        self,
+        owner: str,
+        values: Mapping[str, tuple[Value, Holder]],
+        raws: Mapping[str, Raw],
+        given: Mapping[str, object],
+        path: Path,
+    ) -> None:
+        """Compare values by their keys; those that are left out have their default."""
         from qlinkgen.plan.natives import native_of  # noqa: PLC0415  # see build_examples
 
-        values = {value.name: value for value in message.values}
         unknown = [key for key in given if key not in values]
         for key in unknown:
             hint = did_you_mean(key, values, f"its values are {listed(values)}")
-            self._error((*path, key), f"{message.name} has no value {shown(key)}", hint, of_key=True)
-        for (name, value), step in zip(values.items(), decoded.message.payload.settable, strict=True):
-            if unknown and name not in given:
+            self._error((*path, key), f"{owner} has no value {shown(key)}", hint, of_key=True)
+        for key, (value, step) in values.items():
+            if unknown and key not in given:
                 continue  # probably misspelt
-            found = to_json(value, native_of(step, decoded.values[name]))
+            found = to_json(value, native_of(step, raws[value.name]))
             try:
-                said = to_json(value, from_json(value, given[name]) if name in given else default_of(value))
+                native = from_json(value, cast("Json", given[key])) if key in given else default_of(value)
             except BadValue as bad:
-                self._error((*path, name), str(bad), f"these bytes have {_text(found)}")
+                self._error((*path, key), str(bad), f"these bytes have {_text(found)}")
                 continue
-            if said != found:
-                what = f"{name} is {_text(found)} in these bytes"
-                self._error((*path, name), what, "correct one of both", of_key=name not in given)
+            if to_json(value, native) != found:
+                what = f"{key} is {_text(found)} in these bytes"
+                self._error((*path, key), what, "correct one of both", of_key=key not in given)
 
 
 def _text(value: Json) -> str:

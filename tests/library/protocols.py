@@ -25,7 +25,7 @@ from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.schema import find, library, load
 from qlinkgen.schema.including import GROUPS
-from tests.support.random_raw import random_address, random_values
+from tests.support.random_raw import random_address, random_beside, random_values
 
 #: A message as `qlinkgen decode` prints it.
 Record = Mapping[str, Any]
@@ -34,6 +34,7 @@ Record = Mapping[str, Any]
 PEERS: Mapping[str, tuple[str, str]] = {
     "cobs": ("cobs", "cobs"),
     "crsf": ("crsf_parser", "crsf-parser"),
+    "mavlink_1": ("pymavlink", "pymavlink"),
     "modbus_ascii": ("pymodbus", "pymodbus"),
     "modbus_rtu": ("pymodbus", "pymodbus"),
     "msp": ("yamspy", "yamspy"),
@@ -87,6 +88,7 @@ class Described:
     def wire(self, message: Message, rng: random.Random) -> bytes:
         """A frame of random values, made by the interpreter."""
         values = dict(zip((each.name for each in message.values), random_values(message, rng), strict=True))
+        values |= random_beside(self.model, rng)
         address = random_address(message, rng) if message.addresses else None
         return Codec(self.plan).encode(message.name, values, address)
 

@@ -9,6 +9,7 @@ from typing import TypeAlias, assert_never
 
 from qlinkgen.model.fields import Layout, Record, Records, Value
 from qlinkgen.model.message import Message
+from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Flags, Float, Length, Scalar
 
 Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | list[Mapping[str, Raw]]"
@@ -17,6 +18,11 @@ Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | list[Mapping[str
 def random_values(message: Message, rng: random.Random) -> list[Raw]:
     """Legal raw values of a message, often bounds."""
     return [_random(value, rng) for value in message.values]
+
+
+def random_beside(protocol: Protocol, rng: random.Random) -> dict[str, Raw]:
+    """Legal raw values of a frame."""
+    return {value.name: _random(value, rng) for value in protocol.frame_values}
 
 
 def random_address(message: Message, rng: random.Random) -> int:
