@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 from qlinkgen.model.checksum import Checksum as Algorithm
-from qlinkgen.model.coding import Coding
+from qlinkgen.model.coding import Coding, Escape, Insert
 from qlinkgen.model.fields import Field, Value
 from qlinkgen.model.integer import ByteOrder, Chunk, Integer, pack_chunks
 from qlinkgen.model.texts import Text
@@ -16,6 +16,8 @@ from qlinkgen.model.types import Scalar
 
 #: What the names of attributes begin with where a check value covers them.
 ATTRIBUTE = "attribute."
+#: Bytes of a pair.
+_PAIR = 2
 #: The role of a part of a frame.
 Role = Literal[
     "constant", "length", "message", "address", "payload", "checksum", "terminator", "bits", "derived"
@@ -168,6 +170,27 @@ class DelimitedFrame:
     def part(self, role: Role) -> Part | None:
         """The first part with a role."""
         return next((part for part in self.parts if part.role == role), None)
+
+    @cached_property
+    def paired(self) -> int | None:
+        """The byte before a second one in coded bytes, if a terminator is another pair with it; else None.
+
+        Then the terminator may occur there, but not where a pair begins.
+        """
+        end = self.part("terminator")
+        if end is None or not self.coding or len(end.constant) != _PAIR:
+            return None
+        first, (one, other) = self.coding[-1], end.constant
+        inner = [part.name for part in self.parts[: self.parts.index(end)]][int(bool(self.preamble)) :]
+        match first:
+            case Escape():
+                seconds = {second for _, second in first.codes} | {first.escape}
+                known = first.escape == one and other not in seconds and not first.mask
+            case Insert():
+                known = first.after == bytes((one,)) and other != first.insert
+            case _:
+                known = False
+        return one if known and list(self.coded) == inner else None
 
     @cached_property
     def preamble(self) -> bytes:

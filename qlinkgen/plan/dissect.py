@@ -572,7 +572,7 @@ class _EndedWalk(_Walk):
         last, wire, start = self.frame.end.part, self.wire, self.cursor.at
         size = 0 if self.no_preamble else len(self.envelope.preamble)
         first = min(start + size, len(wire))
-        stop = wire.find(last.data, first)
+        stop = self.frame.end.find(wire, first, len(wire))
         end = len(wire) if stop < 0 else min(len(wire), stop + last.size + self.frame.end.after)
         content = self._as_sent(start, first) + self._decoded(first, len(wire) if stop < 0 else stop)
         self.cursor.at = end

@@ -48,7 +48,7 @@ def find_end(frame: FramePlan, wire: bytes, start: int = 0) -> int:
     if len(head) < len(lead):
         raise Incomplete(start + len(lead))
     first, limit = start + len(lead), start + frame.max_wire - frame.end.after
-    stop = wire.find(last, first, limit)
+    stop = frame.end.find(wire, first, limit)
     if stop == first:
         raise NoFrame("length", first, empty=first + len(last) - start)
     if stop < 0 and len(wire) >= limit:

@@ -302,11 +302,22 @@ class ByTerminator:
     Attributes:
         part: the terminator, one of the parts after the payload.
         shared: it may also begin the next frame.
+        paired: the byte that begins it, and pairs of coded bytes; None if one of its bytes cannot occur.
     """
 
     part: ConstantPart
     after: int
     shared: bool
+    paired: int | None = None
+
+    def find(self, wire: bytes, first: int, limit: int) -> int:
+        """The offset of the terminator that is wholly between two offsets, -1 if there is none."""
+        if self.paired is None:
+            return wire.find(self.part.data, first, limit)
+        at = wire.find(self.part.data[:1], first, limit - 1)
+        while at >= 0 and wire[at : at + 2] != self.part.data:
+            at = wire.find(self.part.data[:1], at + 2, limit - 1)
+        return at
 
 
 End = ByLength | ByMessage | ByMark | ByTerminator
@@ -645,7 +656,7 @@ def _delimited(frame: DelimitedFrame) -> FramePlan:
     if stated := frame.part("terminator"):
         part = next(each for each in envelope.parts if each.name == stated.name)
         assert isinstance(part, ConstantPart)
-        end = ByTerminator(part, envelope.from_end(part) - part.size, stated.shared)
+        end = ByTerminator(part, envelope.from_end(part) - part.size, stated.shared, frame.paired)
     return FramePlan(
         envelopes=dict.fromkeys(("request", "response", "message"), envelope),
         end=end,

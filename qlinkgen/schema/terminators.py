@@ -55,7 +55,7 @@ def check_terminator(frame: Frame | None, messages: Sequence[Message], report: R
     for coding in frame.coding:
         coded = coding.alphabet(coded)
     sent = coded | _joined(found for name, found in plain.items() if name not in frame.coded)
-    if not sent.issuperset(end.constant):
+    if frame.paired is not None or not sent.issuperset(end.constant):
         return
     held = [name for name, found in plain.items() if found & {*end.constant}]
     culprits = ["coded bytes"] if frame.coding else held
@@ -117,12 +117,14 @@ def _numbers(bits: PartBits, chunk: Chunk, messages: Sequence[Message]) -> Itera
         return {message.id for message in messages}
     if bits.role == "constant":
         return bits.constants
+    ranges = [each for message in messages for each in message.addresses]
+    if bits.type is not None:
+        ranges = [(bits.type.minimum, bits.type.maximum)]
     # Of each range, a number for every value of the bits in this byte.
     step = 1 << max(0, chunk.shift - bits.shift)
     return {
         min(number, high)
-        for message in messages
-        for low, high in message.addresses
+        for low, high in ranges
         for number in range(low, min(high, low + 0x100 * step) + step, step)
     }
 

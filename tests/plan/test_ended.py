@@ -54,7 +54,11 @@ SLIP = _SCHEMA.format(
     parts="    open: C0" + _MIDDLE + _CRC + "    close: {role: terminator, value: C0}",
     coding="  coding: {replace: {C0: DB DC, DB: DB DD}}",
 )
-FRAMES = {"ascii": ASCII, "hdlc": HDLC, "cobs": COBS, "late": LATE, "slip": SLIP}
+DLE = _SCHEMA.format(
+    parts="    open: 10 02" + _MIDDLE + _CRC + "    close: {role: terminator, value: 10 03}",
+    coding="  coding: {insert: 10, after: 10}",
+)
+FRAMES = {"ascii": ASCII, "hdlc": HDLC, "cobs": COBS, "late": LATE, "slip": SLIP, "dle": DLE}
 every_frame = pytest.mark.parametrize("text", FRAMES.values(), ids=FRAMES)
 
 
@@ -122,10 +126,17 @@ def test_a_shared_terminator_begins_the_next_frame() -> None:
     assert all(event.raw == wire for event in events)
 
 
+def test_a_terminator_is_not_found_across_a_pair() -> None:
+    codec = Codec(plan(DLE))
+    wire = codec.encode("read.request", {"start": 0x1003, "count": 0x0310}, 0x10)
+    assert wire[:-4] == b"\x10\x02\x10\x10\x03\x10\x10\x03\x03\x10\x10"
+    assert codec.decode(wire, "request").values == {"start": 0x1003, "count": 0x0310}
+
+
 @every_frame
 def test_intact_frames_after_corruption_are_delivered(text: str) -> None:
     codec, rng = Codec(plan(text)), random.Random(text)
-    alphabet = b"\x00\x7e\x7d:0A\r\n\x01\x03\xff"
+    alphabet = b"\x10\x02\x00\x7e\x7d:0A\r\n\x01\x03\xff"
     for _ in range(60):
         stream, intact = b"", []
         for _ in range(rng.randint(1, 5)):

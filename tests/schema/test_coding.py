@@ -96,6 +96,16 @@ def test_the_number_of_a_message_is_tried() -> None:
     assert rules("{}", "05", number=6) == []
 
 
+@pytest.mark.parametrize(("most", "proved"), [(3, True), (7, False), (4, False)])
+def test_values_of_every_frame_are_tried(most: int, *, proved: bool) -> None:
+    low = f"{{at: 0..2, range: 0..{most}}}"
+    part = f"    state: {{type: u8, bits: {{low: {low}, high: {{at: 4, type: bool}}}}}}\n"
+    end = "    end: {role: terminator, value: 14}"
+    text = _SCHEMA.format(end=end, coding="", fields="{}", id=1).replace("    data:", f"{part}    data:", 1)
+    found = [fault.rule for fault in loads(text, "sample.yaml")[1]]
+    assert found == ([] if proved else ["terminator-in-frame"])
+
+
 def test_a_coding_may_bring_the_terminator_in() -> None:
     assert rules("{a: bytes}", "03", coding="  coding: {pair: complement}") == ["terminator-in-frame"]
     escape = "  coding: {escape: 7D, xor: 01, of: [02, 7D]}"
@@ -115,6 +125,27 @@ def test_a_coding_may_bring_the_terminator_in() -> None:
 )
 def test_bytes_of_numbers(chunk: Chunk, low: int, high: int, found: set[int]) -> None:
     assert values_of(chunk, low, high) == found
+
+
+@pytest.mark.parametrize(
+    ("coding", "end", "proved"),
+    [
+        ("{insert: 10, after: 10}", "10 03", True),
+        ("{insert: 10, after: 10}", "10 10", False),
+        ("{insert: 10, after: 10}", "03 10", False),
+        ("{insert: 10, after: 10}", "10 03 04", False),
+        ("{insert: 0, after: 10 10}", "10 03", False),
+        ("{replace: {10: 10 01, 7E: 10 04}}", "10 03", True),
+        ("{replace: {10: 10 01, 7E: 10 03}}", "10 03", False),
+        ("{escape: 10, xor: 01, of: [10, 7F]}", "10 03", False),
+        ("[{insert: 10, after: 10}, {pair: complement}]", "10 03", False),
+        ("[{pair: complement}, {insert: 10, after: 10}]", "10 03", True),
+        ("{insert: 10, after: 10, over: [data]}", "10 03", False),
+    ],
+)
+def test_a_terminator_that_is_another_pair(coding: str, end: str, *, proved: bool) -> None:
+    found = rules("{a: bytes}", end, coding=f"  coding: {coding}", number=0x10)
+    assert found == ([] if proved else ["terminator-in-frame"])
 
 
 def test_alphabets() -> None:

@@ -42,6 +42,7 @@ class EndedView:
         limit: maximum size of a frame up to its terminator.
         matches: condition for the terminator at offset ``stop``; at ``first`` of a receiver.
         last: its last byte.
+        step: number of bytes to the next place where it may be.
         kept: number of its bytes that may begin the next frame.
         flag: its size if it also begins frames, otherwise 0.
         splits: uncoded bytes are not only the first constant and the terminator.
@@ -56,6 +57,7 @@ class EndedView:
     matches: str
     matches_first: str
     last: str
+    step: str
     kept: int
     flag: int
     front: int

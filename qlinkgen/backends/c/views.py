@@ -416,6 +416,7 @@ def _ended(writer: PartWriter, end: ByTerminator, directed: str) -> EndedView:
         matches=_matches("wire[stop{}]", data),
         matches_first=_matches("(receiver->wire[receiver->first{}]", data, ")"),
         last=in_hex(data[-1]),
+        step=f"(wire[stop] == {in_hex(data[0])}) ? 2U : 1U" if end.paired is not None else "",
         kept=writer.frame.kept,
         flag=len(writer.frame.flag),
         front=coded.front,

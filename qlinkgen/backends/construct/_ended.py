@@ -149,7 +149,7 @@ Coding = Escape | Insert | Cobs | Digits | Pair | Add
 class EndedFrame(Frame):
     """A frame that its part ``end`` ends, which does not occur before; it has at most ``most`` bytes.
 
-    Its payload has at least ``least`` bytes.
+    Its payload has at least ``least`` bytes. With ``paired``, the first byte of the end also begins pairs.
 
     With ``bare`` it does not begin with a constant, so an unknown id or an illegal address is detected first.
     """
@@ -166,6 +166,7 @@ class EndedFrame(Frame):
         coding: Sequence[Coding] = (),
         address: str = "",
         bare: bool = False,
+        paired: bool = False,
     ) -> None:
         super().__init__(parts, messages, address=address, bare=bare)
         names = [part.name for part in parts]
@@ -173,6 +174,7 @@ class EndedFrame(Frame):
         last = names.index(over[-1]) + 1
         self.end = parts[names.index(end)]
         self.most = most
+        self.paired = paired
         self.least = least
         self.coding = coding
         self.front = sum(sizes[: names.index(over[0])])
@@ -240,12 +242,20 @@ class EndedFrame(Frame):
         if not lead.startswith(wire[: len(lead)]):
             raise FrameError("frame", f"the frame does not begin with {lead.hex()}")
         limit = self.most - self.closing + len(last.data)
-        stop = wire.find(last.data, len(lead), limit)
+        stop = self._stop(wire, len(lead), limit, last.data)
         if stop == len(lead) or (stop < 0 and len(wire) >= limit):
             raise FrameError("length", f"{last.name} is not after 1 to {limit} bytes")
         if stop < 0 or len(wire) < stop + self.closing:
             raise FrameError("truncated", f"incomplete frame of {len(wire)} bytes")
         return stop + self.closing
+
+    def _stop(self, wire: bytes, at: int, limit: int, end: bytes) -> int:
+        """Offset of the terminator, -1 if there is none."""
+        while at + len(end) <= min(limit, len(wire)):
+            if wire[at : at + len(end)] == end:
+                return at
+            at += 2 if self.paired and wire[at] == end[0] else 1
+        return -1
 
     def _cells(self, wire: bytes) -> dict[str, bytes]:
         """The decoded bytes of each part."""

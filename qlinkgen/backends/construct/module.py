@@ -247,7 +247,8 @@ def _ended(
     coding = (("coding", Sequence(tuple(map(_stage, coded.stages)))),) if coded.stages else ()
     over = tuple(part.name for part in frame.envelope.between(coded.front, coded.back))
     least = (("least", frame.envelope.payload.least),) if frame.envelope.payload.least else ()
-    places = (("end", end.part.name), ("most", frame.max_wire), ("over", Sequence(over)), *least)
+    paired = (("paired", True),) if end.paired is not None else ()
+    places = (("end", end.part.name), ("most", frame.max_wire), ("over", Sequence(over)), *least, *paired)
     return Call("EndedFrame", (layout, messages), (*address, *bare, *coding, *places))
 
 

@@ -164,6 +164,7 @@ class EndedView:
 
     Attributes:
         last: its last byte.
+        pair: its first byte if that also begins pairs of coded bytes, otherwise "".
         kept: number of its bytes that may begin the next frame.
         closing: size of the terminator and what follows it.
         after: size of what follows it.
@@ -180,6 +181,7 @@ class EndedView:
 
     terminator: str
     last: str
+    pair: str
     kept: int
     closing: int
     after: int
@@ -606,6 +608,7 @@ def _ended(plan: Plan, end: ByTerminator, *, bare: bool) -> EndedView:
     return EndedView(
         terminator=literal(part.data),
         last=literal(part.data[-1:]),
+        pair=literal(part.data[:1]) if end.paired is not None else "",
         kept=plan.frame.kept,
         closing=closing,
         after=end.after,

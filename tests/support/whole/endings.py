@@ -24,13 +24,16 @@ class Ending:
 
 def choose(rng: random.Random) -> Ending:
     """An ending of any kind."""
-    kind = rng.choices(("bare", "escape", "replace", "cobs", "digits", "list"), (14, 26, 14, 14, 14, 18))[0]
+    kinds = ("bare", "escape", "replace", "cobs", "digits", "pair", "list")
+    kind = rng.choices(kinds, (14, 22, 14, 12, 12, 12, 18))[0]
     if kind == "bare":
         return Ending(rng.choice(("FF", "80", "FE 0A", "0D 8A", "A5 A5")), [])
     if kind == "cobs":
         return Ending("00", [{"cobs": "00"}])
     if kind == "digits":
         return Ending(rng.choice(("0D 0A", "0D", "00", "0A 0A", "3B", "FF")), [{"digits": "hex"}])
+    if kind == "pair":
+        return _doubled(rng)
     if kind == "list":
         return _several(rng)
     return _escaped(rng) if kind == "escape" else _replaced(rng)
@@ -65,6 +68,14 @@ def _escaped(rng: random.Random) -> Ending:
             spec = {"escape": _hex(escape), "xor": _hex(mask), "of": list(map(_hex, marked))}
             more = rng.choice(("", "", " 0A")) if 0x0A not in marked else ""
             return Ending(_hex(end) + more, [spec])
+
+
+def _doubled(rng: random.Random) -> Ending:
+    """A byte that is doubled, or followed by another, and that begins the terminator as well."""
+    first, second, end = rng.choice((("10", "10", "03"), ("A5", "00", "A5"), ("DB", "DC", "03")))
+    if second == "DC":
+        return Ending(f"{first} {end}", [{"replace": {"DB": "DB DC", "7E": "DB 01"}}])
+    return Ending(f"{first} {end}", [{"insert": second, "after": first}])
 
 
 def _replaced(rng: random.Random) -> Ending:

@@ -17,6 +17,15 @@ class Coding:
         self.kind = next(key for key in _KINDS if key in spec)
         self.given = {key: value for key, value in spec.items() if key != "over"}
 
+    def begins_pair(self, byte: int, other: int) -> bool:
+        """Whether a byte begins pairs when coded, none of them with the other byte."""
+        if self.kind == "insert":
+            return octets(self.given["after"]) == bytes([byte]) and octets(self.given["insert"])[0] != other
+        if self.kind != "replace":
+            return False
+        pairs = self._pairs().values()
+        return all(pair[0] == byte and pair[1] != other for pair in pairs) and byte != other
+
     def most(self, size: int) -> int:
         """Maximum size of so many bytes when coded."""
         if self.kind == "cobs":
