@@ -152,7 +152,8 @@ def _replies(plan: Plan) -> None:
 def _loose_messages(plan: Plan) -> None:
     """Print the messages outside transactions."""
     protocol = plan.protocol
-    loose = [message for message in protocol.messages if protocol.command_of(message) is None]
+    alone = (message for message in protocol.messages if message.command == message.name)
+    loose = [message for message in alone if message.name not in protocol.replies]
     table = Table(["id", "message", "payload", "on the wire", "addresses", "section", "note"], "Messages")
     for message in loose:
         table.add(

@@ -35,7 +35,7 @@ def kept(protocol: Protocol, options: Options) -> tuple[Message, ...]:
     """The selected messages, in schema order."""
     wanted = set(options.only)
     commands = [command for command in protocol.commands if command.name in wanted]
-    wanted |= {reply.message.name for command in commands for reply in command.replies}
+    wanted |= {message.name for command in commands for message in command.messages}
     return tuple(m for m in protocol.messages if not wanted or {m.name, m.command} & wanted)
 
 

@@ -14,8 +14,8 @@ from qlinkgen.schema.file_model import (
     AnswerSpec,
     CommandSpec,
     Fields,
-    NoResponse,
     RepeatSpec,
+    ResponseWord,
     SchemaFile,
 )
 from qlinkgen.schema.kinds import Label
@@ -61,18 +61,20 @@ class CommandBuilder:
         self._bus = bus
         self._replies = ReplyBuilder(file, report, messages, frame)
         self._sizes: dict[str, tuple[tuple[str, str], ...]] = {}
+        self._singles: dict[str, Message] = {}
         self.messages: list[Message] = []
         self.commands: list[Command] = []
 
     def build(self) -> None:
         """Fill :attr:`messages` and :attr:`commands`."""
         self._replies.check_names()
-        for name, spec in self._file.commands.items():
-            self._command(name, spec, ("commands", name))
         for name, message in self._file.messages.items():
             for key, value in message.attributes.items():
                 self._check_attribute(key, value, ("messages", name, "attributes", key))
-            self.messages.append(self._build.single(name, message))
+            self._singles[name] = self._build.single(name, message)
+        for name, spec in self._file.commands.items():
+            self._command(name, spec, ("commands", name))
+        self.messages += self._singles.values()
         if not self._file.commands and not self._file.messages:
             what = "the protocol has no commands and no messages"
             needs = (("commands",), ("messages",))
@@ -140,6 +142,8 @@ class CommandBuilder:
         self.messages.append(asked)
         if response is None or response == "none":
             return asked, None
+        if isinstance(response, str):
+            return asked, self._named_response(response, answers.path)
         found = sized(answers.fields, asked, answers.path, self._report)
         self._sizes[name] = found.sizes
         answered = build(
@@ -148,8 +152,8 @@ class CommandBuilder:
         self.messages.append(answered)
         return asked, answered
 
-    def _response(self, spec: CommandSpec, path: Path) -> tuple[Fields | NoResponse | None, Written]:
-        """The fields of the response, "none" or None if nothing states them; and the message as written."""
+    def _response(self, spec: CommandSpec, path: Path) -> tuple[Fields | ResponseWord | None, Written]:
+        """The fields or the word of the response, None if nothing states it; and the message as written."""
         own, common = spec.response, self._file.defaults.response
         given, place = (own, (*path, "response")) if own is not None else (common, ("defaults", "response"))
         fields = fields_of(given)
@@ -161,7 +165,19 @@ class CommandBuilder:
         written = Written(
             "response", number.of(spec.id), number_path, fields or {}, fields_path(given, place)
         )
-        return "none" if given == "none" else fields, written
+        return given if isinstance(given, str) else fields, written
+
+    def _named_response(self, name: str, path: Path) -> Message | None:
+        """The message that is the response of a command."""
+        message = self._singles.get(name)
+        if message is None:
+            hint = did_you_mean(name, self._singles, "write fields, none, or the name of a message")
+            what, needs = f"unknown message {shown(name)}", (path, ("messages", name))
+            self._report.error("unknown-message", path, what, hint, needs=needs)
+        elif message.direction != "response":
+            what, needs = f"{name} is not sent by slaves", (path, ("messages", name))
+            self._report.error("bad-response", path, what, "give it direction: response", needs=needs)
+        return message
 
     def _missing(self, rule: str, key: str, path: Path, what: str, hint: str) -> None:
         """Report a key that is missing in a command and in the defaults."""
@@ -191,7 +207,7 @@ class CommandBuilder:
         return given
 
     def _check_answered(
-        self, addressing: Addressing, response: Fields | NoResponse | None, path: Path
+        self, addressing: Addressing, response: Fields | ResponseWord | None, path: Path
     ) -> None:
         place, needs = (*path, "response"), ((*path, "response"), (*path, "addressing"))
         if response == "none" and addressing == "answered_broadcast":

@@ -442,7 +442,8 @@ class _RepeatForms:
 
 Repeat = Annotated[RepeatSpec, BeforeValidator(_repeat), _RepeatForms]
 Addressing = Literal["node", "broadcast", "either", "answered_broadcast", "none"]
-NoResponse = Literal["none"]
+#: "none", or the name of a message that is the response.
+ResponseWord = str
 
 
 Means = Literal["refused", "again", "pending", "done"]
@@ -510,7 +511,7 @@ class _AnyForm:
 
 def _response_form(value: object) -> str:
     if isinstance(value, str):
-        return f"{BRANCH}none"
+        return f"{BRANCH}word"
     long = isinstance(value, AnswerSpec) or (isinstance(value, dict) and _is_long(value))
     return f"{BRANCH}long" if long else f"{BRANCH}fields"
 
@@ -518,7 +519,7 @@ def _response_form(value: object) -> str:
 Response = Annotated[
     Annotated[Fields, Tag(f"{BRANCH}fields")]
     | Annotated[AnswerSpec, Tag(f"{BRANCH}long")]
-    | Annotated[NoResponse, Tag(f"{BRANCH}none")],
+    | Annotated[ResponseWord, Tag(f"{BRANCH}word")],
     Discriminator(_response_form),
     _AnyForm,
 ]
@@ -559,7 +560,8 @@ class DefaultsSpec(_Mapping):
     section: Text | None = Field(default=None, description="Section of the source document")
     request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
     response: Response | None = Field(
-        default=None, description="Fields, {} for an empty response, {id:, fields:}, or none"
+        default=None,
+        description="Fields, {} for an empty one, {id:, fields:}, the name of a message, or none",
     )
     addressing: Addressing | None = Field(
         default=None, description="Nodes addressed, and which of them respond"
@@ -602,7 +604,8 @@ class CommandSpec(Fact):
     )
     request: Fields | None = Field(default=None, description="Fields of the request, {} for none")
     response: Response | None = Field(
-        default=None, description="Fields, {} for an empty response, {id:, fields:}, or none"
+        default=None,
+        description="Fields, {} for an empty one, {id:, fields:}, the name of a message, or none",
     )
     replies: Replies = Field(
         default_factory=dict, description="Answers other than the response; they replace those of the file"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from qlinkgen.schema.file_model import AnswerSpec, Fields, NoResponse, RecordSpec, SchemaFile
+from qlinkgen.schema.file_model import AnswerSpec, Fields, RecordSpec, ResponseWord, SchemaFile
 from qlinkgen.schema.source import Path
 
 #: What a layout is, as it matters for a key that only answers have.
@@ -51,19 +51,19 @@ def layouts(file: SchemaFile) -> Iterator[Layout]:
         yield Layout(name, message.fields, ("messages", name, "fields"), "message")
 
 
-def _answer(owner: str, given: Fields | AnswerSpec | NoResponse | None, path: Path) -> Iterator[Layout]:
+def _answer(owner: str, given: Fields | AnswerSpec | ResponseWord | None, path: Path) -> Iterator[Layout]:
     fields = fields_of(given)
     if fields is not None:
         yield Layout(owner, fields, fields_path(given, path), "answer")
 
 
-def fields_of(given: Fields | AnswerSpec | NoResponse | None) -> Fields | None:
+def fields_of(given: Fields | AnswerSpec | ResponseWord | None) -> Fields | None:
     """The fields of a response, None if it states none."""
     if isinstance(given, AnswerSpec):
         return given.fields
     return given if isinstance(given, dict) else None
 
 
-def fields_path(given: Fields | AnswerSpec | NoResponse | None, path: Path) -> Path:
+def fields_path(given: Fields | AnswerSpec | ResponseWord | None, path: Path) -> Path:
     """The path of the fields of a response at a path."""
     return (*path, "fields") if isinstance(given, AnswerSpec) else path

@@ -328,3 +328,24 @@ def test_a_slave_is_held_to_the_size(log: ModuleType) -> None:
 def test_a_simulated_node_answers_with_the_size(log: ModuleType) -> None:
     node = GenericNode(log, 3)
     assert node.handle(log.ReadRequest(node=3, many=3), 0.0) == log.ReadResponse(node=3, values=[0, 0, 0])
+
+
+def test_commands_that_share_a_response() -> None:
+    commands = """\
+  read: {id: 1, request: {}, response: {value: u16}}
+  set: {id: 2, request: {value: u16}, response: ack}
+  reset: {id: 3, request: {}, response: ack, addressing: node}
+messages:
+  ack: {id: 6, direction: response, fields: {state: u8}}
+"""
+    text = SIZED[: SIZED.index("  read:")] + commands
+    protocol, faults = loads(text, "log.yaml")
+    assert protocol is not None, faults
+    codec = load_codec(protocol)
+    assert [message.name for message in protocol.messages][-1] == "ack"
+    engine = MasterEngine(codec, Timing.of(codec, host_slack=SLACK))
+    ack = codec.Ack(node=3, state=9)
+    for at, request in enumerate((codec.SetRequest(node=3, value=1), codec.ResetRequest(node=3))):
+        assert run(engine, request, (at + 0.012, ack.to_frame()), now=float(at)).response == ack
+    wrong = run(engine, codec.ReadRequest(node=3), (5.012, ack.to_frame()), now=5.0, attempts=1)
+    assert isinstance(wrong.error, NoReply)

@@ -86,7 +86,7 @@ class Names:
             message.name: command
             for command in protocol.commands
             for message in (command.request, command.response)
-            if message is not None
+            if message is not None and message.command == command.name
         }
 
     def type_stem(self, name: str) -> str:

@@ -208,7 +208,11 @@ class _Maker:
         rng, used = self.rng, {("request", number) for number in self._ids}
         used |= {("response", number) for number in self._ids}
         answered = {name: spec for name, spec in found["commands"].items() if spec["response"] != "none"}
+        sent = [name for name, spec in found["messages"].items() if spec.get("direction") == "response"]
         for spec in answered.values():
+            if sent and rng.random() < 0.3:
+                spec["response"] = rng.choice(sent)
+                continue
             if shape.has_length and not shape.least and shape.most > 8 and rng.random() < 0.8:
                 self._size_from_request(spec)
             asked = [shape.number(spec["id"])]

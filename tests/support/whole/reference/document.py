@@ -583,7 +583,7 @@ def messages(document: Doc, fields: Fields, addressed: bool) -> tuple[Message, .
 def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: bool) -> Iterator[Message]:
     both: tuple[Direction, ...] = ("request", "response")
     for direction in both:
-        if spec[direction] == "none":
+        if isinstance(spec[direction], str):  # none, or the name of a message
             continue
         ranges, default = (
             _addresses(spec.get("addressing", "node"), direction, document) if addressed else ((), 0)
@@ -625,12 +625,12 @@ def _from_request(spec: Any, asked: Mapping[str, Number]) -> Any:
 
 def _answer(own: Any, common: Any) -> Any:
     """A response in its long form, or "none"."""
-    merged = {**_long(common or {}), **_long(own or {})} if own != "none" else {}
-    return "none" if own == "none" or (own is None and common == "none") else merged
+    given = common if own is None else own
+    return given if isinstance(given, str) else {**_long(common or {}), **_long(own or {})}
 
 
 def _long(given: Any) -> Doc:
-    if given == "none":
+    if isinstance(given, str):
         return {}
     is_long = given.keys() <= {"id", "fields", "means"} and (
         isinstance(given.get("fields"), dict)
