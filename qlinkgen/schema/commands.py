@@ -10,6 +10,7 @@ from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Repeat, Reply
 from qlinkgen.model.types import Scalar
+from qlinkgen.schema.constants import MAX_BITS
 from qlinkgen.schema.file_model import (
     AnswerSpec,
     CommandSpec,
@@ -245,6 +246,7 @@ class CommandBuilder:
             or kind.meaning is not None
             or kind.scaling is not None
             or kind.signed
+            or kind.bits > MAX_BITS
         ):
             what = f"{counter} cannot count repeats"
             self._report.error("bad-repeat", place, what, "use a plain unsigned integer", needs=needs)

@@ -11,9 +11,11 @@ from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.synonyms import type_hint
 
-#: Maximum width of an integer.
+#: Maximum width of an integer with a meaning, a scale, bits or groups, and of an item of an array.
 MAX_BITS = 64
-INTEGER = re.compile(r"(?P<sign>[ui])(?P<bits>[1-9][0-9]?)\Z", re.ASCII)
+#: Maximum width of a plain integer.
+MAX_WIDE_BITS = 128
+INTEGER = re.compile(r"(?P<sign>[ui])(?P<bits>[1-9][0-9]{0,2})\Z", re.ASCII)
 
 
 def integer_range(bits: int, *, signed: bool) -> tuple[int, int]:

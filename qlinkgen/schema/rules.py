@@ -77,7 +77,7 @@ _ALL = (
     Rule("recursive-type", "A named type does not contain itself.", "Its layout would be infinite."),
     Rule(
         "bad-width",
-        "An integer has 8, 16, 24 ... 64 bits, or is sent in groups.",
+        "An integer has 8, 16, 24 ... 128 bits, or up to 64 in groups.",
         "Other widths do not fill whole bytes; use bits, or groups whose parts cover each bit once.",
     ),
     Rule(

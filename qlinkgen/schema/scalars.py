@@ -21,7 +21,7 @@ from qlinkgen.model.types import (
     byte_chunks,
     group_chunks,
 )
-from qlinkgen.schema.constants import INTEGER, MAX_BITS, carrier, integer_range
+from qlinkgen.schema.constants import INTEGER, MAX_BITS, MAX_WIDE_BITS, carrier, integer_range
 from qlinkgen.schema.file_model import FieldSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown
@@ -146,6 +146,13 @@ class ScalarBuilder:
             scaling=plain.scaling, meaning=plain.meaning, unit=spec.unit or "",
         )  # fmt: skip
         _check_keys(spec, plain, location)
+        if plain.bits > MAX_BITS:
+            what = f"an integer of more than {MAX_BITS} bits"
+            location.reject(spec, ("scale", "offset", "counts", "groups", "as"), what)
+            if self._file.groups:
+                location.fault(
+                    "bad-width", "type", f"{base} has {plain.bits} bits", f"use 1 to {MAX_BITS} in groups"
+                )
         if spec.counts is not None:
             return replace(scalar, role=Count(spec.counts, spec.counts_in))
         scalar = quantified(scalar, spec, plain.what, location)
@@ -184,8 +191,9 @@ class ScalarBuilder:
     def _chunks(self, spec: FieldSpec, bits: int, base: str, location: Location) -> tuple[Chunk, ...] | None:
         if spec.packed is not None:
             return self._in_a_row(spec, bits, base, location)
-        if not 1 <= bits <= MAX_BITS:
-            location.fault("bad-width", "type", f"{base} has {bits} bits", f"use 1 to {MAX_BITS}")
+        most = MAX_BITS if FIXED.match(base) else MAX_WIDE_BITS
+        if not 1 <= bits <= most:
+            location.fault("bad-width", "type", f"{base} has {bits} bits", f"use 1 to {most}")
             return None
         groups = spec.groups or self._file.groups
         if groups is not None and FLOAT.match(base):
@@ -204,7 +212,7 @@ class ScalarBuilder:
                 return None
             return group_chunks(parts, groups.bits, least_first=groups.first == "least")
         if bits % 8:
-            hint = "use u8, u16, u24 ... u64, bits inside an integer, or groups"
+            hint = "use u8, u16, u24 ... u128, bits inside an integer, or groups"
             location.fault("bad-width", "type", f"{base} has {bits} bits, not whole bytes", hint)
             return None
         if spec.parts:

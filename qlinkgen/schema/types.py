@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from qlinkgen.model.types import Array, Bits, Blob, Scalar
 from qlinkgen.schema.compounds import bit_scalar, build_array, build_bits, build_blob
-from qlinkgen.schema.constants import INTEGER, build_enum, build_flags
+from qlinkgen.schema.constants import INTEGER, MAX_BITS, build_enum, build_flags
 from qlinkgen.schema.file_model import BitSpec, FieldSpec, RecordSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
@@ -122,11 +122,19 @@ class TypeBuilder:
             return None
         if text.count is not None:
             self._note_unbounded(text, location)
+            if plain.bits > MAX_BITS:
+                what = f"an item of an array cannot have {plain.bits} bits"
+                location.fault("bad-array", "type", what, f"use bytes, or at most {MAX_BITS} bits")
+                return None
             item = self._scalars.build(_item(spec, text.base, location), text.base, plain, location)
             return build_array(item, spec, text, self._payload_max, location) if item else None
         location.reject(spec, ("packed",), "a single number")
         if spec.bits is None:
             return self._scalars.build(spec, text.base, plain, location)
+        if plain.bits > MAX_BITS:
+            what = f"an integer with bits cannot have {plain.bits} bits"
+            location.fault("bad-width", "type", what, f"use at most {MAX_BITS}")
+            return None
         container = self._scalars.build(_bare(spec, text.base), text.base, plain, location)
         return build_bits(spec, container, self._scalars, location) if container else None
 

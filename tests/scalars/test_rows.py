@@ -145,7 +145,8 @@ def test_rows_of_the_model() -> None:
          "'byteorder' has no effect on bits in a row; remove it"),
         ('{a: {type: "u11[6000]", packed: most}}',
          "6000 items of 11 bits are too many in a row; use at most 5957"),
-        ('{a: {type: "u65[2]", packed: most}}', "u65 has 65 bits; use 1 to 64"),
+        ('{a: {type: "u65[2]", packed: most}}',
+         "an item of an array cannot have 65 bits; use bytes, or at most 64 bits"),
     ],
 )  # fmt: skip
 def test_wrong_keys(request_: str, text: str) -> None:

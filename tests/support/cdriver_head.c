@@ -28,6 +28,23 @@ static int digit(char c)
     return (c >= '0' && c <= '9') ? c - '0' : (c >= 'a' && c <= 'f') ? c - 'a' + 10 : (c >= 'A' && c <= 'F') ? c - 'A' + 10 : -1;
 }
 
+static inline void wide_of(const char *text, uint64_t *high, uint64_t *low)
+{
+    const bool minus = *text == '-';
+    *high = 0u;
+    *low = 0u;
+    for (text += minus ? 1 : 0; *text != '\0'; ++text) {
+        const uint64_t small = (*low & 0xFFFFFFFFu) * 10u + (uint64_t)(*text - '0');
+        const uint64_t large = (*low >> 32) * 10u + (small >> 32);
+        *low = (large << 32) | (small & 0xFFFFFFFFu);
+        *high = *high * 10u + (large >> 32);
+    }
+    if (minus) {
+        *low = ~*low + 1u;
+        *high = ~*high + (*low == 0u ? 1u : 0u);
+    }
+}
+
 static size_t from_hex(const char *text, uint8_t *out)
 {
     size_t size = 0u;

@@ -348,6 +348,8 @@ def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:
             "{", f"size_t count{depth} = (size_t)strtoul(word(), NULL, 0);", *counted,
             f"for (size_t {index} = 0u; {index} < count{depth}; ++{index}) {{", *inner, "}", "}",
         ]  # fmt: skip
+    if isinstance(kind, Scalar) and kind.bits > 64:
+        return [f"wide_of(word(), &{owner}{name}.high, &{owner}{name}.low);"]
     if isinstance(kind, Scalar):
         number = "strtoll" if kind.signed else "strtoull"
         width = next(w for w in (8, 16, 32, 64) if w >= kind.bits)
@@ -405,6 +407,9 @@ def _printed(value: Value, owner: str, depth: int = 0) -> list[str]:
             f'printf(" %u", (unsigned){count});',
             f"for (size_t {index} = 0u; {index} < {count}; ++{index}) {{", *inner, "}",
         ]  # fmt: skip
+    if isinstance(kind, Scalar) and kind.bits > 64:
+        halves = ", ".join(f"(unsigned long long){owner}{name}.{half}" for half in ("high", "low"))
+        return [f'printf(" 0x%016llx%016llx", {halves});']
     if isinstance(kind, Scalar):
         form, cast = ("%lld", "long long") if kind.signed else ("%llu", "unsigned long long")
         return [f'printf(" {form}", ({cast}){owner}{name});']

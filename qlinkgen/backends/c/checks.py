@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import assert_never
 
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.names import literal, scalar_type, storage, unsigned, unsigned_type
+from qlinkgen.backends.c.names import halves, is_wide, literal, scalar_type, storage, unsigned, unsigned_type
 from qlinkgen.model.types import Scalar
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.payload import conditions, limits
@@ -34,6 +34,9 @@ def broken(
     terms: list[str] = []
     for rule in rules:
         match rule:
+            case Within() if bits > 64:
+                terms += [_wide_less(value, rule.low, signed=signed)] * (rule.low > held.low)
+                terms += [_wide_less(value, rule.high, signed=signed, above=True)] * (rule.high < held.high)
             case Within():
                 terms += [f"{value} < {literal(rule.low, bits, signed=signed)}"] * (rule.low > held.low)
                 terms += [f"{value} > {literal(rule.high, bits, signed=signed)}"] * (rule.high < held.high)
@@ -44,6 +47,18 @@ def broken(
             case _:
                 assert_never(rule)
     return terms
+
+
+def _wide_less(value: str, bound: int, *, signed: bool, above: bool = False) -> str:
+    """The condition that a number of two halves is below a bound, or above it."""
+    sign, order = 1 << 127, ">" if above else "<"
+    end = (1 << 64) - 1 if above else 0  # beyond it is nothing, which compilers warn of
+    top, (high, low) = f"{value}.high", halves(bound ^ sign if signed else bound)
+    if signed:  # order numbers in two's complement
+        top = f"({top} ^ {halves(sign)[0]})"
+    terms = [f"{top} {order} {high}"] * (int(high[:-3], 16) != end)
+    terms += [f"({top} == {high}) && ({value}.low {order} {low})"] * (int(low[:-3], 16) != end)
+    return condition(terms)
 
 
 def _outside(rule: OneOf, value: str, held: Within, bits: int, *, signed: bool) -> str:
@@ -66,13 +81,15 @@ def as_unsigned(number: Scalar, value: str) -> str:
     """The expression that converts a struct member to an unsigned integer of its bits."""
     if number.meaning == "bool":
         return f"({unsigned_type(number.bits)})({value} ? 1U : 0U)"
-    return f"({unsigned_type(number.bits)}){value}" if number.signed else value
+    return f"({unsigned_type(number.bits)}){value}" if number.signed and not is_wide(number) else value
 
 
 def from_unsigned(number: Scalar, raw: str, layouts: Layouts) -> str:
     """The expression that converts received bits to a struct member."""
     if number.meaning == "bool":
         return f"{raw} != 0U"
+    if is_wide(number):
+        return layouts.extend_wide(raw, number.bits) if number.signed and number.bits < 128 else raw
     if not number.signed:
         return raw
     whole = raw if number.bits == storage(number.bits) else layouts.extend(raw, number.bits)

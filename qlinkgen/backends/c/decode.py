@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.backends.c import checks
-from qlinkgen.backends.c.encode import item_offset, loop
+from qlinkgen.backends.c.encode import item_offset, loop, wide_bytes
 from qlinkgen.backends.c.layout import pointer
 from qlinkgen.backends.c.names import count_type, grouped, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import Learner, index_of, local, size_text, term_text
@@ -107,6 +107,9 @@ class Decoder(Learner):
         match step:
             case ValueStep():
                 self._assign(target, step.number, self._get(step.place, step.integer))
+            case ConstantStep() if step.integer.bits > 64:
+                self.reads = True
+                self.refuse([f"payload[{at}] != {octet}" for at, octet in wide_bytes(step, local)], "RANGE")
             case ConstantStep():
                 pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
                 self.refuse([f"{self._get(step.place, step.integer)} != {pattern}"], "RANGE")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import assert_never
 
@@ -128,8 +129,7 @@ class Encoder:
                     checks.as_unsigned(step.number, f"message->{member_of(step.name)}"),
                 )
             case ConstantStep() | ReservedStep():
-                pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
-                self._put(step.place, step.integer, pattern)
+                self._write_fixed(step)
             case CountStep():
                 number = (
                     f"({local(step.run)} * {step.term.factor}U)" if step.term.factor > 1 else local(step.run)
@@ -161,6 +161,13 @@ class Encoder:
             case _:
                 assert_never(step)
 
+    def _write_fixed(self, step: ConstantStep | ReservedStep) -> None:
+        if step.integer.bits > 64:
+            self.lines += [f"payload[{at}] = {octet};" for at, octet in wide_bytes(step, local_size)]
+            return
+        pattern = unsigned(step.value & step.integer.mask, step.integer.bits, hexadecimal=True)
+        self._put(step.place, step.integer, pattern)
+
     def _put_record(self, record: RecordPlan) -> str:
         return f"{self.layouts.records[record.name]}_put_"
 
@@ -184,6 +191,13 @@ class Encoder:
     @staticmethod
     def _number_of(run: RunStep) -> str:
         return f"{run.length.maximum}U" if run.fixed else local(run.name)
+
+
+def wide_bytes(step: ConstantStep | ReservedStep, count: Callable[[str], str]) -> Iterator[tuple[str, str]]:
+    """Index and value of each byte of a number of more than 64 bits."""
+    for at, byte in enumerate(step.integer.pack(step.value)):
+        octet = unsigned(byte, 8, hexadecimal=True)
+        yield index_of(step.place, count, f"{at}U") if at else index_of(step.place, count), octet
 
 
 def item_offset(run: ItemsStep | RecordsStep) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from qlinkgen.backends.c.crc import CheckView, CrcView
 from qlinkgen.backends.c.dispatch import callback_name
-from qlinkgen.backends.c.names import Names
+from qlinkgen.backends.c.names import Names, is_wide
 from qlinkgen.model.naming import file_stem, handler, member, snake
 from qlinkgen.model.transaction import Command
 from qlinkgen.plan.payload import Member, ValueStep
@@ -146,7 +146,8 @@ def _echo(request: MessagePlan, response: MessagePlan) -> list[str]:
 
 
 def _numbers(message: MessagePlan) -> list[str]:
-    return [each.name for each in message.payload.settable if isinstance(each, ValueStep | Member)]
+    steps = [each for each in message.payload.settable if isinstance(each, ValueStep | Member)]
+    return [each.name for each in steps if not is_wide(each.number)]
 
 
 def _receive(prefix: str, section: FrameSection, declared: list[str], *handled: str) -> list[str]:

@@ -14,8 +14,9 @@ from qlinkgen.backends.c.constants import EnumView, enum_views, limits
 from qlinkgen.backends.c.crc import CrcView
 from qlinkgen.backends.c.describe import WIDTH
 from qlinkgen.backends.c.example import example_lines, option_lines
+from qlinkgen.backends.c.forms import Helper
 from qlinkgen.backends.c.frames import FrameSection, frame_section
-from qlinkgen.backends.c.layout import Helper, Layouts
+from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
 from qlinkgen.backends.c.parts import in_hex

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from qlinkgen.backends.c.forms import Helper, decimal_helpers, row_helpers, wide_helpers
 from qlinkgen.backends.c.names import storage, unsigned, unsigned_type
 from qlinkgen.model.integer import BitOrder, Chunk, Integer
 from qlinkgen.model.types import Scalar
@@ -12,14 +13,6 @@ from qlinkgen.model.types import Scalar
 Chunks = tuple[Chunk, ...]
 #: An integer with a wire layout: the Integer of a frame part, or the Scalar of a field.
 AnyInteger = Integer | Scalar
-
-
-@dataclass(frozen=True, slots=True)
-class Helper:
-    """The functions of one layout."""
-
-    comment: str
-    lines: tuple[str, ...]
 
 
 @dataclass
@@ -32,6 +25,8 @@ class Layouts:
     _names: dict[tuple[int, Chunks], str] = field(default_factory=dict)
     _partial: set[tuple[int, Chunks]] = field(default_factory=set)
     _used: set[tuple[str, int, Chunks]] = field(default_factory=set)
+    #: Functions of numbers of more than 64 bits, and the order.
+    _wides: set[tuple[str, str]] = field(default_factory=set)
     #: Numbers in binary-coded decimal that are read, written or checked: width of the C type, and the order.
     _decimals: set[tuple[str, int, str]] = field(default_factory=set)
     #: Rows of bits that are read or written: the width of the C type of an item, and the order.
@@ -41,6 +36,8 @@ class Layouts:
 
     def put(self, integer: AnyInteger, place: str, index: str, value: str) -> str:
         """A statement that writes an unsigned value."""
+        if integer.bits > 64:
+            return f"{self._wide('put', integer)}({pointer(place, index)}, {integer.size}U, {value});"
         if integer.bcd:
             return f"{self._decimal('put', integer)}({pointer(place, index)}, {integer.size}U, {value});"
         if integer.size == 1:
@@ -51,6 +48,8 @@ class Layouts:
 
     def get(self, integer: AnyInteger, place: str, index: str) -> str:
         """An expression for the unsigned value at a place whose unused bits are known to be zero."""
+        if integer.bits > 64:
+            return f"{self._wide('get', integer)}({pointer(place, index)}, {integer.size}U)"
         if integer.bcd:
             return f"{self._decimal('get', integer)}({pointer(place, index)}, {integer.size}U)"
         if integer.size == 1:
@@ -84,45 +83,15 @@ class Layouts:
         self._decimals.add((verb, width, order))
         return f"{self.prefix}_{verb}_bcd{width}_{order}_"
 
-    def _decimal_helpers(self) -> list[Helper]:
-        found = []
-        for verb, width, order in sorted(self._decimals):
-            kind, name = f"uint{width}_t", f"{self.prefix}_{verb}_bcd{width}_{order}_"
-            up, down = "size_t index = 0U; index < size; ++index", "size_t index = size; index > 0U; --index"
-            if verb == "check":
-                head = f"static inline bool {self.prefix}_is_bcd_(const uint8_t *from, size_t size)"
-                body = [
-                    f"for ({up}) {{",
-                    "    if (((from[index] >> 4) > 9U) || ((from[index] & 0x0FU) > 9U)) {",
-                    "        return false;",
-                    "    }",
-                    "}",
-                    "return true;",
-                ]
-            elif verb == "put":
-                head = f"static inline void {name}(uint8_t *to, size_t size, {kind} value)"
-                at = "index - 1U" if order == "be" else "index"
-                body = [
-                    f"for ({down if order == 'be' else up}) {{",
-                    f"    to[{at}] = (uint8_t)((((value / 10U) % 10U) << 4) | (value % 10U));",
-                    f"    value = ({kind})(value / 100U);",
-                    "}",
-                ]
-            else:
-                head = f"static inline {kind} {name}(const uint8_t *from, size_t size)"
-                at = "index" if order == "be" else "index - 1U"
-                body = [
-                    f"{kind} value = 0U;",
-                    f"for ({up if order == 'be' else down}) {{",
-                    f"    const uint8_t tens = (uint8_t)(from[{at}] >> 4);",
-                    f"    const uint8_t ones = (uint8_t)(from[{at}] & 0x0FU);",
-                    f"    value = ({kind})((value * 100U) + (({kind})tens * 10U) + ones);",
-                    "}",
-                    "return value;",
-                ]
-            lines = [head, "{", *(f"    {line}" for line in body), "}"]
-            found.append(Helper("Binary-coded decimal, two digits a byte", tuple(lines)))
-        return found
+    def _wide(self, verb: str, integer: AnyInteger) -> str:
+        order = "be" if integer.byteorder == "big" else "le"
+        self._wides.add((verb, order))
+        return f"{self.prefix}_{verb}_wide_{order}_"
+
+    def extend_wide(self, raw: str, bits: int) -> str:
+        """An expression that sign-extends a number of ``bits`` bits, more than 64."""
+        self._wides.add(("extend", ""))
+        return f"{self.prefix}_extend_wide_({raw}, {unsigned(1 << (bits - 65), 64, hexadecimal=True)})"
 
     def get_row(self, item: Integer, order: BitOrder, start: str, index: str) -> str:
         """An expression for the unsigned value of an item in a row of bits."""
@@ -137,39 +106,6 @@ class Layouts:
         at = _times(item.bits, index)
         return f"{self.prefix}_put_row_{order}_{width}_({start}, {at}, {item.bits}U, {value});"
 
-    def _row_helpers(self) -> list[Helper]:
-        found = []
-        for width, order in sorted({(width, order) for _, width, order in self._rows}):
-            lines: list[str] = []
-            place = "at % 8U" if order == "least" else "7U - (at % 8U)"
-            index = "bit" if order == "least" else "bits - 1U - bit"
-            parameters = "size_t at, size_t bits"
-            kind, name = f"uint{width}_t", f"row_{order}_{width}_"
-            if ("put", width, order) in self._rows:
-                lines += [
-                    f"static inline void {self.prefix}_put_{name}(uint8_t *to, {parameters}, {kind} value)",
-                    "{",
-                    "    for (size_t bit = 0U; bit < bits; ++bit, ++at) {",
-                    f"        const unsigned int one = (unsigned int)(value >> ({index})) & 1U;",
-                    f"        to[at / 8U] = (uint8_t)(to[at / 8U] | (one << ({place})));",
-                    "    }",
-                    "}",
-                ]
-            if ("get", width, order) in self._rows:
-                lines += [
-                    f"static inline {kind} {self.prefix}_get_{name}(const uint8_t *from, {parameters})",
-                    "{",
-                    f"    {kind} value = 0U;",
-                    "    for (size_t bit = 0U; bit < bits; ++bit, ++at) {",
-                    f"        const {kind} one = ({kind})((from[at / 8U] >> ({place})) & 1U);",
-                    f"        value = ({kind})(value | ({kind})(one << ({index})));",
-                    "    }",
-                    "    return value;",
-                    "}",
-                ]
-            found.append(Helper(f"Numbers in a row of bits, {order} significant ones first", tuple(lines)))
-        return found
-
     def extend(self, raw: str, bits: int) -> str:
         """An expression that sign-extends a number of ``bits`` bits."""
         width = storage(bits)
@@ -180,7 +116,12 @@ class Layouts:
     def helpers(self) -> list[Helper]:
         """The functions of all layouts in use."""
         whole = [self._helper(bits, chunks, name) for (bits, chunks), name in self._names.items()]
-        return [*whole, *self._decimal_helpers(), *self._row_helpers()]
+        return [
+            *whole,
+            *wide_helpers(self.prefix, self._wides),
+            *decimal_helpers(self.prefix, self._decimals),
+            *row_helpers(self.prefix, self._rows),
+        ]
 
     def _call(self, verb: str, integer: AnyInteger) -> str:
         key = (integer.bits, integer.chunks)

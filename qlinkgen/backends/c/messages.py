@@ -11,7 +11,7 @@ from qlinkgen.backends.c.describe import field_rows, member_note, message_head, 
 from qlinkgen.backends.c.encode import Encoder
 from qlinkgen.backends.c.framing import struct_parameter
 from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.names import Names, count_type, scalar_literal, unsigned
+from qlinkgen.backends.c.names import Names, count_type, is_wide, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Kind, Types
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout, Value
@@ -172,6 +172,8 @@ class MessageWriter:
         lines = []
         for each in plan.payload.settable:
             match each:
+                case ValueStep() | Member() if is_wide(each.number):
+                    return self._copied(plan)
                 case ValueStep() | Member():
                     default = scalar_literal(each.number, each.number.default)
                     lines.append(f"message->{naming.member(each.name)} = {default};")

@@ -8,7 +8,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Enum, Flags, Scalar
 
-_WIDTHS = (8, 16, 32, 64)
+_WIDTHS = (8, 16, 32, 64, 128)
 
 
 def storage(bits: int) -> int:
@@ -24,6 +24,19 @@ def unsigned_type(bits: int) -> str:
 def integer_type(bits: int, *, signed: bool) -> str:
     """The C type of an integer with ``bits`` bits."""
     return f"int{storage(bits)}_t" if signed else unsigned_type(bits)
+
+
+def is_wide(scalar: Scalar) -> bool:
+    """Whether no integer of C holds the number, so that it is a struct of two."""
+    return scalar.bits > 64
+
+
+def halves(value: int) -> tuple[str, str]:
+    """The upper and the lower 64 bits of a wide number in two's complement."""
+    pattern = value & (1 << 128) - 1
+    return unsigned(pattern >> 64, 64, hexadecimal=True), unsigned(
+        pattern & (1 << 64) - 1, 64, hexadecimal=True
+    )
 
 
 def scalar_type(scalar: Scalar) -> str:
@@ -56,6 +69,8 @@ def scalar_literal(scalar: Scalar, value: int) -> str:
     """A constant of a scalar's type."""
     if scalar.meaning == "bool":
         return "true" if value else "false"
+    if is_wide(scalar):
+        return "{{{}, {}}}".format(*halves(value))
     return literal(value, scalar.bits, signed=scalar.signed)
 
 

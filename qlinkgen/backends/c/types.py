@@ -10,7 +10,7 @@ from typing import assert_never
 
 from qlinkgen.backends import c_text
 from qlinkgen.backends.c.constants import constant_type
-from qlinkgen.backends.c.names import Names, bracketed, scalar_literal, scalar_type
+from qlinkgen.backends.c.names import Names, bracketed, is_wide, scalar_literal, scalar_type
 from qlinkgen.model.types import Enum, Flags, Scalar
 from qlinkgen.plan.payload import (
     BytesStep,
@@ -100,13 +100,20 @@ class Types:
         found: dict[str, Counter[Scalar]] = {}
         beside = (member.number for _, member in self._plan.frame.envelope.values)
         for number in (*beside, *self.numbers()):
-            if number.type_name and not isinstance(number.meaning, Enum | Flags) and number.meaning != "bool":
+            if (
+                number.type_name
+                and not is_wide(number)
+                and not isinstance(number.meaning, Enum | Flags)
+                and number.meaning != "bool"
+            ):
                 found.setdefault(number.type_name, Counter())[_kept(number)] += 1
         return {name: self._kind(name, counts.most_common(1)[0][0]) for name, counts in found.items()}
 
     def of(self, number: Scalar) -> str:
         """The C type of a struct member."""
         plain, meaning = scalar_type(number), number.meaning
+        if is_wide(number):
+            return f"{self._names.prefix}_int128_t"
         if isinstance(meaning, Enum | Flags):
             return (
                 f"{self._names.prefix}_{self._names.constants(meaning)}_t"

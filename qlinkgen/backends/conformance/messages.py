@@ -222,6 +222,8 @@ class Entries:
     def _member(self, struct: str, inside: str, step: Holder) -> list[str]:
         name = inside + naming.member(step.name)
         match step:
+            case ValueStep() | Member() if step.number.bits > 64:
+                return [f"NUMBER({struct}, {name}.high),", f"NUMBER({struct}, {name}.low),"]
             case ValueStep() | Member():
                 return [f"NUMBER({struct}, {name}),"]
             case RecordStep():

@@ -242,7 +242,7 @@ class FieldMaker:
         made: Callable[[], tuple[Any, int]] = rng.choice(
             (self._plain, self._plain, self._plain, self._ranged, self._truth, self._of_enum, self._of_flags,
              self._scaled, self._fixed_point, self._constant, self._reserved, self._grouped, self._of_named,
-             self._real, self._digits)
+             self._real, self._digits, self._wide)
         )  # fmt: skip
         return made()
 
@@ -323,6 +323,24 @@ class FieldMaker:
         )
         kind, bits = self.rng.choice(kinds)
         return kind, self._bytes_of(f"u{bits}", {})
+
+    def _wide(self) -> tuple[Any, int]:
+        """An integer of more than 64 bits."""
+        rng = self.rng
+        if self.shape.groups:
+            return self._plain()
+        kind = rng.choice(("u72", "i72", "u96", "u128", "i128"))
+        low, high = _limits(kind)
+        spec: Doc = {"type": kind}
+        if rng.random() < 0.3:
+            spec["byteorder"] = rng.choice(("big", "little"))
+        roll = rng.random()
+        first = rng.choice((low, high, rng.randint(low, high), rng.randint(0, 1 << 64)))
+        if roll < 0.3:
+            spec["range"] = f"{first}..{rng.choice((high, rng.randint(first, high)))}"
+        elif roll < 0.6:
+            spec[rng.choice(("default", "const"))] = first
+        return spec, int(kind[1:]) // 8
 
     def _digits(self) -> tuple[Any, int]:
         """A number in binary-coded decimal."""

@@ -436,7 +436,8 @@ def _raw(kind: Value, words: Iterator[str]) -> Raw:
         return [_raw_record(kind.record, words) for _ in range(int(next(words)))]
     word = next(words)
     if isinstance(kind, Number):
-        return int(word)
+        raw = int(word, 0)
+        return raw - (1 << 128) if kind.signed and word.startswith("0x") and raw >> 127 else raw
     if kind.item is None:
         return _bytes(word).rstrip(kind.pad) if kind.pad else _bytes(word)
     return [int(each) for each in word.split(",")] if word != "-" else []
