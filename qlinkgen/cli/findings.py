@@ -21,6 +21,7 @@ from qlinkgen.plan.describe import (
     value_text,
 )
 from qlinkgen.plan.framing import (
+    BlocksPart,
     ByLength,
     ByMark,
     CellPart,
@@ -223,8 +224,10 @@ def _size(found: Dissection, fault: Fault) -> Words:
 
 def _check(found: Dissection, fault: Fault) -> Words:
     part, received = fault.of, fault.seen or 0
-    assert isinstance(part, CheckPart)
+    assert isinstance(part, CheckPart | BlocksPart)
     expected = found.expected[part.name]
+    if isinstance(part, BlocksPart):
+        return _block(found, part, fault, expected)
     text = check_text(part.check, found.plan.frame)
     rule = f"{part.name} is {check_number(part, received)}, but {text} gives {check_number(part, expected)}"
     if part.check.chained:
@@ -237,6 +240,17 @@ def _check(found: Dissection, fault: Fault) -> Words:
     plain = {name: cell.data for name, cell in cells.items()}
     own = [pair for name in over for pair in zip(cells[name].places, plain[name], strict=True)]
     return rule, explain_mismatch(part.check, received, _coverages(found, plain, over), own)
+
+
+def _block(found: Dissection, part: BlocksPart, fault: Fault, expected: int) -> Words:
+    index = found.cells[part.name].places.index(fault.at) // part.check.size
+    payload = found.cells[found.plan.frame.envelope.payload.name]
+    block = slice(index * part.every, (index + 1) * part.every)
+    own = list(zip(payload.places[block], payload.data[block], strict=True))
+    received = fault.seen or 0
+    what = f"{check_number(part, received)}, but {part.check.algorithm.name}"
+    rule = f"{part.name} is {what} over block {index + 1} gives {check_number(part, expected)}"
+    return rule, explain_mismatch(part.check, received, [Coverage(payload.data[block], "", 0)], own)
 
 
 def _coverages(found: Dissection, plain: Mapping[str, bytes], over: Sequence[str]) -> list[Coverage]:

@@ -8,6 +8,7 @@ from qlinkgen.plan.content import unpack_items
 from qlinkgen.plan.describe import id_text, part_text, value_text
 from qlinkgen.plan.framing import (
     AddressPart,
+    BlocksPart,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -74,6 +75,8 @@ def _of_part(found: Dissection, part: Part, span: Span) -> str:
             return "payload of an unknown message"
         case CheckPart():
             return _check(found, part, span)
+        case BlocksPart():
+            return "wrong" if span.fault else "right" if part.name not in found.expected else ""
         case _:
             assert_never(part)
 
@@ -124,6 +127,6 @@ def _check(found: Dissection, part: CheckPart, span: Span) -> str:
     return f"{received}, right" + ("" if part.check.complete else " (the bits that are sent)")
 
 
-def check_number(part: CheckPart, value: int) -> str:
+def check_number(part: CheckPart | BlocksPart, value: int) -> str:
     """Return a check value in hex, with all digits of its width."""
     return f"0x{value:0{(part.check.algorithm.width + 3) // 4}X}"

@@ -36,6 +36,8 @@ class Checksum:
     confirmed: bool = True
     #: The value where the covered parts are empty, None if the algorithm gives it.
     otherwise: int | None = None
+    #: Size of the blocks of the covered part that have a value each, 0 for one value over all parts.
+    every: int = 0
 
     @property
     def mask(self) -> int:
@@ -132,10 +134,12 @@ class Part:
 
     @property
     def size(self) -> int:
-        """Size in bytes, 0 for the payload."""
+        """Size in bytes, 0 for the payload and the check values of its blocks."""
         if self.scalar is not None:
             return self.scalar.size
-        return len(self.checksum.chunks) if self.checksum else len(self.constant)
+        if self.checksum:
+            return 0 if self.checksum.every else len(self.checksum.chunks)
+        return len(self.constant)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from qlinkgen.plan import select
 from qlinkgen.plan.expr import OneOf, Within
 from qlinkgen.plan.framing import (
     AddressPart,
+    BlocksPart,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -52,6 +53,7 @@ def _message(frame: FramePlan, message: Message, options: Options) -> MessagePla
     payload = payload_plan(message)
     envelope = frame.with_check(message.direction, checked=message.checksum)
     size = envelope.overhead + payload.most
+    size += envelope.blocks.added(payload.most) if envelope.blocks else 0
     return MessagePlan(
         message=message,
         payload=payload,
@@ -101,5 +103,7 @@ def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
             return int(any(first <= mark <= last for first, last in message.addresses))
         case LengthPart() | IdPart() | AddressPart() | CellPart() | EqualPart() | CheckPart() | MarkPart():
             return part.size
+        case BlocksPart():
+            raise AssertionError("a stuffed payload has no check values of blocks")
         case _:
             assert_never(part)

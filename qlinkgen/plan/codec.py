@@ -39,6 +39,7 @@ from qlinkgen.plan.ended import frame_reader
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
+    BlocksPart,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -146,7 +147,7 @@ class Codec:
         parts = {
             part.name: sent if isinstance(part, PayloadPart) else _cell(part, given)
             for part in message.envelope.parts
-            if not isinstance(part, CheckPart)
+            if not isinstance(part, CheckPart | BlocksPart)
         }
         return {**parts, **dict(message.message.seeds)}
 
@@ -157,6 +158,10 @@ class Codec:
             if part.name not in cells:
                 value = self.check_value(part, envelope, cells, request)
                 cells = {**cells, part.name: part.check.pack(value)}
+        if blocks := envelope.blocks:
+            payload = cells[envelope.payload.name]
+            sent = blocks.join(payload, cells.get(blocks.name, blocks.values(payload)))
+            cells = {**cells, envelope.payload.name: sent, blocks.name: b""}
         frame = b"".join(cells[each.name] for each in envelope.parts)
         match transparency:
             case FrameStuffing():
@@ -213,6 +218,8 @@ class Codec:
         for part in envelope.checks:
             if part not in envelope.seeded:
                 self._verify(part, envelope, taken, taken.cells, request)
+        if envelope.blocks and taken.cells[envelope.blocks.name] != envelope.blocks.values(taken.payload):
+            raise BadFrame("crc", taken.end)
         if message is None:
             raise BadFrame("unknown", taken.end)
         for part in envelope.seeded:

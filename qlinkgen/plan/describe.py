@@ -26,6 +26,7 @@ from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
+    BlocksPart,
     ByLength,
     ByMark,
     ByMessage,
@@ -333,7 +334,7 @@ def _counted_text(count: CountStep) -> str:
 # Parts ------------------------------------------------------------------------------------------------------
 
 
-def part_text(part: Part, frame: FramePlan) -> str:
+def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a part
     """The content of a part of a frame."""
     match part:
         case ConstantPart():
@@ -359,6 +360,8 @@ def part_text(part: Part, frame: FramePlan) -> str:
         case CheckPart():
             text = check_text(part.check, frame)
             return text if part.check.complete else f"{text}; bits {_sent_bits_text(part.check)} are sent"
+        case BlocksPart():
+            return f"{check_text(part.check, frame)}, after every {part.every} bytes and after the rest"
         case _:
             assert_never(part)
 

@@ -19,6 +19,7 @@ from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
 from qlinkgen.plan.fields import Fields
 from qlinkgen.plan.framing import (
     AddressPart,
+    BlocksPart,
     ByLength,
     ByMark,
     ByMessage,
@@ -197,6 +198,8 @@ class _Walk:
             self.envelope = self.message.envelope
         self._take_payload()
         for part in self.envelope.back:
+            if isinstance(part, BlocksPart):
+                continue
             if isinstance(part, MarkPart) and self._interrupted(part):
                 self.wanted[part.name] = 0
             self._take(part, self.wanted.get(part.name, part.size))
@@ -226,6 +229,9 @@ class _Walk:
                 length = self._number_in(end.part, end.part.integer)
                 fits = length is not None and end.part.least <= length <= end.part.most
                 size = length - end.part.bias if fits and length is not None else self._left() - trailer
+                if self.envelope.blocks:
+                    self._take_blocks(self.envelope.blocks, max(0, size), fits=fits)
+                    return
             case ByMark():
                 size = self._marked_size(end)
             case ByTerminator():
@@ -238,6 +244,16 @@ class _Walk:
             case _:
                 assert_never(end)
         self._take(part, max(0, size))
+
+    def _take_blocks(self, part: BlocksPart, size: int, *, fits: bool) -> None:
+        """Take a payload of a size with its check values; without a length ``size`` is that of both."""
+        payload, size = self.envelope.payload, size if fits else part.plain(size)
+        for at in range(0, size, part.every):
+            self._take(payload, min(part.every, size - at))
+            self._take(part, part.check.size)
+        for each, wanted in ((payload, size), (part, part.added(size))):
+            self.cells.setdefault(each.name, Cell(b"", (), b""))
+            self.wanted[each.name] = wanted
 
     def _marked_size(self, end: ByMark) -> int:
         """Size of the payload between two marks; without room for a check value none is assumed."""
@@ -365,6 +381,8 @@ class _Walk:
                     self._payload(part)
                 case CheckPart():
                     self._check(part)
+                case BlocksPart():
+                    self._check_blocks(part)
                 case _:
                     assert_never(part)
         if self.frame.needs_request and self.direction == "response" and self.message is None:
@@ -480,7 +498,19 @@ class _Walk:
         self._fault(kind, rule, self._found(part).places[0], part, received)
         self._span(part, received, kind)
 
-    def _displaced(self, part: CheckPart) -> bool:
+    def _check_blocks(self, part: BlocksPart) -> None:
+        """Check the values of all blocks; the first wrong one is a fault."""
+        cell, size, check = self._found(part), part.check.size, part.check
+        kind = ""
+        for index, block in enumerate(part.blocks(self._found(self.envelope.payload).data)):
+            received, right = cell.data[index * size : (index + 1) * size], check.of(block)
+            if received != check.pack(right) and not self._displaced(part):
+                kind, self.expected[part.name] = "crc", check.unpack(check.pack(right))
+                self._fault(kind, Rule.CHECK, cell.places[index * size], part, check.unpack(received))
+                break
+        self._span(part, None, kind)
+
+    def _displaced(self, part: CheckPart | BlocksPart) -> bool:
         """Whether wrong stuffing or a wrong length shifts the bytes, so the check value is meaningless."""
         if self.no_preamble:
             return True
@@ -640,7 +670,7 @@ class _EndedWalk(_Walk):
     def _close_cells(self) -> None:
         """Cells have their bytes as sent already."""
 
-    def _displaced(self, part: CheckPart) -> bool:
+    def _displaced(self, part: CheckPart | BlocksPart) -> bool:
         del part
         incomplete = any(len(self._found(each).data) < each.size for each in self.envelope.parts)
         return self.no_preamble or incomplete or any(each.rule is Rule.STUFFING for each in self.faults)

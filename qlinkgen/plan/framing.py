@@ -146,6 +146,43 @@ class CheckPart:
 
 
 @dataclass(frozen=True, slots=True)
+class BlocksPart:
+    """Check values of the blocks of the payload: one follows every ``every`` bytes of it, one the rest."""
+
+    name: str
+    check: Check
+    every: int
+
+    #: Bytes for an empty payload.
+    size = 0
+
+    def blocks(self, payload: bytes) -> list[bytes]:
+        """The blocks of a payload."""
+        return [payload[at : at + self.every] for at in range(0, len(payload), self.every)]
+
+    def values(self, payload: bytes) -> bytes:
+        """The check values of a payload."""
+        return b"".join(self.check.pack(self.check.of(block)) for block in self.blocks(payload))
+
+    def join(self, payload: bytes, values: bytes) -> bytes:
+        """A payload and its check values as sent."""
+        size = self.check.size
+        return b"".join(
+            block + values[index * size : (index + 1) * size]
+            for index, block in enumerate(self.blocks(payload))
+        )
+
+    def added(self, payload: int) -> int:
+        """Bytes of the check values of a payload of so many bytes."""
+        return -(-payload // self.every) * self.check.size
+
+    def plain(self, sent: int) -> int:
+        """Bytes of a payload that takes so many bytes with its check values; a cut one counts."""
+        whole = self.every + self.check.size
+        return sent // whole * self.every + min(self.every, sent % whole)
+
+
+@dataclass(frozen=True, slots=True)
 class Seed:
     """Bytes that a check value covers but that are not sent: a numeric attribute of the message."""
 
@@ -269,7 +306,7 @@ def gathered(pieces: tuple[Bits, ...], cells: Mapping[str, bytes]) -> int | None
 
 
 Numeric = LengthPart | IdPart | AddressPart | CellPart | EqualPart
-Part = ConstantPart | Numeric | MarkPart | PayloadPart | CheckPart
+Part = ConstantPart | Numeric | MarkPart | PayloadPart | CheckPart | BlocksPart
 
 
 # The end of a frame -----------------------------------------------------------------------------------------
@@ -421,7 +458,8 @@ class Envelope:
     @property
     def max_frame(self) -> int:
         """Maximum size of a frame, with the payload as a length counts it."""
-        return self.overhead + self.payload.most_sent
+        blocks = self.blocks.added(self.payload.most_sent) if self.blocks else 0
+        return self.overhead + self.payload.most_sent + blocks
 
     @property
     def preamble(self) -> bytes:
@@ -454,6 +492,11 @@ class Envelope:
         """The check value whose algorithm can be replaced: the last over the payload, else the last."""
         over = [part for part in self.checks if self.payload.name in part.check.over]
         return (over or self.checks or (None,))[-1]
+
+    @cached_property
+    def blocks(self) -> BlocksPart | None:
+        """The check values of the blocks of the payload, None if there are none."""
+        return next((part for part in self.parts if isinstance(part, BlocksPart)), None)
 
     @cached_property
     def header_checks(self) -> tuple[CheckPart, ...]:
@@ -717,7 +760,12 @@ def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -
             return PayloadPart(part.name, part.min_size, part.max_size, transparency.most_sent(part.max_size))
         case "checksum":
             assert part.checksum is not None
-            return CheckPart(part.name, Check(part.checksum))
+            check = Check(part.checksum)
+            return (
+                BlocksPart(part.name, check, check.value.every)
+                if check.value.every
+                else CheckPart(part.name, check)
+            )
         case "length" | "message" | "address" | "bits":
             return _integer_part(frame, part, transparency)
         case "derived":
@@ -760,7 +808,9 @@ def _receiver(envelope: Envelope, transparency: Transparency) -> Receiver:
     if isinstance(transparency, FrameStuffing) and _unique(envelope, transparency):
         return Hunt(transparency.rule.after[0], transparency.rule.insert)
     return Rescan(
-        bare=not envelope.preamble, verified=envelope.check is not None, seeded=bool(envelope.seeded)
+        bare=not envelope.preamble,
+        verified=bool(envelope.checks or envelope.blocks),
+        seeded=bool(envelope.seeded),
     )
 
 

@@ -15,6 +15,7 @@ from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.framing import (
     AddressPart,
+    BlocksPart,
     ByLength,
     ByMark,
     ByMessage,
@@ -207,7 +208,8 @@ class FrameReader:
         self._check_header(cursor, taken)
         sent = self._payload(cursor, taken, length)
         for part in self._envelope.back:
-            taken.cells[part.name] = self._take(cursor, part, part.size)
+            if not isinstance(part, BlocksPart):
+                taken.cells[part.name] = self._take(cursor, part, part.size)
         self._identify(taken)
         taken.end = cursor.at
         taken.due = bytes((rule.insert,)) if rule and cursor.due else b""
@@ -233,7 +235,7 @@ class FrameReader:
             case CheckPart():
                 taken.cells[part.name] = self._take(cursor, part, part.size)
                 return 0
-            case MarkPart() | PayloadPart():
+            case MarkPart() | PayloadPart() | BlocksPart():
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
@@ -277,6 +279,8 @@ class FrameReader:
     def _payload(self, cursor: Cursor, taken: Taken, length: int) -> bytes:
         part, end = self._envelope.payload, self._plan.end
         match end:
+            case ByLength() if self._envelope.blocks:
+                sent = self._blocks(cursor, self._envelope.blocks, taken, length - end.part.bias)
             case ByLength():
                 sent = self._take(cursor, part, length - end.part.bias)
             case ByMessage():
@@ -287,6 +291,14 @@ class FrameReader:
                 assert_never(end)
         taken.cells[part.name] = sent
         return sent
+
+    def _blocks(self, cursor: Cursor, part: BlocksPart, taken: Taken, size: int) -> bytes:
+        """Take a payload with the check values of its blocks; returns the payload."""
+        sent = self._take(cursor, self._envelope.payload, size + part.added(size))
+        starts = range(0, len(sent), part.every + part.check.size)
+        pieces = [sent[at : at + part.every + part.check.size] for at in starts]
+        taken.cells[part.name] = b"".join(piece[-part.check.size :] for piece in pieces)
+        return b"".join(piece[: -part.check.size] for piece in pieces)
 
     def _measured(self, cursor: Cursor, part: PayloadPart, taken: Taken) -> bytes:
         message = self._known.get(taken.number if taken.number is not None else -1)
@@ -329,7 +341,9 @@ def is_wrong(part: Part, cells: Mapping[str, bytes]) -> bool:
         case EqualPart():
             right = part.value(part.of.integer.unpack(cells[part.of.name]))
             return part.integer.unpack(cells[part.name]) != right
-        case LengthPart() | IdPart() | AddressPart() | MarkPart() | PayloadPart() | CheckPart():
+        case (
+            LengthPart() | IdPart() | AddressPart() | MarkPart() | PayloadPart() | CheckPart() | BlocksPart()
+        ):
             return False
         case _:
             assert_never(part)

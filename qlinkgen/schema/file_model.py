@@ -27,6 +27,7 @@ from pydantic_core import CoreSchema
 from qlinkgen.schema.kinds import (
     AnswerNumber,
     AnyRange,
+    ByteCount,
     ByteText,
     Characters,
     Consts,
@@ -277,6 +278,9 @@ class PartSpec(Fact):
         default=None, description="Name of a CRC in the catalogue or of a sum, or the parameters of a CRC"
     )
     init: Id | None = Field(default=None, description="Start of the checksum, if it is not the algorithm's")
+    every: ByteCount | None = Field(
+        default=None, description="Size of the blocks of the covered part that have a checksum each: 16 bytes"
+    )
     otherwise: Id | None = Field(
         default=None, description="Value of the checksum where the covered parts are empty"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from qlinkgen.model import checksum as catalogue
-from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame, Part
 from qlinkgen.model.types import Chunk
 from qlinkgen.schema.coding import CodingBuilder
 from qlinkgen.schema.file_model import MarkedSpec, PartSpec, SchemaFile
@@ -34,7 +34,7 @@ def payload_bounds(file: SchemaFile) -> tuple[int, int]:
 
 def _main_check(specs: Mapping[str, PartSpec]) -> str:
     """The check value whose algorithm can be replaced: the last over the payload, else the last."""
-    checks = [name for name, spec in specs.items() if spec.told == "checksum"]
+    checks = [name for name, spec in specs.items() if spec.told == "checksum" and not spec.every]
     payload = next((name for name, spec in specs.items() if spec.told == "payload"), "")
     over = [name for name in checks if payload in (specs[name].over or ())]
     return (over or checks or [""])[-1]
@@ -104,6 +104,9 @@ class FrameBuilder:
         self._check_pieces(frame, path)
         self._check_order(frame, path)
         self._check_empty(frame, path)
+        for part in frame.parts:
+            if part.checksum and part.checksum.every:
+                self._check_blocks(frame, part, path)
         if self._is_circular(frame, path):
             return None
         self._check_length(frame, path)
@@ -123,6 +126,49 @@ class FrameBuilder:
                 if identifies:
                     what = f"{what}, whose size follows from it"
                 self._parts.fault("bad-frame", (*path, part.name), what, hint)
+
+    def _check_blocks(self, frame: DelimitedFrame, part: Part, path: Path) -> None:
+        """Check that check values of blocks follow the payload, whose size a length gives."""
+        assert part.checksum is not None
+        names = [each.name for each in frame.parts]
+        payload, length = frame.payload.name, frame.part("length")
+        others = [each for each in frame.parts if each.checksum and each is not part]
+        beside = [
+            each.name
+            for each in others
+            if {payload, part.name} & set(each.checksum.over if each.checksum else ())
+        ]
+        wrong = [
+            (
+                part.checksum.over != (payload,),
+                f"{part.name} does not cover the payload alone",
+                f"write over: [{payload}]",
+            ),
+            (
+                names[names.index(payload) + 1 :][:1] != [part.name],
+                f"{part.name} does not follow {payload}",
+                "move it there",
+            ),
+            (length is None or payload not in length.counts, "no length counts the payload", "add one"),
+            (
+                length is not None and part.name in length.counts,
+                f"a length counts {part.name}",
+                f"count {payload} alone",
+            ),
+            (frame.stuffing is not None, "the frame is stuffed", "remove the stuffing or every"),
+            (frame.coding != (), "the frame is coded", "remove the coding or every"),
+            (frame.part("terminator") is not None, "the frame has a terminator", "remove it or every"),
+            (
+                bool(beside),
+                f"{', '.join(beside)} covers the payload or its check values, too",
+                "cover other parts",
+            ),
+            (part.checksum.otherwise is not None, f"{part.name} has a value for nothing", "remove otherwise"),
+        ]
+        for is_wrong, what, hint in wrong:
+            if is_wrong:
+                self._report.error("check-blocks", (*path, part.name, "every"), what, hint, of_key=True)
+                return
 
     def _check_empty(self, frame: DelimitedFrame, path: Path) -> None:
         """Check that what a value for empty parts covers may be empty."""
@@ -223,7 +269,7 @@ class FrameBuilder:
             return None
         self._parts.reject(
             spec.checksum,
-            ("value", "text", "counts", "size", "words", "rejected", "otherwise"),
+            ("value", "text", "counts", "size", "words", "rejected", "every", "otherwise"),
             "checksum",
             place,
         )
@@ -302,7 +348,7 @@ class FrameBuilder:
     def _packet_checksum(self, spec: PartSpec, specs: Mapping[str, PartSpec], place: Path) -> Checksum | None:
         self._parts.reject(
             spec,
-            ("value", "text", "counts", "size", "sent", "only", "over", "init", "otherwise"),
+            ("value", "text", "counts", "size", "sent", "only", "over", "init", "every", "otherwise"),
             "packet's checksum",
             place,
         )

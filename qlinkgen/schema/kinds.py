@@ -124,6 +124,9 @@ ByteText = Annotated[
     PlainValidator(notation.byte_string),
     _json("Hex pairs (A5 A5) or one byte (0xA5)", "string", "integer"),
 ]
+ByteCount = Annotated[
+    int, PlainValidator(notation.byte_count), _json("A number of bytes: 16 bytes", "string")
+]
 Characters = Annotated[
     str, BeforeValidator(_characters), WithJsonSchema({"type": "string", "pattern": "^[ -~]+$"})
 ]

@@ -109,6 +109,14 @@ def whole_range(value: object) -> tuple[int, int]:
     return int(found.first), int(found.last)
 
 
+def byte_count(value: object) -> int:
+    """A positive number of bytes like ``16 bytes``. Raises ValueError."""
+    match = re.fullmatch(r"([1-9][0-9]{0,4}) bytes?", value, re.ASCII) if isinstance(value, str) else None
+    if match is None:
+        raise ValueError(f"{shown(value)} is not a number of bytes; write it like 16 bytes")
+    return int(match[1])
+
+
 def byte_string(value: object) -> bytes:
     """Pairs of hex digits like ``A5 A5``, or one number like ``0xA5``. Raises ValueError.
 

@@ -30,7 +30,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
     "payload": ("size",),
-    "checksum": ("type", "byteorder", "algorithm", "init", "over", "otherwise", "sent"),
+    "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent"),
     "terminator": ("value", "text", "shared"),
 }
 _KEYS = (
@@ -48,6 +48,7 @@ _KEYS = (
     "algorithm",
     "init",
     "over",
+    "every",
     "otherwise",
     "sent",
     "only",
@@ -281,6 +282,7 @@ class PartBuilder:
             tuple(spec.over or ()),
             spec.confirmed,
             self._otherwise(spec, algorithm, path),
+            spec.every or 0,
         )
 
     def _otherwise(self, spec: PartSpec, algorithm: catalogue.Checksum, path: Path) -> int | None:

@@ -197,6 +197,11 @@ _ALL = (
         "Otherwise the check value of the message could not be computed.",
     ),
     Rule(
+        "check-blocks",
+        "Check values of blocks follow the payload, whose size a length gives.",
+        "They are sent inside it, after each block: a receiver needs the end of the last one.",
+    ),
+    Rule(
         "part-order",
         "Parts are listed once, in wire order.",
         "A checksum depends on the order of the bytes.",

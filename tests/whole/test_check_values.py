@@ -11,6 +11,7 @@ from qlinkgen.model.checksum import find
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
+from qlinkgen.plan.reading import BadFrame
 from qlinkgen.plan.receive import receiver
 from qlinkgen.plan.spans import Rule
 from qlinkgen.plan.tree import Plan
@@ -40,6 +41,17 @@ _TWO = """\
     head: {type: u8, algorithm: xor8, over: [length, code]}
     data: {role: payload, size: 0..40}
     sum: {type: u16, algorithm: sum16, over: [start, head, data]}
+"""
+#: The link layer of DNP3, with its user data as the payload.
+_DNP3 = """\
+    start: 05 64
+    length: {type: u8, counts: [control, code, source, data]}
+    control: {type: u8, const: 0xF3}
+    code: {role: message, type: u16, byteorder: little}
+    source: {type: u16, byteorder: little, const: 0x0400}
+    crc: {type: u16, byteorder: little, algorithm: crc-16/dnp, over: [start, length, control, code, source]}
+    data: {role: payload, size: 0..40}
+    blocks: {type: u16, byteorder: little, algorithm: crc-16/dnp, over: [data], every: 16 bytes}
 """
 SHAPES = {
     "a check value of the header, and one over it": _TWO,
@@ -76,6 +88,7 @@ SHAPES = {
     data: {role: payload, size: 0..40}
     crc: {type: u16, algorithm: crc-16/mcrf4xx, over: [length, code, data, attribute.extra, attribute.salt]}
 """,
+    "one after each block of the payload, and one over the header": _DNP3,
     "two of one algorithm in a stuffed frame": """\
     start: A5 A5
     length: {type: u8, counts: [data]}
@@ -124,6 +137,25 @@ def test_numbers_that_are_not_sent() -> None:
     assert [(event.kind, event.offset) for event in events] == [("unknown", 0), ("message", len(unknown))]
     hidden = unknown[:4] + frame  # a false start of five bytes, whose length reaches into the frame
     assert receiver(found, "request").run(hidden)[-1].kind == "message"
+
+
+def test_a_check_value_after_each_block() -> None:
+    found = plan(_DNP3)
+    data = bytes.fromhex("c0c3013c02063c03063c04063c0106")
+    # Class 0 to 3 poll, as printed in introductions to DNP3; the destination is 1.
+    wire = bytes.fromhex("056414f3010000040a3b" + data.hex() + "9a12")
+    text = (_HEAD + _DNP3).replace("id: 5", "id: 1")
+    protocol, faults = loads(text, "tank.yaml")
+    assert protocol, faults
+    assert Codec(plan_of(protocol)).encode("log", {"note": data}) == wire
+    long = Codec(found).encode("log", {"note": bytes(range(40))})
+    assert len(long) == 10 + 16 + 2 + 16 + 2 + 8 + 2
+    assert Codec(found).decode(long, "request").values == {"note": bytes(range(40))}
+    for at in range(10, len(long)):
+        with pytest.raises(BadFrame, match="crc"):
+            Codec(found).decode(long[:at] + bytes((long[at] ^ 1,)) + long[at + 1 :], "request")
+    wrong = dissect(found, long[:30] + b"\0" + long[31:], "request")
+    assert [(fault.rule, fault.at) for fault in wrong.faults] == [(Rule.CHECK, 44)]
 
 
 def test_a_value_where_there_is_nothing_to_cover() -> None:

@@ -19,6 +19,7 @@ from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
     Bits,
+    BlocksPart,
     ByTerminator,
     CellPart,
     CheckPart,
@@ -96,6 +97,17 @@ class ValueView:
     algorithm: CheckView
     updates: list[str]
     seeded: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BlocksView:
+    """Check values of blocks of a payload; ``put`` and ``differs`` are about the bytes after a block."""
+
+    every: int
+    size: int
+    algorithm: CheckView
+    put: list[str]
+    differs: str
 
 
 @dataclass(frozen=True)
@@ -187,7 +199,7 @@ class PartWriter:
                 return [
                     self.layouts.put(part.integer, place, str(at), derived(part, self.get(part.of, source)))
                 ]
-            case CheckPart() | PayloadPart() | MarkPart():
+            case CheckPart() | BlocksPart() | PayloadPart() | MarkPart():
                 return []
             case _:
                 assert_never(part)
@@ -281,7 +293,7 @@ class PartWriter:
                     yield from self._number_checks(part, f"{reached}{end}U", directed)
                 case CheckPart():
                     pass
-                case PayloadPart() | MarkPart():
+                case PayloadPart() | MarkPart() | BlocksPart():
                     raise AssertionError(f"{part.name} is not a part of a header")
                 case _:
                     assert_never(part)
@@ -316,7 +328,7 @@ class PartWriter:
                         yield from (line.removeprefix("    ") for line in lines[1:-1])
                 case CheckPart():
                     pass
-                case PayloadPart() | MarkPart():
+                case PayloadPart() | MarkPart() | BlocksPart():
                     raise AssertionError(f"{part.name} is not a part of a header")
                 case _:
                     assert_never(part)
@@ -459,6 +471,8 @@ class PartWriter:
         """Each algorithm of the frame, the main one first."""
         parts = sorted(self.envelope.checks, key=lambda part: part is not self.envelope.check)
         found = dict.fromkeys(part.check.algorithm for part in parts)
+        if self.envelope.blocks:
+            found[self.envelope.blocks.check.algorithm] = None
         return {each: render(each, number) for number, each in enumerate(found, 1)}
 
     @property
@@ -481,6 +495,20 @@ class PartWriter:
             return []
         return refusal(
             f"payload_end == {self.head}U", unsigned(part.check.otherwise, part.check.algorithm.width)
+        )
+
+    @property
+    def blocks(self) -> BlocksView | None:
+        """The check values of the blocks of the payload, None if there are none."""
+        part = self.envelope.blocks
+        if part is None:
+            return None
+        return BlocksView(
+            part.every,
+            part.check.size,
+            self.algorithms[part.check.algorithm],
+            put_check(part.check, "block", 0, "value"),
+            differs(part.check, "block", 0, "value"),
         )
 
     def _function(self, part: CheckPart) -> str:

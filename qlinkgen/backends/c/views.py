@@ -11,7 +11,7 @@ from qlinkgen.backends.c.coding import EndedView, stage_views
 from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
-from qlinkgen.backends.c.parts import PartWriter, ValueView, in_hex, length_bounds, sender_of
+from qlinkgen.backends.c.parts import BlocksView, PartWriter, ValueView, in_hex, length_bounds, sender_of
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.framing import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
@@ -123,6 +123,7 @@ class PartsView:
         judged: without a check value, only valid contents confirm a frame.
         values: functions for check values, none if the only one is computed in passing.
         judges: statements that verify them.
+        inline: the only check value is computed in passing.
         identified_late: message id or address follow the payload.
         unused: the parameter for the message id if frames have none, otherwise "".
         refused_values: conditions that hold if a value of the frame cannot be sent.
@@ -143,6 +144,8 @@ class PartsView:
     check_differs: str
     values: list[ValueView]
     judges: list[str]
+    inline: bool
+    blocks: BlocksView | None
     identified_late: bool
     unused: str
     refused_values: list[str]
@@ -274,7 +277,7 @@ def parts_views(plan: Plan, layouts: Layouts) -> PartsViews:
     rule, body_size = None, 0
     match transparency:
         case Plain():
-            pass
+            body_size = envelope.payload.most if envelope.blocks else 0
         case PayloadStuffing():
             rule, body_size = transparency.rule, envelope.payload.most_sent
         case FrameStuffing():
@@ -322,7 +325,9 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
         wrong_tail=writer.wrong_tail("end"),
         check_differs=writer.check_differs("end", "value"),
         values=writer.values,
-        judges=writer.judges("body", "end", f"payload + {writer.head}U"),
+        judges=writer.judges("body", "end", f"{'sent' if writer.blocks else 'payload'} + {writer.head}U"),
+        inline=writer.alone is not None,
+        blocks=writer.blocks,
         identified_late=writer.reads_tail,
         unused="" if envelope.id else writer.sender.id,
         refused_values=writer.refused_values(),
@@ -331,14 +336,14 @@ def _parts(writer: PartWriter, max_wire: int) -> PartsView:
 
 
 def _plain(writer: PartWriter, directed: str) -> PlainView:
-    header = writer.envelope.header_size
+    header, received = writer.envelope.header_size, "sent" if writer.blocks else "payload"
     return PlainView(
-        put_header=writer.put_header("wire", "sent"),
+        put_header=writer.put_header("wire", "size" if writer.blocks else "sent"),
         put_trailer=writer.put_trailer("end", "wire"),
         put_check=writer.put_check("end", "value"),
         fills=writer.fills("wire", "end", f"{header}U + sent"),
         update_sent=writer.covered_loops("wire", "0", f"{header}U + sent"),
-        update_received=writer.covered_loops("wire", "0", f"payload + {header}U"),
+        update_received=writer.covered_loops("wire", "0", f"{received} + {header}U"),
         head_checks=list(writer.head_checks("size", directed, all_there=True)),
     )
 

@@ -33,8 +33,8 @@ _SUPPORT = {
     "_fields": "ArrayField BitFields Bits Boolean BytesField Clear Count Groups Member Message OpenFlags "
     "Ranged Scaled TextField like",
     "_packed": "BcdInteger PackedField PaddedBytesField PaddedTextField",
-    "_frames": "CRC Address AddressBits Cell Check Constant ConstantBits DelimitedFrame Equal Fletcher Id "
-    "IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
+    "_frames": "CRC Address AddressBits Blocks Cell Check Constant ConstantBits DelimitedFrame Equal "
+    "Fletcher Id IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
     "_ended": "Add Cobs Digits EndedFrame Escape Insert Pair",
     "_frecords": "Record",
 }

@@ -246,6 +246,34 @@ class Payload(NamedTuple):
     most: int
 
 
+class Blocks(NamedTuple):
+    """Check values of the blocks of the payload: one after every ``every`` bytes, one after the rest."""
+
+    name: str
+    algorithm: CRC | Sum | Xor | Fletcher
+    integer: Construct
+    mask: int
+    every: int
+
+    def values(self, payload: bytes) -> Sequence[bytes]:
+        """The wire bytes of the check value of each block."""
+        blocks = [
+            payload[at : at + self.every] for at in range(0, len(payload), self.every)
+        ]
+        return [
+            bytes(self.integer.build(self.algorithm.compute(block) & self.mask))
+            for block in blocks
+        ]
+
+    def join(self, payload: bytes) -> bytes:
+        """The payload with its check values."""
+        values = self.values(payload)
+        return b"".join(
+            payload[index * self.every : (index + 1) * self.every] + value
+            for index, value in enumerate(values)
+        )
+
+
 class Check(NamedTuple):
     """A check value over other parts; bits outside of ``mask`` are neither sent nor compared.
 
@@ -287,7 +315,7 @@ class Check(NamedTuple):
         )
 
 
-Part = Constant | Length | Id | Address | Cell | Equal | Mark | Payload | Check
+Part = Constant | Length | Id | Address | Cell | Equal | Mark | Payload | Check | Blocks
 
 
 def _size(part: Part) -> int:
@@ -297,7 +325,7 @@ def _size(part: Part) -> int:
             return len(part.data)
         case Mark():
             return 1
-        case Payload():
+        case Payload() | Blocks():
             return 0
         case Length() | Id() | Address() | Cell() | Equal() | Check():
             return int(part.integer.sizeof())
@@ -409,6 +437,9 @@ class Frame(Construct):
             part = next(part for part in left if names.isdisjoint(part.over))
             cells[part.name] = part.value(cells, request)
             left = [each for each in left if each is not part]
+        for blocks in self.parts:
+            if isinstance(blocks, Blocks):
+                cells[self.payload.name] = blocks.join(cells[self.payload.name])
         inner = [
             part.name for part in self.parts if stuffing and part.name in stuffing.over
         ]
@@ -440,7 +471,7 @@ class Frame(Construct):
                 return part.byte(number, address)
             case Payload():
                 return payload
-            case Cell() | Check():
+            case Cell() | Check() | Blocks():
                 return b""
 
     def _equal(self, part: Equal, cells: Mapping[str, bytes]) -> bytes:
@@ -540,6 +571,7 @@ class Frame(Construct):
         unseeded = [check for check in self.checks if not _seeds(check)]
         for check in unseeded if found is None or found.checksum else ():
             self._compare(check, cells, request)
+        self._compare_blocks(cells, payload)
         message = self._known(number)
         for check in self.checks:
             if _seeds(check):
@@ -564,6 +596,14 @@ class Frame(Construct):
                 except ConstructError as error:
                     raise FrameError("range", f"{part.name}; {error}") from None
         return Container(message=message.name, **place, fields=fields)
+
+
+    def _compare_blocks(self, cells: Mapping[str, bytes], payload: bytes) -> None:
+        for blocks in self.parts:
+            if isinstance(blocks, Blocks):
+                values = b"".join(blocks.values(payload))
+                if cells[blocks.name] != values:
+                    raise FrameError("crc", f"{blocks.name} are not {values.hex()}")
 
 
 def _seeds(check: Check) -> list[str]:
@@ -651,6 +691,9 @@ class DelimitedFrame(Frame):
             if isinstance(part, Payload):
                 self._verify(cells)
                 cells[part.name] = self._sent(source, part, numbers)
+                self._split(source, part, cells, numbers)
+            elif isinstance(part, Blocks):
+                pass  # taken with the payload
             elif isinstance(part, Constant) and Payload not in numbers:
                 cells[part.name] = self._constant(source, part)
             else:
@@ -700,13 +743,31 @@ class DelimitedFrame(Frame):
     def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
         numbers[Payload] = 0
         if Length in numbers:
-            return source.take(part, numbers[Length])
+            blocks = next((each for each in self.parts if isinstance(each, Blocks)), None)
+            return source.take(part, 0 if blocks else numbers[Length])
         try:
             return self._known(numbers[Id]).measured(
                 lambda size: source.take(part, size)
             )
         except RangeError as error:
             raise FrameError("length", str(error)) from None
+
+    def _split(
+        self,
+        source: _Wire,
+        part: Payload,
+        cells: dict[str, bytes],
+        numbers: dict[type, int],
+    ) -> None:
+        """Take a payload with the check values of its blocks."""
+        for blocks in self.parts:
+            if isinstance(blocks, Blocks):
+                cells[blocks.name] = b""
+                for at in range(0, numbers[Length], blocks.every):
+                    size = min(blocks.every, numbers[Length] - at)
+                    cells[part.name] += source.take(part, size)
+                    value = source.take(part, int(blocks.integer.sizeof()))
+                    cells[blocks.name] += value
 
     def _plain(self, cells: Mapping[str, bytes]) -> bytes:
         for part in self.parts:

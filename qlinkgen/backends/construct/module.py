@@ -14,6 +14,7 @@ from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, S
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
+    BlocksPart,
     ByTerminator,
     CellPart,
     CheckPart,
@@ -109,6 +110,8 @@ def _algorithms(envelope: Envelope) -> Mapping[catalogue.Checksum, str]:
     """The name of each algorithm of a frame, the main one first."""
     parts = sorted(envelope.checks, key=lambda part: part is not envelope.check)
     found = dict.fromkeys(part.check.algorithm for part in parts)
+    if envelope.blocks:
+        found[envelope.blocks.check.algorithm] = None
     return {
         each: "ALGORITHM" if number == 1 else f"ALGORITHM_{number}" for number, each in enumerate(found, 1)
     }
@@ -150,7 +153,7 @@ def _layout(envelope: Envelope, types: Types) -> Sequence:
     return Sequence(tuple(_part(part, envelope, types) for part in envelope.parts))
 
 
-def _part(part: Part, envelope: Envelope, types: Types) -> Call:
+def _part(part: Part, envelope: Envelope, types: Types) -> Call:  # noqa: C901  # a case a part
     match part:
         case ConstantPart():
             return Call("Constant", (part.name, part.data))
@@ -178,6 +181,11 @@ def _part(part: Part, envelope: Envelope, types: Types) -> Call:
             return Call("Payload", (part.name, part.most))
         case CheckPart():
             return _check(part, envelope)
+        case BlocksPart():
+            kind = Integer(8 * part.check.size, signed=False, chunks=part.check.value.chunks)
+            mask = hexadecimal(part.check.mask, (part.check.algorithm.width + 3) // 4)
+            algorithm = Ref(_algorithms(envelope)[part.check.algorithm])
+            return Call("Blocks", (part.name, algorithm, integer(kind), mask, part.every))
         case _:
             assert_never(part)
 

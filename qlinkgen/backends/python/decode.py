@@ -17,6 +17,7 @@ from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
+    BlocksPart,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -182,7 +183,7 @@ class Decoder:
                 self._sizes += [f"if {number} != {self._length(part)}:", self._bad_layout]
             case LengthPart() | IdPart() | ConstantPart() | CellPart() | EqualPart() | CheckPart():
                 self._row(at).codes.append(f"{part.size}x")
-            case MarkPart() | PayloadPart():
+            case MarkPart() | PayloadPart() | BlocksPart():
                 raise AssertionError(f"{part.name} is not read by a message's class")
             case _:
                 assert_never(part)

@@ -19,6 +19,7 @@ from qlinkgen.plan.expr import Condition, Within
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
+    BlocksPart,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -139,6 +140,8 @@ class Encoder:
                 self._add(f"{part.size}s", literal(part.data))
             case CheckPart():
                 self._add(f"{part.size}x")
+            case BlocksPart():
+                pass  # added later, inside the payload
             case LengthPart():
                 number = self._part_number(part)
                 plain = integers.letter(part.integer, self.place.byteorder)

@@ -17,6 +17,7 @@ from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.framing import (
     AddressPart,
+    BlocksPart,
     ByLength,
     ByMark,
     ByTerminator,
@@ -220,6 +221,14 @@ class PlacedCheck:
 
 
 @dataclass(frozen=True)
+class BlocksView:
+    """The check values of the blocks of a payload."""
+
+    every: int
+    view: CheckView
+
+
+@dataclass(frozen=True)
 class PartsView:
     """Any other delimited frame.
 
@@ -235,6 +244,7 @@ class PartsView:
     filling: Sequence[PlacedCheck]
     blank: int
     seeds: Sequence[str]
+    blocks: BlocksView | None
     address: AddressView | None
     length: LengthView | None
     stuffing: StuffingView | None
@@ -543,6 +553,9 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         title=title,
         checks=checks,
         filling=filling,
+        blocks=BlocksView(envelope.blocks.every, _check_view(envelope.blocks.check, "_BLOCKS"))
+        if envelope.blocks
+        else None,
         blank=last.size if isinstance(last, CheckPart) else 0,
         seeds=sorted({seed_name(seed) for part in envelope.checks for seed in envelope.seeds(part)}),
         address=address,
@@ -643,7 +656,7 @@ def _ended_checks(envelope: Envelope, *, bare: bool) -> Iterator[tuple[str, str]
                         yield "not _allowed(frame, known)", "range"
             case CheckPart():
                 pass
-            case MarkPart() | PayloadPart():
+            case MarkPart() | PayloadPart() | BlocksPart():
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)
@@ -702,7 +715,7 @@ def _head_checks(plan: Plan, envelope: Envelope, *, bare: bool) -> Iterator[Head
                     yield from _bare_checks(envelope, part, f"len(head) >= {end} and", no_frame)
             case CheckPart():
                 pass
-            case MarkPart() | PayloadPart():
+            case MarkPart() | PayloadPart() | BlocksPart():
                 raise AssertionError(f"{part.name} is not a part of a header")
             case _:
                 assert_never(part)

@@ -189,6 +189,7 @@ class Module:
                 typing |= {"Any"}
             case PartsView():
                 used |= {each.view.maker for each in view.checks}
+                used |= {"wrong_check", view.blocks.view.maker} if view.blocks else set()
             case MarkedView():
                 used |= {"Marking", "illegal", "index", "refused"}
             case PacketView():

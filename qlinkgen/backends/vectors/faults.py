@@ -22,6 +22,7 @@ from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
+    BlocksPart,
     CellPart,
     CheckPart,
     ConstantPart,
@@ -180,6 +181,10 @@ class _Frame:
                 yield from ((what, self._made(payload)) for what, payload in self._payloads())
             case CheckPart():
                 yield from ((what, {name: part.check.pack(value)}) for what, value in self._checks(part))
+            case BlocksPart():
+                values = part.values(self._cells[self._envelope.payload.name])
+                if values:
+                    yield "a bit of the last is flipped", {name: values[:-1] + bytes((values[-1] ^ 1,))}
             case _:
                 assert_never(part)
 
@@ -318,8 +323,17 @@ class _Frame:
     def _part_at(self, cells: Mapping[str, bytes], wire: bytes, at: int) -> str:
         """The name of the part that a byte belongs to."""
         at -= sum(place < at for place in self._inserted(wire))
+        blocks = self._envelope.blocks
         for part in self._envelope.parts:
-            at -= len(cells[part.name]) if isinstance(part, PayloadPart) else part.size
+            if isinstance(part, PayloadPart) and blocks:
+                size = len(cells[part.name]) + blocks.added(len(cells[part.name]))
+                if at < size and at % (blocks.every + blocks.check.size) >= min(
+                    blocks.every, size - blocks.check.size
+                ):
+                    return blocks.name
+                at -= size
+            else:
+                at -= len(cells[part.name]) if isinstance(part, PayloadPart) else part.size
             if at < 0:
                 return part.name
         return self._envelope.parts[-1].name

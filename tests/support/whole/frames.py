@@ -174,6 +174,8 @@ class _Parts:
         if self._chance(0.08) and not hunted:
             self._add("gap", {"role": "constant", "value": "55"})
         names["payload"] = self._add("data", {"role": "payload"})
+        if "length" in names and self._chance(0.12) and not hunted:
+            names["blocks"] = self._blocks(names)
         if self._chance(0.08) and not strict:
             self._add("fence", {"role": "constant", "value": "5A"})
         self._checked(names, whole=strict)
@@ -287,13 +289,13 @@ class _Parts:
         """A check value; `whole`: over everything after the first part, and sent whole."""
         if not whole and not self._chance(0.78):
             return
-        rng, covered = self.rng, list(self.parts)
+        rng, covered = self.rng, self._coverable(names)
         algorithm, width = _algorithm(rng)
         if whole:
             covered = covered[1:]
         elif self._chance(0.35):
             covered = [name for name in covered if rng.random() < 0.7] if self._chance(0.7) else []
-            covered = covered or [names["payload"]]
+            covered = covered or ([names["payload"]] if "blocks" not in names else self._coverable(names)[:1])
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
         spec |= _order(rng) | self._start(width)
         if covered == [names["payload"]] and self._chance(0.5):
@@ -321,24 +323,43 @@ class _Parts:
     def _start(self, width: int) -> Doc:
         return {"init": self.rng.randrange(1 << width)} if self._chance(0.15) else {}
 
+    def _coverable(self, names: Doc) -> list[str]:
+        """The parts that a check value can cover."""
+        blocked = (names["payload"], names["blocks"]) if "blocks" in names else ()
+        return [name for name in self.parts if name not in blocked]
+
+    def _blocks(self, names: Doc) -> str:
+        """Check values of the blocks of the payload."""
+        rng, (algorithm, width) = self.rng, _algorithm(self.rng)
+        every = rng.choice(("16 bytes", "1 byte", "3 bytes", "8 bytes", "600 bytes"))
+        spec = {
+            "role": "checksum",
+            "type": _WIDTHS[width],
+            "algorithm": algorithm,
+            "over": [names["payload"]],
+        }
+        return self._add("blocks", {**spec, "every": every, **_order(rng), **self._start(width)})
+
     def _also_checked(self, names: Doc) -> None:
         """One more check value at any place, often in the header and over it alone."""
         rng, others = self.rng, list(self.parts)
         algorithm, width = _algorithm(rng)
         front = others[: others.index(names["payload"])]
-        covered = front if front and self._chance(0.5) else others
+        covered = front if front and self._chance(0.5) else self._coverable(names)
         covered = [name for name in covered if rng.random() < 0.7] or covered[:1]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
         name = self._add("head", self._seeded(spec) | _order(rng) | self._start(width))
         least = 1 if "lead" in names else 0
         place = rng.randint(least, len(front) if self._chance(0.7) else len(others))
+        if "blocks" in names and others[place : place + 1] == [names["blocks"]]:
+            place += 1
         others.insert(place, name)
         ordered = {each: self.parts[each] for each in others}
         self.parts.clear()
         self.parts.update(ordered)
         for each, part in self.parts.items():
             # No two check values cover each other.
-            if "over" in part and each not in self._under(name) and self._chance(0.6):
+            if "over" in part and "every" not in part and each not in self._under(name) and self._chance(0.6):
                 kept = [other for other in others if other in (name, *part["over"])]
                 part["over"] = [*kept, *(each for each in part["over"] if each not in others)]
 
@@ -351,7 +372,8 @@ class _Parts:
         counted = [
             name
             for name in self.parts
-            if every or name == names["payload"] or self.rng.random() < (0.3 if hunted else 0.5)
+            if name != names.get("blocks")
+            and (every or name == names["payload"] or self.rng.random() < (0.3 if hunted else 0.5))
         ]
         self.parts[names["length"]]["counts"] = counted
         if hunted:
@@ -359,7 +381,7 @@ class _Parts:
 
     def _stuffing(self, names: Doc, lead: str, *, hunted: bool, strict: bool) -> Doc:
         rng = self.rng
-        if not hunted and not self._chance(0.35 if lead else 0.05):
+        if "blocks" in names or (not hunted and not self._chance(0.35 if lead else 0.05)):
             return {}
         first = lead.split()
         if hunted or self._chance(0.4):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -116,6 +117,8 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
     pieces = byte_pieces(int(spec["type"][1:]) // 8, spec.get("byteorder", order))
     if "sent" in spec:
         pieces = tuple((first, last + 1 - first) for first, last in map(whole_span, spec["sent"]))
+    if "every" in spec:
+        return Part(name, "blocks", 0, spec, pieces=pieces)
     bits = tuple((role, shift, size, inner) for _, role, shift, size, inner in bits_of(spec))
     if spec["role"] == "constant" and len(_several(spec["const"])) == 1:
         data = put(pieces, _several(spec["const"])[0])
@@ -150,6 +153,7 @@ class Frame:
         #: Bytes of attributes of messages, by number of the message.
         self.seeds: dict[int, Mapping[str, bytes]] = {}
         self.checks = [part for part in self.parts if part.role == "checksum"]
+        self.blocks: Part | None = next((part for part in self.parts if part.role == "blocks"), None)
         self.payload_at = self.parts.index(self.by_role["payload"])
         self.least, self.most = whole_span(self.by_role["payload"].spec["size"])
         self.overhead = sum(part.size for part in self.parts)
@@ -169,7 +173,7 @@ class Frame:
     def longest(self) -> int:
         """Number of bytes after which those outside of frames are reported."""
         if self.terminator is None:
-            return self.overhead + self.most_sent
+            return self.overhead + self.most_sent + self.added(self.most_sent)
         inner = outer = 0
         for part in self.parts:
             size = self.most if part.role == "payload" else part.size
@@ -315,7 +319,32 @@ class Frame:
         for _ in self.checks:  # so often that those which cover others become right
             for check in self.checks:
                 cut[check.name] = put(check.pieces, self.check_value(check, cut))
-        return self._stuffed(cut)
+        return self._stuffed(cut | self._blocked(payload))
+
+    def _blocked(self, payload: bytes) -> dict[str, bytes]:
+        """The payload with the check values of its blocks."""
+        if self.blocks is None:
+            return {}
+        sent = zip(self.blocks_of(payload), self.block_values(payload), strict=True)
+        return {self.by_role["payload"].name: b"".join(itertools.chain(*sent)), self.blocks.name: b""}
+
+    def blocks_of(self, payload: bytes) -> list[bytes]:
+        """The blocks of a payload that have check values of their own."""
+        every = int(self.blocks.spec["every"].split()[0]) if self.blocks else len(payload) + 1
+        return [payload[at : at + every] for at in range(0, len(payload), every)]
+
+    def block_values(self, payload: bytes) -> list[bytes]:
+        """The check values of blocks."""
+        assert self.blocks
+        spec, pieces = self.blocks.spec, self.blocks.pieces
+        return [
+            put(pieces, checks.compute(spec["algorithm"], block, spec.get("init")))
+            for block in self.blocks_of(payload)
+        ]
+
+    def added(self, payload: int) -> int:
+        """Bytes of the check values of blocks."""
+        return len(b"".join(self.block_values(bytes(payload)))) if self.blocks else 0
 
     def _id_pieces(self, number: int) -> dict[tuple[str, int], int]:
         """The pieces of a message number by part and lowest bit."""
@@ -393,6 +422,10 @@ class Frame:
     def check_fails(self, cut: Mapping[str, bytes], seeds: Mapping[str, bytes] | None = None) -> bool:
         """Whether one of the check values is wrong that need only the parts found, and the seeds."""
         cut = {**cut, **(seeds or {})}
+        if self.blocks and self.blocks.name in cut:
+            values = b"".join(self.block_values(cut[self.by_role["payload"].name]))
+            if cut[self.blocks.name] != values:
+                return True
         checks = [each for each in self.checks if {each.name, *each.spec["over"]} <= cut.keys()]
         return any(cut[each.name] != put(each.pieces, self.check_value(each, cut)) for each in checks)
 
@@ -525,8 +558,11 @@ class Splitter:
             raise Refused("crc", cursor.at)
         payload = frame.by_role["payload"]
         cut[payload.name] = self._payload(payload, cursor, cut)
+        if frame.blocks:
+            self._unblock(frame.blocks, payload, cut)
         for part in frame.parts[frame.payload_at + 1 :]:
-            cut[part.name] = cursor.run(part, part.size)
+            if part is not frame.blocks:
+                cut[part.name] = cursor.run(part, part.size)
         if frame.bad_constant(cut):
             raise Refused("frame", cursor.at)
         return Cut(cut, cursor.at, cursor.pending)
@@ -547,6 +583,16 @@ class Splitter:
             else:
                 self._judge(part, cursor, cut)
         return found
+
+    def _unblock(self, blocks: Part, payload: Part, cut: dict[str, bytes]) -> None:
+        """Take the check values of blocks out of a payload."""
+        rest, size, values = cut[payload.name], len(blocks.pieces), b""
+        every, plain = int(blocks.spec["every"].split()[0]), b""
+        while rest:
+            block = rest[: min(every, len(rest) - size)]
+            plain, values = plain + block, values + rest[len(block) : len(block) + size]
+            rest = rest[len(block) + size :]
+        cut |= {payload.name: plain, blocks.name: values}
 
     def _take(self, part: Part, cursor: Cursor, cut: dict[str, bytes]) -> None:
         data = b""
@@ -578,7 +624,8 @@ class Splitter:
         frame = self._frame
         announced = frame.number("length", cut)
         if announced is not None:
-            return cursor.run(part, announced - frame.bias)
+            size = announced - frame.bias
+            return cursor.run(part, size + frame.added(size))
         message = self._known.get(frame.number("message", cut) or 0)
         if message is None:
             raise Refused("unknown", cursor.at)

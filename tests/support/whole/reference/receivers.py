@@ -246,7 +246,9 @@ class Searcher(Receiver):
     def _attempt(self) -> tuple[Event, int, bool]:
         cut = self.splitter.split(self.buffer)
         event = self._event(cut, self._plain(cut))
-        unproven = "checksum" not in self.frame.by_role or (self.frame.seeded and event.kind == "unknown")
+        unproven = not (self.frame.checks or self.frame.blocks) or (
+            self.frame.seeded and event.kind == "unknown"
+        )
         if event.kind == "crc" or (event.kind != "message" and unproven):
             # It may not be a frame at all, so another one may begin after its first byte.
             raise Refused(event.kind, cut.size)
