@@ -82,8 +82,8 @@ def finding(found: Dissection, fault: Fault, start: int = 0) -> Words:  # noqa: 
             return f"no {of.data.hex(' ')} within {most} bytes, the longest frame", _LOST
         case Rule.COUNTED:
             assert isinstance(of, LengthPart)
-            size = len(found.cells[found.plan.frame.envelope.payload.name].data) + of.bias
-            rule = f"{of.name} is {fault.seen}, but it counts {counted(size)} up to the terminator"
+            size = of.number(len(found.cells[found.plan.frame.envelope.payload.name].data))
+            rule = f"{of.name} is {fault.seen}, but up to the terminator it is {size}"
             return rule, "bytes were lost or added"
         case Rule.LAST:
             cause = (
@@ -215,10 +215,9 @@ def _size(found: Dissection, fault: Fault) -> Words:
         return rule, "a count was corrupted, or bytes were lost or added"
     cause = f"{lost}, or the other side has another revision of the protocol"
     if envelope.length and payload.fixed:
-        bias = envelope.length.bias
-        cause = (
-            f"{message.name} has {envelope.length.name} {payload.most + bias}, this is {size + bias}; {cause}"
-        )
+        length = envelope.length
+        right, seen = length.number(payload.most), length.number(size)
+        cause = f"{message.name} has {length.name} {right}, this is {seen}; {cause}"
     return f"payload of {counted(size)}; {message.name} has {span_text(payload.least, payload.most)}", cause
 
 

@@ -122,6 +122,9 @@ class Part:
     derivation: Derivation | None = None
     #: Names of the parts that a length counts.
     counts: tuple[str, ...] = ()
+    #: Bytes of one step of a length, and bytes at raw 0.
+    scale: int = 1
+    offset: int = 0
     #: Payload only: minimum and maximum size.
     min_size: int = 0
     max_size: int = 0
@@ -203,9 +206,17 @@ class DelimitedFrame:
 
     @cached_property
     def length_bias(self) -> int:
-        """Difference between the length field and the payload size."""
+        """What a length counts in addition to the payload: other parts, less its offset."""
         length = self.part("length")
-        return sum(part.size for part in self.parts if length and part.name in length.counts)
+        if length is None:
+            return 0
+        return sum(part.size for part in self.parts if part.name in length.counts) - length.offset
+
+    @cached_property
+    def length_scale(self) -> int:
+        """Bytes of one step of the length."""
+        length = self.part("length")
+        return length.scale if length else 1
 
     @cached_property
     def id_bits(self) -> tuple[PartBits, ...]:

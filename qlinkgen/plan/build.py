@@ -96,7 +96,7 @@ def _stuffable(part: Part, message: Message, stuffing: FrameStuffing) -> int:
         case ConstantPart():
             return part.size
         case LengthPart(size=1):
-            return int(message.min_size + part.bias <= mark <= message.max_size + part.bias)
+            return int(part.number(message.min_size) <= mark <= part.number(message.max_size))
         case IdPart(size=1):
             return int(message.id == mark)
         case AddressPart(size=1):

@@ -300,7 +300,7 @@ def _number(part: Numeric, given: Given) -> int:
     """The integer of a part."""
     match part:
         case LengthPart():
-            return given.size + part.bias
+            return part.number(given.size)
         case IdPart():
             return given.number
         case AddressPart():

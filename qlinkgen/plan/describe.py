@@ -340,9 +340,7 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
         case ConstantPart():
             return part.data.hex(" ").upper()
         case LengthPart():
-            return (
-                f"payload bytes{f' + {part.bias}' if part.bias else ''}, {span_text(part.least, part.most)}"
-            )
+            return f"{_counted('payload bytes', part.bias, part.scale)}, {span_text(part.least, part.most)}"
         case IdPart():
             return "message id"
         case AddressPart():
@@ -384,6 +382,11 @@ def _slot_text(part: CellPart, slot: Slot) -> str:
             assert_never(slot)
 
 
+def _counted(what: str, bias: int, scale: int = 1) -> str:
+    text = f"{what} {'+' if bias > 0 else '-'} {abs(bias)}" if bias else what
+    return f"({text}) / {scale}" if scale > 1 else text
+
+
 def check_text(check: Check, frame: FramePlan) -> str:
     """Algorithm and coverage."""
     if check.chained:
@@ -413,8 +416,8 @@ def end_text(frame: FramePlan) -> str:
     end = frame.end
     match end:
         case ByLength():
-            bias = f" - {end.part.bias}" if end.part.bias else ""
-            return f"the payload has {end.part.name}{bias} bytes"
+            steps = f" * {end.part.scale}" if end.part.scale > 1 else ""
+            return f"the payload has {_counted(f'{end.part.name}{steps}', -end.part.bias)} bytes"
         case ByMessage():
             return "the size follows from the message and the counts in its payload"
         case ByTerminator():

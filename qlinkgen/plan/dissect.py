@@ -228,7 +228,7 @@ class _Walk:
             case ByLength():
                 length = self._number_in(end.part, end.part.integer)
                 fits = length is not None and end.part.least <= length <= end.part.most
-                size = length - end.part.bias if fits and length is not None else self._left() - trailer
+                size = end.part.payload(length) if fits and length is not None else self._left() - trailer
                 if self.envelope.blocks:
                     self._take_blocks(self.envelope.blocks, max(0, size), fits=fits)
                     return
@@ -677,7 +677,7 @@ class _EndedWalk(_Walk):
 
     def _length(self, part: LengthPart) -> None:
         number, size = self._number_in(part, part.integer), len(self._found(self.envelope.payload).data)
-        wrong = number is not None and number != size + part.bias and not self._short(part)
+        wrong = number is not None and part.payload(number) != size and not self._short(part)
         if wrong:
             self._fault("length", Rule.COUNTED, self._found(part).places[0], part, number)
         self._span(part, number, "length" if wrong else "")

@@ -123,7 +123,7 @@ class EndedReader(FrameReader):
                 raise BadFrame("frame", taken.end)
             if isinstance(part, LengthPart):
                 number = part.integer.unpack(cells[part.name])
-                if number != len(taken.payload) + part.bias:
+                if part.payload(number) != len(taken.payload):
                     raise BadFrame("length", taken.end)
             self._identify(taken)
             if self._bare and part in self._envelope.front and self._envelope.identifies(part):

@@ -46,13 +46,22 @@ class ConstantPart:
 
 @dataclass(frozen=True, slots=True)
 class LengthPart:
-    """The number of payload bytes as sent, plus ``bias``; ``least`` to ``most``."""
+    """The number of payload bytes as sent, plus ``bias``, in steps of ``scale``; ``least`` to ``most``."""
 
     name: str
     integer: Integer
     bias: int
     least: int
     most: int
+    scale: int = 1
+
+    def number(self, payload: int) -> int:
+        """The length for a size of the payload."""
+        return (payload + self.bias) // self.scale
+
+    def payload(self, number: int) -> int:
+        """The size of the payload for a length."""
+        return number * self.scale - self.bias
 
     @property
     def size(self) -> int:
@@ -784,8 +793,8 @@ def _integer_part(frame: DelimitedFrame, part: StatedPart, transparency: Transpa
     if part.bits:
         return CellPart(part.name, integer, tuple(map(_slot, part.bits)))
     bias, payload = frame.length_bias, frame.payload
-    most = min(integer.maximum, bias + transparency.most_sent(payload.max_size))
-    return LengthPart(part.name, integer, bias, bias + payload.min_size, most)
+    most = min(integer.maximum, (bias + transparency.most_sent(payload.max_size)) // part.scale)
+    return LengthPart(part.name, integer, bias, -(-(bias + payload.min_size) // part.scale), most, part.scale)
 
 
 def _slot(bits: PartBits) -> Slot:
@@ -826,7 +835,7 @@ def _unique(envelope: Envelope, stuffing: FrameStuffing) -> bool:
         return False
     if (stuffing.front, stuffing.back) != (len(envelope.preamble), 0):
         return False
-    if length is None or envelope.parts[1] is not length or length.size != 1:
+    if length is None or envelope.parts[1] is not length or length.size != 1 or length.scale > 1:
         return False
     if length.least <= rule.after[0] <= length.most or envelope.checks != envelope.parts[-1:]:
         return False

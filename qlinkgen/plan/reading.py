@@ -282,7 +282,7 @@ class FrameReader:
             case ByLength() if self._envelope.blocks:
                 sent = self._blocks(cursor, self._envelope.blocks, taken, length - end.part.bias)
             case ByLength():
-                sent = self._take(cursor, part, length - end.part.bias)
+                sent = self._take(cursor, part, end.part.payload(length))
             case ByMessage():
                 sent = self._measured(cursor, part, taken)
             case ByMark() | ByTerminator():

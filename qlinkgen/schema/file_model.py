@@ -169,6 +169,14 @@ class FieldSpec(Fact):
     )
 
 
+class _OneOrMore:
+    """Adds the short form of a list to the JSON Schema."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [{"type": "string"}, handler(core)]}
+
+
 PartRole = Literal[
     "constant", "length", "message", "address", "direction", "payload", "checksum", "terminator"
 ]
@@ -187,6 +195,9 @@ _TELLING: Final[Mapping[str, PartKind]] = {
 #: Bytes as a short form; names are in lower case.
 _HEX_PAIRS = re.compile(r"\s*(?:[0-9A-F]{2}\s*)+\Z", re.ASCII)
 
+PartNames = Annotated[
+    list[str], BeforeValidator(lambda value: [value] if isinstance(value, str) else value), _OneOrMore
+]
 Directions = Annotated[dict[Literal["request", "response"], Id], Field(min_length=2)]
 ShortField = Annotated[FieldSpec, ShortForm("type", "string")]
 Fields = dict[str, ShortField]
@@ -265,14 +276,18 @@ class PartSpec(Fact):
     bits: dict[str, Annotated[PartBitSpec, ShortForm("at", "integer", "string")]] | None = Field(
         default=None, description="Roles of the bits of the integer"
     )
-    scale: Rational | None = Field(default=None, description="Of a value: that of one step in the unit")
-    offset: Rational | None = Field(default=None, description="Of a value: that of raw 0 in the unit")
+    scale: Rational | None = Field(
+        default=None, description="Of a value: that of one step in the unit; of a length: bytes of one step"
+    )
+    offset: Rational | None = Field(
+        default=None, description="Of a value: that of raw 0 in the unit; of a length: bytes of raw 0"
+    )
     unit: Text | None = Field(default=None, description="Unit of a value")
     range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
     raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
     default: ScalarValue | None = Field(default=None, description="Default of a value, in the unit")
     shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
-    counts: list[str] | None = Field(default=None, description="Parts whose bytes a length counts")
+    counts: PartNames | None = Field(default=None, description="Part, or parts, whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     algorithm: AnyAlgorithm | None = Field(
         default=None, description="Name of a CRC in the catalogue or of a sum, or the parameters of a CRC"

@@ -226,9 +226,11 @@ class FrameBuilder:
             needs = (place, (*path, frame.payload.name))
             self._report.error("bad-frame", place, what, hint, of_key=True, needs=needs)
             return
+        self._check_scale(frame, length, path)
         longest = frame.length_bias + frame.payload.max_size
         if frame.stuffing and frame.stuffing.before_checksum:
             longest += frame.payload.max_size // len(frame.stuffing.after)
+        longest = -(-longest // length.scale)
         if longest > length.scalar.maximum:
             what = f"{length.name} would be {longest} for the longest payload"
             most = f"{length.scalar.bits} bits hold {length.scalar.maximum}"
@@ -236,6 +238,19 @@ class FrameBuilder:
             self._report.error(
                 "length-does-not-fit", (*path, length.name), what, hint, of_key=True, needs=(path,)
             )
+
+    def _check_scale(self, frame: DelimitedFrame, length: Part, path: Path) -> None:
+        """Check that the shortest frame has a length, and that no stuffed bytes are counted in steps."""
+        if (shortest := frame.length_bias + frame.payload.min_size) < 0:
+            what = f"{length.name} would be {shortest} for the shortest payload"
+            hint = f"use a smaller offset, or payloads of at least {frame.payload.min_size - shortest} bytes"
+            self._report.error(
+                "length-does-not-fit", (*path, length.name, "offset"), what, hint, needs=(path,)
+            )
+        if length.scale > 1 and frame.stuffing and frame.stuffing.before_checksum:
+            what = "stuffed bytes are not counted in steps"
+            hint = "remove scale, or stuff the whole frame"
+            self._report.error("bad-frame", (*path, length.name, "scale"), what, hint, needs=(path,))
 
     # Header and end marked by a bit
 

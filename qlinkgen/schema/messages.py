@@ -177,6 +177,7 @@ class MessageBuilder:
                 self._check_marker(field, self._frame.marker, path)
             return
         self._check_end(message, path)
+        self._check_steps(message, path)
         if isinstance(self._frame, PacketFrame):
             self._check_words(message, self._frame.word_size, path)
             if message.direction == "response" and not message.max_size and not self._frame.checksum:
@@ -219,6 +220,25 @@ class MessageBuilder:
         if message.empty_is_default and message.max_size:
             what = f"an empty {message.name} cannot be distinguished from a full one: the frame has no length"
             self._error("no-frame-end", (*path[:-1], "empty_request"), what, "remove empty_request")
+
+    def _check_steps(self, message: Message, path: Path) -> None:
+        """Check that a length in steps of several bytes can state the size of the message."""
+        if not isinstance(self._frame, DelimitedFrame) or (step := self._frame.length_scale) == 1:
+            return
+        bias, hint = self._frame.length_bias, "add a reserved field, or reduce the scale of the length"
+        sizes = {message.min_size, 0} if message.empty_is_default else {message.min_size}
+        if any((size + bias) % step for size in sizes):
+            what = (
+                f"{message.name} has {message.min_size} bytes, which a length in steps of {step} cannot state"
+            )
+            self._error("bad-frame", path, what, hint)
+        for field in message.variable:
+            assert not isinstance(field.type, Scalar | Bits | Record)
+            if field.type.size_of(1) % step:
+                what = (
+                    f"the size of {field.name} varies by less than the {step} bytes of a step of the length"
+                )
+                self._error("bad-frame", (*path, field.name), what, "use items of as many bytes")
 
     def _check_words(self, message: Message, word: int, path: Path) -> None:
         for field in message.fields:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fractions import Fraction
 
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, Derivation, Part, Role
@@ -26,7 +27,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "derived": ("type", "byteorder", "equals"),
     "direction": ("type", "byteorder", "values"),
     "value": ("type", "byteorder", *_VALUE_KEYS),
-    "length": ("type", "byteorder", "counts"),
+    "length": ("type", "byteorder", "counts", "scale", "offset"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
     "payload": ("size",),
@@ -140,9 +141,22 @@ class PartBuilder:
             scalar=scalar,
             checksum=checksum,
             counts=tuple(spec.counts or ()),
+            scale=self._whole(spec, "scale", 1, path) if role == "length" else 1,
+            offset=self._whole(spec, "offset", 0, path) if role == "length" else 0,
             min_size=size[0],
             max_size=size[1],
         )
+
+    def _whole(self, spec: PartSpec, key: str, least: int, path: Path) -> int:
+        """The scale or the offset of a length."""
+        given: Fraction | None = getattr(spec, key)
+        if given is None:
+            return least
+        if given.denominator != 1 or given < least:
+            what = f"{given} is not a number of bytes"
+            self._report.error("bad-value", (*path, key), what, f"use a whole number from {least}")
+            return least
+        return int(given)
 
     def _value(self, name: str, spec: PartSpec, path: Path) -> Part:
         """A part with a value of every frame, or several in its bits."""

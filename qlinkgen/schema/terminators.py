@@ -80,7 +80,8 @@ def _bytes_of(part: Part, frame: DelimitedFrame, messages: Sequence[Message]) ->
             return _joined(frozenset(range(chunk.mask + 1)) for chunk in part.checksum.chunks)
         case "length":
             assert part.scalar is not None
-            ranges = [(frame.length_bias + low, frame.length_bias + high) for low, high in _sizes(messages)]
+            bias, step = frame.length_bias, frame.length_scale
+            ranges = [((bias + low) // step, (bias + high) // step) for low, high in _sizes(messages)]
             return _joined(
                 values_of(chunk, low, high) for low, high in ranges for chunk in part.scalar.chunks
             )
@@ -123,7 +124,7 @@ def _numbers(bits: PartBits, chunk: Chunk, messages: Sequence[Message]) -> Itera
     # Of each range, a number for every value of the bits in this byte.
     step = 1 << max(0, chunk.shift - bits.shift)
     return {
-        min(number, high)
+        min(number, high) & (1 << bits.bits) - 1
         for low, high in ranges
         for number in range(low, min(high, low + 0x100 * step) + step, step)
     }

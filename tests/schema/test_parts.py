@@ -93,11 +93,14 @@ frame:
     data: {{role: payload, size: 0..16}}
 {after}
 bus: {bus}
-commands: {{go: {{{id}request: {{}}, response: {{value: u8}}, repeat: safe{more}}}}}
+commands: {{go: {{{id}request: {request}, response: {response}, repeat: safe{more}}}}}
 """
+USUAL_FIELDS = {"request": "{}", "response": "{value: u8}"}
 
 
-def wires(*before: str, after: tuple[str, ...] = (), id_: str = "id: 3", address: bool = False) -> list[str]:
+def wires(
+    *before: str, after: tuple[str, ...] = (), id_: str = "id: 3", address: bool = False, **fields: str
+) -> list[str]:
     """The frames of a request, and of a response with the value 9, from and to node 5."""
     text = BITS.format(
         order="little",
@@ -106,6 +109,7 @@ def wires(*before: str, after: tuple[str, ...] = (), id_: str = "id: 3", address
         bus="{kind: master_slave, nodes: 1..7}" if address else "{kind: master_slave}",
         id=f"{id_}, " if id_ else "",
         more=", addressing: node" if address else "",
+        **{**USUAL_FIELDS, **fields},
     )
     protocol, faults = loads(text, "sample")
     assert protocol is not None, faults
@@ -154,6 +158,16 @@ def test_derived_numbers() -> None:
     assert wires(code, after=("more: {type: u8, equals: code - 4}",)) == ["03 ff", "03 09 ff"]
 
 
+def test_length_with_an_offset_and_in_steps() -> None:
+    start = ("start: FE", "code: {role: message, type: u8}")
+    assert wires(*start, "size: {type: u8, counts: data}") == ["fe 03 00", "fe 03 01 09"]
+    more = "size: {type: u8, counts: [code, data], offset: 1}"
+    assert wires(*start, more) == ["fe 03 00", "fe 03 01 09"]
+    words = ("size: {type: u8, counts: [code, data], scale: 2}", "code: {role: message, type: u8}")
+    request, response = "{gap: {type: u8, const: 7}}", '{value: u8, more: "u16[0..2]"}'
+    assert wires(*words, request=request, response=response) == ["01 03 07", "01 03 09"]
+
+
 def test_id_and_address_after_the_payload() -> None:
     after = ("code: {role: message, type: u8}", "node: {role: address, type: u40}")
     expected = ["00 03 05 00 00 00 00", "01 09 03 05 00 00 00 00"]
@@ -172,6 +186,7 @@ def test_each_of_several_constants_is_accepted(wire: str, kind: str) -> None:
         bus="{kind: master_slave}",
         id="",
         more="",
+        **USUAL_FIELDS,
     )
     protocol, _ = loads(text, "sample")
     assert protocol is not None
@@ -229,6 +244,7 @@ def test_wrong_pieces(part: str, what: str) -> None:
         bus="{kind: master_slave}",
         id="id: 3, ",
         more="",
+        **USUAL_FIELDS,
     )
     protocol, faults = loads(text, "sample")
     assert protocol is None

@@ -186,7 +186,9 @@ class PartWriter:
             case ConstantPart():
                 return [f"{place}[{at + index}] = {in_hex(byte)};" for index, byte in enumerate(part.data)]
             case LengthPart():
-                total = f"({unsigned_type(part.integer.bits)})({sent} + {part.bias}U)"
+                counted = f"{sent} {_signed(part.bias)}"
+                counted = f"({counted}) / {part.scale}U" if part.scale > 1 else counted
+                total = f"({unsigned_type(part.integer.bits)})({counted})"
                 return [self.layouts.put(part.integer, place, str(at), total)]
             case IdPart():
                 return [self.layouts.put(part.integer, place, str(at), self.sender.id)]
@@ -270,7 +272,10 @@ class PartWriter:
 
     def payload_size(self, length: LengthPart) -> str:
         """The payload size given by a length."""
-        return f"{self.get(length)} - {length.bias}U" if length.bias else self.get(length)
+        found = self.get(length)
+        if length.scale > 1:
+            found = f"((size_t){found} * {length.scale}U)"
+        return f"{found} {_signed(-length.bias)}" if length.bias else found
 
     def head_checks(self, counted: str, directed: str, *, all_there: bool) -> Iterator[str]:
         """Statements that check a header, part by part in wire order.
@@ -318,8 +323,9 @@ class PartWriter:
                     for at, byte in enumerate(part.data, self._at(part)):
                         yield from refusal(f"body[{at}] != {in_hex(byte)}", f"{upper}_ERROR_FRAME")
                 case LengthPart():
-                    counted = f"(payload + {part.bias}U)" if part.bias else "payload"
-                    yield from refusal(f"{self.get(part)} != {counted}", f"{upper}_ERROR_LENGTH")
+                    counted = f"(payload {_signed(part.bias)})" if part.bias else "payload"
+                    seen = f"((size_t){self.get(part)} * {part.scale}U)" if part.scale > 1 else self.get(part)
+                    yield from refusal(f"{seen} != {counted}", f"{upper}_ERROR_LENGTH")
                 case IdPart() | AddressPart() | CellPart() | EqualPart():
                     for test in self._wrong(part):
                         yield from refusal(test, f"{upper}_ERROR_FRAME")
@@ -574,6 +580,11 @@ def derived(part: EqualPart, other: str) -> str:
         return value
     added = f"{value} + {unsigned(part.added & mask, part.integer.bits)}"
     return f"({kind})(({added}) & {every})"
+
+
+def _signed(number: int) -> str:
+    """A number that is added, with its sign."""
+    return f"{'-' if number < 0 else '+'} {abs(number)}U"
 
 
 def _shifted(value: str, shift: int, kind: str) -> str:

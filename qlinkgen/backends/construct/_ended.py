@@ -213,7 +213,7 @@ class EndedFrame(Frame):
             self._refuse(part, found)
             if (
                 isinstance(part, Length)
-                and part.integer.parse(cell) != len(payload) + part.bias
+                and part.integer.parse(cell) * part.scale != len(payload) + part.bias
             ):
                 raise FrameError(
                     "length", f"{part.name} does not count {len(payload)} bytes"

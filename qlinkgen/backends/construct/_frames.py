@@ -122,13 +122,17 @@ class Constant(NamedTuple):
 
 
 class Length(NamedTuple):
-    """The size of the payload as sent, plus ``bias``; from ``least`` to ``most``."""
+    """The size of the payload as sent, plus ``bias``, in steps of ``scale`` bytes.
+
+    It is from ``least`` to ``most``.
+    """
 
     name: str
     integer: Construct
     bias: int
     least: int
     most: int
+    scale: int = 1
 
 
 class Id(NamedTuple):
@@ -460,7 +464,7 @@ class Frame(Construct):
             case Constant():
                 return part.data
             case Length():
-                return bytes(part.integer.build(len(payload) + part.bias))
+                return bytes(part.integer.build((len(payload) + part.bias) // part.scale))
             case Id():
                 return bytes(part.integer.build(number))
             case Address():
@@ -729,7 +733,7 @@ class DelimitedFrame(Frame):
                 raise FrameError(
                     "length", f"{part.name} is {number}, not {part.least}..{part.most}"
                 )
-            numbers[Length] = number - part.bias
+            numbers[Length] = number * part.scale - part.bias
         self._refuse(part, cells)
         known = len(numbers)
         self._identify(cells, numbers)

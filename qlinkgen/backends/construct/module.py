@@ -159,7 +159,8 @@ def _part(part: Part, envelope: Envelope, types: Types) -> Call:  # noqa: C901  
             return Call("Constant", (part.name, part.data))
         case LengthPart():
             bounds = (("bias", part.bias), ("least", part.least), ("most", part.most))
-            return Call("Length", (part.name, integer(part.integer)), bounds)
+            scale = (("scale", part.scale),) if part.scale > 1 else ()
+            return Call("Length", (part.name, integer(part.integer)), (*bounds, *scale))
         case IdPart():
             return Call("Id", (part.name, integer(part.integer)))
         case AddressPart():

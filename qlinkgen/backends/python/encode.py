@@ -169,7 +169,8 @@ class Encoder:
         """The integer of a part."""
         match part:
             case LengthPart():
-                return integers.size_text(self.message.payload.size + part.bias)
+                size = integers.size_text(self.message.payload.size + part.bias)
+                return f"({size}) // {part.scale}" if part.scale > 1 else size
             case IdPart():
                 return self.number
             case AddressPart():

@@ -146,6 +146,7 @@ class LengthView:
     end: int
     value: str
     bytes: str
+    scale: int
 
 
 @dataclass(frozen=True)
@@ -646,7 +647,8 @@ def _ended_checks(envelope: Envelope, *, bare: bool) -> Iterator[tuple[str, str]
                 yield f"frame[{start}:{start + part.size}] != {literal(part.data)}", "frame"
             case LengthPart():
                 counted = f"len(frame) - {envelope.overhead - part.bias}"
-                yield f"{pieces.read(envelope, part, 'frame')} != {counted}", "length"
+                seen = pieces.read(envelope, part, "frame")
+                yield f"{seen}{f' * {part.scale}' if part.scale > 1 else ''} != {counted}", "length"
             case IdPart() | AddressPart() | CellPart() | EqualPart():
                 yield from ((test, "frame") for test in pieces.wrong(envelope, part, "frame"))
                 if bare and envelope.identifies(part) and envelope.known_at(part, envelope.id):
@@ -669,12 +671,13 @@ def _length_view(plan: Plan, envelope: Envelope) -> LengthView | None:
     start = envelope.offset(part)
     return LengthView(
         bias=part.bias,
-        least=part.least,
-        most=part.most,
+        least=part.least * part.scale,
+        most=part.most * part.scale,
         start=start,
         end=start + part.size,
-        value=pieces.read(envelope, part, "head"),
+        value=pieces.read(envelope, part, "head") + (f" * {part.scale}" if part.scale > 1 else ""),
         bytes=integers.to_bytes(part.integer, "number"),
+        scale=part.scale,
     )
 
 

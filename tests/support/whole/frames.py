@@ -375,7 +375,13 @@ class _Parts:
             if name != names.get("blocks")
             and (every or name == names["payload"] or self.rng.random() < (0.3 if hunted else 0.5))
         ]
-        self.parts[names["length"]]["counts"] = counted
+        length = self.parts[names["length"]]
+        length["counts"] = counted[0] if len(counted) == 1 and self._chance(0.5) else counted
+        others = sum(_size(self.parts[name]) for name in counted)
+        if others and self._chance(0.15):
+            length["offset"] = self.rng.randint(1, others)
+        elif self._chance(0.05) and not hunted:
+            length["scale"] = 2
         if hunted:
             self.parts[names["length"]]["type"] = "u8"
 
@@ -426,8 +432,9 @@ class _Parts:
     def _longest(self, names: Doc, stuffing: Doc, most: int, *, below: bool) -> int:
         """The maximum payload for the length; `below`: with lengths below the stuffed byte."""
         length = parts_length = self.parts[names["length"]]
-        bias = sum(_size(self.parts[name]) for name in length["counts"])
-        top = (1 << int(parts_length["type"][1:])) - 1 - bias
+        counts = length["counts"] if isinstance(length["counts"], list) else [length["counts"]]
+        bias = sum(_size(self.parts[name]) for name in counts) - int(length.get("offset", 0))
+        top: int = (1 << int(parts_length["type"][1:])) - 1 - bias
         if stuffing.get("checksum") == "after":
             top = top * len(stuffing["after"].split()) // (len(stuffing["after"].split()) + 1)
         # Lengths below, around and above the stuffed byte.

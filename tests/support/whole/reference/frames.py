@@ -159,7 +159,12 @@ class Frame:
         self.overhead = sum(part.size for part in self.parts)
         self.stuffing = _stuffing(frame.get("stuffing"))
         length = self.by_role.get("length")
-        self.bias = sum(part.size for part in self.parts if length and part.name in length.spec["counts"])
+        counted = length.spec["counts"] if length else []
+        counted = [counted] if isinstance(counted, str) else counted
+        self.bias = sum(part.size for part in self.parts if part.name in counted)
+        self.bias -= length.spec.get("offset", 0) if length else 0
+        #: Bytes of one step of the length.
+        self.step = length.spec.get("scale", 1) if length else 1
         #: No leading constant: a candidate begins with a known message and a legal address.
         self.bare = self.parts[0].role != "constant"
         most, stuffing = self.most, self.stuffing
@@ -253,6 +258,8 @@ class Frame:
             or stuffing.exempt != (first.name,)
         ):
             return False
+        if self.step > 1:
+            return False
         lengths = range(self.bias + self.least, self.bias + self.most + 1)
         roles = [part.role for part in self.parts]
         if roles[1] != "length" or self.parts[1].size != 1 or stuffing.after[0] in lengths:
@@ -302,7 +309,7 @@ class Frame:
         rest = self._id_pieces(number)
         for part in self.parts:
             if part.role == "length":
-                cut[part.name] = put(part.pieces, self.bias + len(payload))
+                cut[part.name] = put(part.pieces, (self.bias + len(payload)) // self.step)
             elif part.role == "bits":
                 raw = _bits_of_values(part, given)
                 for role, shift, _, spec in part.bits:
@@ -445,7 +452,7 @@ class Frame:
         """The length, message number or address; None if the frame has none, or bytes are missing."""
         if role == "length":
             part = self.by_role.get(role)
-            return get(part.pieces, cut[part.name]) if part and part.name in cut else None
+            return self.step * get(part.pieces, cut[part.name]) if part and part.name in cut else None
         found = (
             self.id_bits()
             if role == "message"
