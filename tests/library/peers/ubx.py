@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pyubx2 import GET, POLL, SETPOLL, UBXMessage, UBXReader
+from pyubx2 import GET, POLL, SET, SETPOLL, UBXMessage, UBXReader
 
 from qlinkgen.model.message import Direction
 from tests.library.protocols import Record, pairs
@@ -17,8 +17,13 @@ _ENUMS = {
 }
 #: Message to its name in the library, and each field to its attribute.
 _KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
-    "poll_rate.request": ("CFG-RATE", {}),
-    "poll_rate.response": ("CFG-RATE", pairs("period=measRate ratio=navRate reference=timeRef")),
+    "set_message_rate.request": (
+        "CFG-MSG",
+        pairs(
+            "class=msgClass number=msgID i2c=rateDDC uart1=rateUART1 uart2=rateUART2 usb=rateUSB spi=rateSPI"
+        ),
+    ),
+    "set_rate.request": ("CFG-RATE", pairs("period=measRate ratio=navRate reference=timeRef")),
     "poll_status.request": ("NAV-STATUS", {}),
     "poll_status.response": (
         "NAV-STATUS",
@@ -67,7 +72,8 @@ def build(record: Record) -> bytes | None:
             given[named[each]] = _given(each, named[each], value)
     if record["message"] == "nav_sat":
         given |= {"version": 1, "numSvs": len(record["fields"]["satellites"])}
-    mode = POLL if record["message"].endswith(".request") else GET
+    sets = record["message"].startswith("set_")
+    mode = SET if sets else POLL if record["message"].endswith(".request") else GET
     return bytes(UBXMessage(identity[:3], identity, mode, parsebitfield=0, **given).serialize())
 
 
