@@ -45,6 +45,7 @@ class Names:
         self._what = what
         self._types = types
         self._taken = set(taken)
+        self._numbers: dict[str, int] = {}
 
     def take(self, raw: str, line: int, notes: Notes | None = None) -> str:
         """The name for a name of the input, with a number if another one has it.
@@ -57,12 +58,13 @@ class Names:
         wanted = schema_name(raw, self._what.split()[-1])
         if self._types and _BUILT_IN.fullmatch(wanted):
             wanted = f"{wanted}_type"
-        name, number = wanted, 1
+        name, number = wanted, self._numbers.get(wanted, 1)
         while name in self._taken:
             number += 1
             name = f"{wanted[: _MOST - len(str(number)) - 1].rstrip('_')}_{number}"
         if name != wanted:
             (notes or self._notes).add(line, f"{self._what} '{raw[:60]}' is called {name}: {wanted} is taken")
+        self._numbers[wanted] = number
         self._taken.add(name)
         return name
 

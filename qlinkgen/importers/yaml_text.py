@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import textwrap
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -43,7 +44,9 @@ class Written:
 
     def item_at(self, line: int) -> tuple[str, str] | None:
         """Section and name of the item at a line."""
-        return next((item for item, (first, last) in self.places.items() if first <= line <= last), None)
+        listed = list(self.places.items())  # in order of their lines
+        at = bisect_right(listed, line, key=lambda each: each[1][0]) - 1
+        return listed[at][0] if at >= 0 and line <= listed[at][1][1] else None
 
 
 def write(document: Document) -> Written:

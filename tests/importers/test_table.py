@@ -331,6 +331,13 @@ def test_notes(imported: Import, heading: str, line: str, note: str) -> None:
     assert any(note in each for each in found.notes), found.notes
 
 
+def test_more_than_a_frame_can_have(imported: Import) -> None:
+    found = rows(imported, "name,type", "a,u8[65000]", "b,u8[600]", "c,u8")
+    assert fields(found) == "a bytes[65000]"
+    (note,) = found.notes
+    assert note.startswith("3: note: field 'b' is left out: with it the message has more than 65535 bytes")
+
+
 @pytest.mark.parametrize(
     ("text", "error"),
     [

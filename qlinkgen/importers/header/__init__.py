@@ -70,6 +70,7 @@ class _Header:
             self._types.add(each)
             self._collect(each.type, each.name)
         self._names = self._schema_names()
+        self._outermost = {each.line: each for each in reversed(self._structures())}
         self._layouts = Layouts(self._types, self._names, comments, notes, big=big)
 
     def _collect(self, type_: CType, called: str, outer: str = "") -> None:
@@ -126,8 +127,8 @@ class _Header:
 
     def _doc(self, structure: Structure) -> str:
         """The comment above a structure; of several on one line, that of the outermost."""
-        first = next(each for each in self._structures() if each.line == structure.line)
-        return self._comments.above(structure.line) if first is structure else ""
+        outermost = self._outermost[structure.line] is structure
+        return self._comments.above(structure.line) if outermost else ""
 
     # Structures -----------------------------------------------------------------------------------------
 
@@ -203,12 +204,14 @@ class _Header:
             self._notes.add(enum.line, f"enum {called} has {size} bytes, as without -fshort-enums")
         names = Names(self._notes, "constant")
         values: list[Constant] = []
+        seen: set[int] = set()
         for short, (raw, number, line) in zip(
             without_prefix([raw for raw, _, _ in enum.values]), enum.values, strict=True
         ):
-            if any(each.value == number for each in values):
+            if number in seen:
                 self._notes.add(line, f"constant {raw} is left out: {number} has a name already")
                 continue
+            seen.add(number)
             values.append(Constant(names.take(short, line), number, self._comments.of(line)))
         doc = self._comments.above(enum.line)
         return Constants(self._names[enum], f"{sign}{8 * size}", tuple(values), enum.line, doc)

@@ -172,7 +172,7 @@ class Directives:
     # Constants ------------------------------------------------------------------------------------------
 
     def _expanded(self, token: Token, inside: tuple[str, ...]) -> Iterator[Token]:
-        self._made += 1
+        self._made += bool(inside)
         if self._made > _MOST_TOKENS:
             raise self.notes.error(token.line, f"macros expand to more than {_MOST_TOKENS} tokens")
         macro = self.macros.get(token.text) if token.kind == "word" else None

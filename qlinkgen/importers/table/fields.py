@@ -90,6 +90,7 @@ class Layout:
         self._bits: _Bits | None = None
         self._open = ""
         self._single = 0
+        self._full = False
 
     @property
     def size(self) -> int:
@@ -99,7 +100,7 @@ class Layout:
     @property
     def open(self) -> bool:
         """Whether a field takes the rest of the message."""
-        return bool(self._open)
+        return bool(self._open) and not self._full
 
     def fields(self, records: Sequence[Record]) -> tuple[Field, ...]:
         """The fields of the rows, in wire order."""
@@ -135,6 +136,8 @@ class Layout:
 
     def _reach(self, record: Record, byte: int | None) -> bool:
         """Go to the place of a row; report a gap or an overlap."""
+        if self._full:
+            return False
         if self._open:
             self._leave_out(record, f"{self._open} before it takes the rest of the message")
             return False
@@ -184,6 +187,13 @@ class Layout:
             self._leave_out(record, f"{total} bytes are more than a payload can have")
             return
         if not self._reach(record, where.byte):
+            return
+        if self._at + total > _MOST:
+            self._leave_out(
+                record, f"with it the message has more than {_MOST} bytes, and so with all after it"
+            )
+            self._open = record.get("name")
+            self._full = True
             return
         line = record.line
         name = self._names.take(record.get("name"), line)
