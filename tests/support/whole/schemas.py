@@ -132,8 +132,11 @@ class _Maker:
         if rng.random() < 0.3:
             found["attributes"] = {"level": {"doc": self.words.text(), "values": ["user", "service"]}}
         if shape.id_bits == 0:
-            return found | self._only(shape, maker, bus, taken, attributes="attributes" in found)
-        return found | self._several(shape, maker, bus, taken, kinds, attributes="attributes" in found)
+            found |= self._only(shape, maker, bus, taken, attributes="attributes" in found)
+        else:
+            found |= self._several(shape, maker, bus, taken, kinds, attributes="attributes" in found)
+        self._seeds(shape, found)
+        return found
 
     def _several(
         self, shape: Shape, maker: FieldMaker, bus: Doc, taken: set[str], kinds: str, *, attributes: bool
@@ -154,7 +157,6 @@ class _Maker:
             shape.frame["marked"]["checksum"]["only"] = rng.sample(names, rng.randint(1, len(names)))
         if found["commands"] and shape.kind != "packet" and rng.random() < 0.4:
             self._answers(shape, maker, found)
-        self._seeds(shape, found)
         return {key: value for key, value in found.items() if value or key == "commands"}
 
     def _only(self, shape: Shape, maker: FieldMaker, bus: Doc, taken: set[str], *, attributes: bool) -> Doc:
@@ -197,7 +199,7 @@ class _Maker:
         for name, spec in shape.seeds.items():
             found.setdefault("attributes", {})[name] = spec
             top = (1 << int(spec["type"][1:])) - 1
-            for each in (*found["commands"].values(), *found["messages"].values()):
+            for each in (*found["commands"].values(), *found.get("messages", {}).values()):
                 each.setdefault("attributes", {})[name] = self.rng.choice((0, top, self.rng.randint(0, top)))
             if found.get("replies"):
                 defaults = found.setdefault("defaults", {})
