@@ -22,6 +22,7 @@ COMMANDS = {
     "encode": "Encode values as wire bytes.",
     "decode": "Decode wire bytes: one JSON object per line.",
     "explain": "Describe every byte of a frame, and its errors.",
+    "crc": "List check values, or find those that fit frames.",
     "simulate": "Simulate nodes, a ring or a chip set on a new port, with optional faults.",
     "scan": "Find the nodes of a Q.link bus.",
     "send": "Send one request on a port and print its response, or one message into a ring.",
