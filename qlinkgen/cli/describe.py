@@ -23,6 +23,8 @@ def default_text(value: Value) -> str:
     """Return the default as written on the command line, ``required`` if there is none."""
     if value.required:
         return "required"
+    if not value.field.given:
+        return "absent"
     if isinstance(value.type, Record | Records):
         return "its own" if isinstance(value.type, Record) else "none"
     shown = to_json(value, default_of(value))

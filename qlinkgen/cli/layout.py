@@ -14,6 +14,7 @@ from qlinkgen.plan.describe import (
     holds_text,
     id_text,
     number_of,
+    presence_text,
     scale_text,
     size_text,
     span_text,
@@ -97,12 +98,16 @@ def _facts(plan: Plan, planned: MessagePlan) -> list[str]:
 def _layout(title: str, stated: Message | Layout, payload: PayloadPlan) -> None:
     table = Table(COLUMNS, title, frozenset({"offset", "bytes"}))
     values, docs = {value.name: value for value in stated.values}, stated.docs
+    moving = [step for segment in payload.segments[1:] for step in segment.steps]
     for field, step in zip(stated.fields, payload.steps, strict=True):
         offset = step.place.offset
         notes = ["echo"] if field.echo else []
         notes += [] if field.confirmed else [UNCONFIRMED]
+        notes += [presence_text(step.presence)] if step.presence else []
+        if step in moving:
+            offset = None
         table.add(
-            size_text(step.place.front) if offset is None else offset,
+            ("..." if payload.walked else size_text(step.place.front)) if offset is None else offset,
             step.name,
             span_text(field.min_size, field.max_size),
             *_about(step, values.get(step.name)),

@@ -14,6 +14,7 @@ from qlinkgen.plan.describe import (
     must_text,
     part_text,
     receiver_text,
+    segment_text,
     size_text,
     sizing_text,
     span_text,
@@ -114,6 +115,10 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
     if sizes:
         heading("Sizes, in this order")
         paragraph([*sizes, f"{len(sizes) + 1}. the payload has {size_text(payload.size)} bytes"])
+    if payload.walked:
+        heading("Walked in this order")
+        walk = [f"{index}. {segment_text(each)}" for index, each in enumerate(payload.segments, 1)]
+        paragraph([*walk, f"{len(walk) + 1}. no bytes are left"])
     _steps("Steps", payload)
     for record in payload.records:
         _steps(f"Steps of a record {record.name}", record.payload)
@@ -122,10 +127,11 @@ def show_message_plan(plan: Plan, message: MessagePlan) -> None:
 def _steps(title: str, payload: PayloadPlan) -> None:
     columns = ["offset", "from end", "bytes", "step", "kind", "type", "must be"]
     table = Table(columns, title, frozenset({"offset", "from end", "bytes"}))
+    moving = [step for segment in payload.segments[1:] for step in segment.steps]
     for step in payload.steps:
         back = "" if step.place.back is None else step.place.back
         table.add(
-            size_text(step.place.front), back, _bytes(step), step.name,
+            "..." if step in moving else size_text(step.place.front), back, _bytes(step), step.name,
             kind_text(step), type_text(step), must_text(step),
         )  # fmt: skip
         for member in step.members if isinstance(step, BitsStep) else ():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, assert_never
 
+from qlinkgen.model.condition import Condition
 from qlinkgen.model.texts import Text
 from qlinkgen.model.types import Array, BitField, Bits, Blob, Length, Scalar
 
@@ -94,10 +95,26 @@ class Field:
     confirmed: bool = True
     #: It repeats the field of the same name of the request.
     echo: bool = False
+    #: It is present only where this holds.
+    when: Condition = ()
+    #: It may be left out at the end.
+    optional: bool = False
+    #: A new message has it.
+    given: bool = True
+
+    @property
+    def conditional(self) -> bool:
+        """Whether it may be absent."""
+        return self.optional or bool(self.when)
 
     @property
     def min_size(self) -> int:
-        """Minimum size on the wire."""
+        """Minimum size on the wire, 0 if it may be absent."""
+        return 0 if self.conditional else self.full_min_size
+
+    @property
+    def full_min_size(self) -> int:
+        """Minimum size on the wire where it is present."""
         match self.type:
             case Blob() | Array() | Records():
                 return self.type.size_of(self.type.length.minimum)
@@ -130,6 +147,8 @@ class Field:
     @property
     def fixed(self) -> bool:
         """Whether the size is constant."""
+        if self.conditional:
+            return False
         return not isinstance(self.type, Blob | Array | Records) or self.type.length.fixed
 
 
@@ -147,7 +166,7 @@ class Value:
     @property
     def required(self) -> bool:
         """Whether the caller must provide the value; the default is used only in vectors."""
-        return self.type.required
+        return self.type.required and not self.field.conditional
 
     @property
     def unit(self) -> str:

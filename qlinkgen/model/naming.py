@@ -26,10 +26,10 @@ _IN_CALLS = frozenset("ask tell handle number axis bool bytes float int list str
 _IN_MODULE = frozenset(
     """Message Request Response StreamDecoder Command Counters Fault CodecError EncodeError DecodeError
     Codec Bus OpenEnum BaseMessage ArrayRule BytesRule ConstantRule CountRule IntRule MaskRule
-    ScaledRule TextRule RecordRule RecordsRule BaseRecord Rule OutOfRange Scale DecimalScale Marking
-    Struct Decimal Self Any Callable BytesLike ClassVar Final Literal LayoutError Checksum
-    BUS COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES ADDRESS
-    EMPTY CHECKED""".split()  # noqa: SIM905
+    ScaledRule TextRule RecordRule RecordsRule BaseRecord MaybeRule Misplaced NEW Rule OutOfRange Scale
+    DecimalScale Marking Struct Decimal Self Any Callable BytesLike ClassVar Final Literal LayoutError
+    Checksum BUS COMMANDS MESSAGES RECORDS MARKING REFUSALS UNREAD UNREADABLE NAME ID FIELDS RULES
+    ADDRESS EMPTY CHECKED""".split()  # noqa: SIM905
 ) | frozenset(dir(builtins))
 
 

@@ -25,7 +25,8 @@ from qlinkgen.model.types import Array, Blob, Enum, Flags, Float, Scalar
 Json: TypeAlias = "str | int | float | Decimal | Sequence[Json] | Mapping[str, Json] | None"
 Item = int | bool | float | Decimal
 Native: TypeAlias = (
-    "Item | bytes | str | list[Item] | list[int] | Mapping[str, Native] | Sequence[Mapping[str, Native]]"
+    "Item | bytes | str | list[Item] | list[int]"
+    " | Mapping[str, Native] | Sequence[Mapping[str, Native]] | None"
 )
 
 
@@ -41,8 +42,10 @@ class BadValue(ValueError):
 
 
 def default_of(value: Value) -> Native:
-    """The native default of a field."""
+    """The native default of a field, None if a new message does not have it."""
     kind = value.type
+    if not value.field.given:
+        return None
     match kind:
         case Scalar():
             return native_from_raw(kind, kind.default)
@@ -77,7 +80,7 @@ def raw_from_native(value: Value, native: Native) -> int:
 
 def raw_number(name: str, scalar: Scalar, native: Native) -> int:
     """Like `raw_from_native`, for a value or an item of a list."""
-    if isinstance(native, bytes | str | Sequence | Mapping):
+    if native is None or isinstance(native, bytes | str | Sequence | Mapping):
         raise BadValue(f"{name}: {_shown(native)} is not a number")
     if isinstance(scalar.meaning, Float):
         return _raw_float(name, scalar, scalar.meaning, native)
@@ -114,6 +117,8 @@ def _out_of_range(name: str, scalar: Scalar, native: Item) -> BadValue:
 def to_json(value: Value, native: Native) -> Json:
     """The JSON value of a native value; a Decimal is kept, so that the writer can print all its digits."""
     kind = value.type
+    if native is None:
+        return None
     if isinstance(kind, Record):
         assert isinstance(native, Mapping)
         return {each.name: to_json(each, native[each.name]) for each in kind.layout.values}
@@ -149,6 +154,8 @@ def from_json(value: Value, given: Json) -> Native:
     0b). Raises BadValue; ranges are checked by the encoder and by :func:`check_items`.
     """
     kind = value.type
+    if value.field.conditional and given is None:
+        return None
     if isinstance(kind, Record):
         return _record(value.name, kind.layout, _parsed(given, "{"))
     if isinstance(kind, Records):

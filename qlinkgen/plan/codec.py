@@ -14,7 +14,8 @@ Every target checks a whole frame in this order:
 7. a message number that the direction does not have: ``unknown``; then a wrong check value that covers an
    attribute of the message: ``crc``;
 8. the payload: wrong sizes are ``length``, then illegal values ``range``; last the address and the values
-   of the frame, ``range``.
+   of the frame, ``range``. A payload in which fields may be absent is walked instead, in wire order: for
+   each field its size, ``length``, then its value, ``range`` (see `walk`).
 
 A frame that a terminator ends is decoded as a whole. Step 2 is: a wrong first constant is ``frame``; no
 terminator within the longest frame, or nothing before it, is ``length``; a wrong coding is ``stuffing``; a

@@ -1,16 +1,17 @@
 """Interprets the steps of a payload: encodes values to bytes and decodes them.
 
 Values are raw: the integer on the wire, bytes for bytes and text, a list of integers for an array, a mapping
-of raw values for a record.
+of raw values for a record; None for an absent field.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeAlias, assert_never
 
 from qlinkgen.model.integer import Integer, pack_row, unpack_row
 from qlinkgen.model.types import Scalar
+from qlinkgen.plan import walk
 from qlinkgen.plan.expr import Condition
 from qlinkgen.plan.payload import (
     BitsStep,
@@ -31,11 +32,13 @@ from qlinkgen.plan.payload import (
     RunStep,
     Step,
     ValueStep,
+    holders,
     limits,
     term_of,
 )
+from qlinkgen.plan.walk import Missing, Wrong, present
 
-Raw: TypeAlias = "int | bytes | list[int] | Mapping[str, Raw] | Sequence[Mapping[str, Raw]]"
+Raw: TypeAlias = "int | bytes | list[int] | Mapping[str, Raw] | Sequence[Mapping[str, Raw]] | None"
 
 
 class Unsendable(ValueError):
@@ -86,12 +89,36 @@ class MoreNeeded(Exception):
 def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     """The payload with these values, defaults for missing ones. Raises Unsendable."""
     whole = {each.name: values.get(each.name, default_of(each)) for each in plan.settable}
+    if plan.walked:
+        return _pack_walked(plan, whole)
     counts = {run.name: _count(run, whole[run.name]) for run in plan.runs}
     return b"".join(_packed(step, whole, counts) for step in plan.steps)
 
 
+def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
+    data, left_out = b"", False
+    numbers = {name: value for name, value in values.items() if isinstance(value, int)}
+    counts = {run.name: 0 if values[run.name] is None else _count(run, values[run.name]) for run in plan.runs}
+    for segment in plan.segments:
+        given = [values[each.name] is not None for each in holders(segment.steps)]
+        if segment.presence is not None and segment.presence.optional:
+            sent = given[0]
+            if sent and left_out:
+                raise Unsendable(segment.presence.field, values[segment.presence.field])
+            left_out = not sent
+        else:
+            sent = present(segment.presence, numbers, 0)
+        for each in holders(segment.steps):
+            if (values[each.name] is not None) != sent:
+                raise Unsendable(each.name, values[each.name])
+        data += b"".join(_packed(step, values, counts) for step in segment.steps) if sent else b""
+    return data
+
+
 def default_of(each: Holder) -> Raw:
-    """The default of a field."""
+    """The default of a field, None if a new message does not have it."""
+    if each.presence is not None and not each.presence.given:
+        return None
     match each:
         case ValueStep() | Member():
             return each.number.default
@@ -209,12 +236,41 @@ def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
     """The values of a payload; checks sizes first, then each step in wire order. Raises BadContent."""
     if not payload and plan.empty_is_default:
         return defaults(plan)
+    if plan.walked:
+        return _unpack_walked(plan, payload)
     counts = count_items(plan, payload)
     values: dict[str, Raw] = {}
     for step in plan.steps:
         at = step.place.front.value(counts)
         values |= _unpacked(step, payload[at:], counts, at)
     return values
+
+
+def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
+    values: dict[str, Raw] = {}
+    try:
+        for each in walk.visit(plan, payload):
+            if each.data is None:
+                values |= {holder.name: None for holder in holders((each.step,))}
+            else:
+                values |= _unpacked(each.step, each.data, _counts_of(each.step, each.data), each.at)
+    except Wrong as wrong:
+        raise BadContent("length", wrong.field, wrong.at) from None
+    return values
+
+
+def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:
+    """The number of items of a run that has these bytes."""
+    return {step.name: len(data) // step.item_size} if isinstance(step, RunStep) else {}
+
+
+def places(plan: PayloadPlan, payload: bytes) -> Iterator[tuple[Step, int]]:
+    """The steps of a valid payload and their offsets, without absent ones."""
+    if plan.walked:
+        yield from ((each.step, each.at) for each in walk.visit(plan, payload) if each.data is not None)
+        return
+    counts = count_items(plan, payload)
+    yield from ((step, step.place.front.value(counts)) for step in plan.steps)
 
 
 def count_items(plan: PayloadPlan, payload: bytes) -> dict[str, int]:
@@ -246,6 +302,8 @@ def measure(plan: PayloadPlan, start: bytes) -> int:
 
     Raises MoreNeeded while counts are missing, BadContent if one is out of range.
     """
+    if plan.walked:
+        return _measure_walked(plan, start)
     counts = {run.name: run.length.minimum for run in plan.runs}
     for each in plan.sizing:
         if isinstance(each, Learn):
@@ -254,6 +312,15 @@ def measure(plan: PayloadPlan, start: bytes) -> int:
                 raise MoreNeeded(plan.size.value(counts), end)
             counts[each.count.run] = _learn(each.count, start, counts)
     return plan.size.value(counts)
+
+
+def _measure_walked(plan: PayloadPlan, start: bytes) -> int:
+    try:
+        return walk.measure(plan, start)
+    except Missing as missing:
+        raise MoreNeeded(max(plan.least, missing.end), missing.end) from None
+    except Wrong as wrong:
+        raise BadContent("length", wrong.field, wrong.at) from None
 
 
 def _learn(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:

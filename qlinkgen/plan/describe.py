@@ -6,6 +6,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import assert_never
 
+from qlinkgen.model.condition import Test
 from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import (
     Constant,
@@ -59,9 +60,11 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Learn,
     Member,
+    Presence,
     RecordsStep,
     RecordStep,
     ReservedStep,
+    Segment,
     Sizing,
     Step,
     ValueStep,
@@ -507,3 +510,31 @@ def receiver_text(frame: FramePlan) -> tuple[str, str]:
             return "in step", "packets have no delimiter, so both sides must stay in step"
         case _:
             assert_never(way)
+
+
+# Walked payloads --------------------------------------------------------------------------------------------
+
+
+def presence_text(presence: Presence) -> str:
+    """What decides whether a field is present: ``if kind is 3..5``."""
+    if presence.optional:
+        return "if bytes are left"
+    return f"if {' and '.join(map(_test_text, presence.when))}"
+
+
+def _test_text(test: Test) -> str:
+    ranges = " or ".join(span_text(first, last) for first, last in test.ranges)
+    return f"{test.value} is {'not ' if test.negated else ''}{ranges}"
+
+
+def segment_text(segment: Segment) -> str:
+    """A segment of a walked payload: its fields, its size, and what decides whether it is present."""
+    names = ", ".join(step.name for step in segment.steps)
+    run = segment.run
+    if run is None:
+        size = f"{segment.size} bytes" if segment.size != 1 else "1 byte"
+    else:
+        size = f"{run.item_size}*{run.name}" if run.item_size > 1 else run.name
+        if segment.rest is not None:
+            size = f"the rest{f' but {segment.rest} bytes' if segment.rest else ''}"
+    return f"{names}: {size}" + (f", {presence_text(segment.presence)}" if segment.presence else "")

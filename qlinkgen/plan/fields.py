@@ -24,10 +24,13 @@ from qlinkgen.plan.payload import (
     ReservedStep,
     Step,
     ValueStep,
+    full_size,
     least_size,
     term_of,
 )
 from qlinkgen.plan.spans import Around, Span
+from qlinkgen.plan.walk import Wrong as WrongSize
+from qlinkgen.plan.walk import visit
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,10 @@ class Fields:
         self.spans: list[Span] = []
         self.wrong: list[Wrong] = []
         counts: Mapping[str, int] = {}
+        if plan.walked:
+            self._judging = judging and sound
+            self._walk()
+            return
         try:
             counts = count_items(plan, payload)
         except BadContent:
@@ -67,6 +74,28 @@ class Fields:
         self._judging = judging and sound and not self.bad
         self._counts = counts
         self._divide(counts)
+
+    def _walk(self) -> None:
+        """Divide the payload segment by segment; values are judged up to the first wrong size."""
+        at = 0
+        try:
+            for each in visit(self._plan, self._payload):
+                if each.data is not None:
+                    at = each.at + len(each.data)
+                    self._step(each.step, tuple(range(each.at, at)), len(each.data))
+        except WrongSize as wrong:
+            self.bad = self._sound
+            for step in wrong.steps:
+                begin = wrong.at + step.place.front.fixed
+                at = min(max(at, begin + full_size(step)), len(self._payload))
+                self._step(step, tuple(range(min(begin, at), at)), full_size(step))
+        self._extra(at)
+
+    def _extra(self, at: int) -> None:
+        """Add the bytes after the last step."""
+        if self._payload[at:]:
+            places = tuple(range(at, len(self._payload)))
+            self.spans.append(Span(Around.EXTRA, places, self._payload[at:], len(places), None, "length"))
 
     def _divide(self, counts: Mapping[str, int]) -> None:
         at, rest = 0, sum(map(least_size, self._plan.steps))
@@ -76,9 +105,7 @@ class Fields:
             places = tuple(range(at, min(at + size, len(self._payload))))
             at += len(places)
             self._step(step, places, size)
-        if self._payload[at:]:
-            places = tuple(range(at, len(self._payload)))
-            self.spans.append(Span(Around.EXTRA, places, self._payload[at:], len(places), None, "length"))
+        self._extra(at)
 
     def _size(self, step: Step, counts: Mapping[str, int], left: int) -> int:
         """Size of a step: by its count if that is right, otherwise by the bytes left."""

@@ -20,7 +20,9 @@ from qlinkgen.plan.payload import (
 
 
 def native_of(step: Holder, raw: Raw) -> Native:
-    """The native Python value of a raw value."""
+    """The native Python value of a raw value, None for an absent one."""
+    if raw is None:
+        return None
     match step:
         case ValueStep() | Member():
             assert isinstance(raw, int)

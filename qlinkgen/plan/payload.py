@@ -8,9 +8,10 @@ sizes are consistent, so a decoder reports `length` before `range`, in any order
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import assert_never
 
+from qlinkgen.model.condition import Test
 from qlinkgen.model.fields import Field, FieldType, Layout, Record, Records
 from qlinkgen.model.integer import BitOrder, Integer
 from qlinkgen.model.message import Message
@@ -50,6 +51,23 @@ class Place:
         return None if self.front.terms else self.front.fixed
 
 
+@dataclass(frozen=True, slots=True)
+class Presence:
+    """What decides whether a field is present.
+
+    Attributes:
+        field: name of the field.
+        when: tests of earlier values, all of which hold; () for an optional field.
+        optional: it is present if bytes are left, and sent if the caller gives it.
+        given: a new message has it.
+    """
+
+    field: str
+    when: tuple[Test, ...]
+    optional: bool
+    given: bool
+
+
 # Steps ------------------------------------------------------------------------------------------------------
 
 
@@ -61,6 +79,7 @@ class ValueStep:
     place: Place
     integer: Integer
     number: Scalar
+    presence: Presence | None = None
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -77,6 +96,7 @@ class ConstantStep:
     integer: Integer
     value: int
     number: Scalar
+    presence: Presence | None = None
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -93,6 +113,7 @@ class ReservedStep:
     integer: Integer
     value: int
     number: Scalar
+    presence: Presence | None = None
 
 
 @dataclass(frozen=True)
@@ -110,6 +131,7 @@ class CountStep:
     run: str
     term: Term
     bounds: Within
+    presence: Presence | None = None
 
     @property
     def scale(self) -> int:
@@ -126,6 +148,7 @@ class Member:
     shift: int
     bits: int
     number: Scalar
+    presence: Presence | None = None
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -141,6 +164,7 @@ class BitsStep:
     place: Place
     integer: Integer
     members: tuple[Member, ...]
+    presence: Presence | None = None
 
 
 @dataclass(frozen=True)
@@ -155,6 +179,7 @@ class BytesStep:
     #: The byte that fills up a shorter value, which does not end with it; b"" if there is none.
     pad: bytes
     required: bool
+    presence: Presence | None = None
 
     #: Bytes of one item.
     item_size = 1
@@ -194,6 +219,7 @@ class ItemsStep:
     default: tuple[int, ...]
     required: bool
     packed: BitOrder | None
+    presence: Presence | None = None
 
     #: Suffix for the name of the number of items.
     quantity = "count"
@@ -240,6 +266,7 @@ class RecordStep:
     name: str
     place: Place
     record: RecordPlan
+    presence: Presence | None = None
 
     @property
     def required(self) -> bool:
@@ -256,6 +283,7 @@ class RecordsStep:
     record: RecordPlan
     length: Length
     required: bool
+    presence: Presence | None = None
 
     #: See ItemsStep.
     packed = None
@@ -279,6 +307,30 @@ RunStep = BytesStep | ItemsStep | RecordsStep
 Step = SimpleStep | RecordStep | RecordsStep
 #: A step or member with a value of the message.
 Holder = ValueStep | Member | RunStep | RecordStep
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of a walked payload whose size is known when it is reached.
+
+    Attributes:
+        steps: fields of fixed size that are always present; or one field that may be absent, or a run of
+            variable size. Their places count from the beginning of the segment.
+        presence: what decides whether it is present, None if it always is.
+        size: its size if it is present, None for a run of variable size.
+        rest: number of bytes after a run that takes the rest of the payload, None for other segments.
+    """
+
+    steps: tuple[Step, ...]
+    presence: Presence | None
+    size: int | None
+    rest: int | None = None
+
+    @property
+    def run(self) -> RunStep | None:
+        """The run of variable size, None for other segments."""
+        (step,) = self.steps if self.size is None else (None,)
+        return step if isinstance(step, BytesStep | ItemsStep | RecordsStep) else None
 
 
 # Numbers of items -------------------------------------------------------------------------------------------
@@ -321,6 +373,8 @@ class PayloadPlan:
         least: minimum size, without regard to `empty_is_default`.
         most: maximum size.
         empty_is_default: an empty payload means that every field has its default.
+        segments: how a payload is walked in which fields may be absent; () for all others. ``sizing`` and
+            ``size`` are then empty.
     """
 
     steps: tuple[Step, ...]
@@ -329,11 +383,17 @@ class PayloadPlan:
     least: int
     most: int
     empty_is_default: bool
+    segments: tuple[Segment, ...] = ()
+
+    @property
+    def walked(self) -> bool:
+        """Whether places of fields depend on earlier values, not on counts alone."""
+        return bool(self.segments)
 
     @property
     def fixed(self) -> bool:
         """Whether the size is constant."""
-        return not self.size.terms
+        return not self.size.terms and not self.walked
 
     @property
     def runs(self) -> tuple[RunStep, ...]:
@@ -381,22 +441,32 @@ class PayloadPlan:
     @property
     def settable(self) -> tuple[Holder, ...]:
         """Steps and members with a value of the message, in wire order."""
-        found: list[Holder] = []
-        for step in self.steps:
-            match step:
-                case ValueStep() | BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
-                    found.append(step)
-                case BitsStep():
-                    found += step.members
-                case ConstantStep() | ReservedStep() | CountStep():
-                    pass
-                case _:
-                    assert_never(step)
-        return tuple(found)
+        return holders(self.steps)
+
+
+def holders(steps: Iterable[Step]) -> tuple[Holder, ...]:
+    """Steps and members with a value, in wire order."""
+    found: list[Holder] = []
+    for step in steps:
+        match step:
+            case ValueStep() | BytesStep() | ItemsStep() | RecordStep() | RecordsStep():
+                found.append(step)
+            case BitsStep():
+                found += step.members
+            case ConstantStep() | ReservedStep() | CountStep():
+                pass
+            case _:
+                assert_never(step)
+    return tuple(found)
+
+
+def full_size(step: Step) -> int:
+    """Size of a step of constant size, if it is present."""
+    return term_of(step).value(step.length.maximum) if isinstance(step, RunStep) else least_size(step)
 
 
 def least_size(step: Step) -> int:
-    """Minimum size of a step."""
+    """Minimum size of a step, if it is present."""
     match step:
         case ValueStep() | ConstantStep() | ReservedStep() | CountStep() | BitsStep():
             return step.integer.size
@@ -410,6 +480,8 @@ def least_size(step: Step) -> int:
 
 def is_required(each: Holder) -> bool:
     """Whether the caller must provide the value: it has no default, or only an illegal one."""
+    if each.presence is not None:
+        return False
     match each:
         case ValueStep() | Member():
             return each.number.required
@@ -480,6 +552,8 @@ class _Planner:
         self._fields = {field.name: field for field in fields}
 
     def plan(self, *, empty_is_default: bool = False) -> PayloadPlan:
+        if any(field.conditional for field in self._all):
+            return self._walked()
         front, steps = Size(), []
         for index, field in enumerate(self._all):
             rest = self._all[index:]
@@ -494,6 +568,45 @@ class _Planner:
             most=sum(field.max_size for field in self._all),
             empty_is_default=empty_is_default,
         )
+
+    def _walked(self) -> PayloadPlan:
+        segments = tuple(self._segments())
+        return PayloadPlan(
+            steps=tuple(step for segment in segments for step in segment.steps),
+            sizing=(),
+            size=Size(),
+            least=sum(field.min_size for field in self._all),
+            most=sum(field.max_size for field in self._all),
+            empty_is_default=False,
+            segments=segments,
+        )
+
+    def _segments(self) -> Iterator[Segment]:
+        """Consecutive fields of fixed size that are always present share a segment."""
+        steps: list[Step] = []
+        size = 0
+        for index, field in enumerate(self._all):
+            if field.fixed:
+                steps.append(self._step(field, Place(Size(size), None)))
+                size += field.max_size
+                continue
+            if steps:
+                yield Segment(tuple(steps), None, size)
+                steps, size = [], 0
+            yield self._own_segment(field, self._all[index + 1 :])
+        if steps:
+            yield Segment(tuple(steps), None, size)
+
+    def _own_segment(self, field: Field, after: tuple[Field, ...]) -> Segment:
+        presence = None
+        if field.conditional:
+            presence = Presence(field.name, field.when, field.optional, field.given)
+        step = _present(self._step(field, Place(Size(), None)), presence)
+        kind = field.type
+        if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
+            return Segment((step,), presence, field.max_size)
+        rest = None if kind.length.counted_by else sum(each.max_size for each in after)
+        return Segment((step,), presence, None, rest)
 
     def _step(self, field: Field, place: Place) -> Step:
         kind = field.type
@@ -556,6 +669,14 @@ class _Planner:
         kind = self._fields[run].type
         assert isinstance(kind, Blob | Array | Records)
         return kind.length
+
+
+def _present(step: Step, presence: Presence | None) -> Step:
+    """The step of a field that may be absent."""
+    if isinstance(step, BitsStep):
+        members = tuple(replace(each, presence=presence) for each in step.members)
+        step = replace(step, members=members)
+    return replace(step, presence=presence)
 
 
 def _member(member: BitField) -> Member:

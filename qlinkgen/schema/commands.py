@@ -241,8 +241,10 @@ class CommandBuilder:
             self._report.error("unknown-message", place, what, hint, needs=needs)
             return
         kind = known[counter]
+        absent = any(value.field.conditional for value in request.values if value.name == counter)
         if (
-            not isinstance(kind, Scalar)
+            absent
+            or not isinstance(kind, Scalar)
             or kind.meaning is not None
             or kind.scaling is not None
             or kind.signed

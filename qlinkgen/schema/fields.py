@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from qlinkgen.model.fields import Field, FieldType, Records
 from qlinkgen.model.types import Array, Blob, Count, Scalar
+from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.file_model import Fields, FieldSpec, RecordSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown, type_text
@@ -39,6 +40,7 @@ class FieldBuilder:
             if kind is not None:
                 doc, confirmed = self._inherited(spec)
                 fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
+        fields = ConditionBuilder(specs, path, self._report).build(fields)
         fields = self._counted(fields, path)
         self._check_open_ends(fields, path)
         return tuple(self._bounded(fields, path))
@@ -142,7 +144,7 @@ class FieldBuilder:
         """Check that counts precede a field that takes the rest of the payload."""
         order = [field.name for field in fields]
         for field in fields[order.index(name) + 1 :]:
-            if not isinstance(field.type, Blob | Array | Records) or field.fixed:
+            if not isinstance(field.type, Blob | Array | Records) or field.type.length.fixed:
                 continue
             count = field.type.length.counted_by
             if count and order.index(count) > order.index(name):
@@ -194,6 +196,6 @@ def is_open(field: Field) -> bool:
     """Whether the field takes the rest of the payload."""
     return (
         isinstance(field.type, Blob | Array | Records)
-        and not field.fixed
+        and not field.type.length.fixed
         and not field.type.length.counted_by
     )

@@ -26,6 +26,7 @@ from pydantic_core import CoreSchema
 
 from qlinkgen.schema.kinds import (
     AnswerNumber,
+    AnyCondition,
     AnyRange,
     ByteCount,
     ByteText,
@@ -167,6 +168,10 @@ class FieldSpec(Fact):
     bits: dict[str, Annotated[BitSpec, ShortForm("at", "integer", "string")]] | None = Field(
         default=None, description="Fields inside the integer"
     )
+    when: AnyCondition | None = Field(
+        default=None, alias="if", description="Present only where earlier fields have these values"
+    )
+    optional: StrictBool = Field(default=False, description="May be left out, with all fields after it")
 
 
 class _OneOrMore:

@@ -130,6 +130,13 @@ ByteCount = Annotated[
 Characters = Annotated[
     str, BeforeValidator(_characters), WithJsonSchema({"type": "string", "pattern": "^[ -~]+$"})
 ]
+AnyCondition = Annotated[
+    tuple[notation.TestText, ...],
+    PlainValidator(notation.condition),
+    _json(
+        "{FIELD: value, range, list of them, or `not` one}, or the name of a truth value", "object", "string"
+    ),
+]
 Time = Annotated[
     notation.Duration, PlainValidator(notation.duration), _json("3 bytes, 260 us, 10 ms or 1 s", "string")
 ]

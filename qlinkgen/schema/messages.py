@@ -172,6 +172,9 @@ class MessageBuilder:
         if self._frame is None:
             return
         self._check_size(message, path)
+        if message.empty_is_default and any(field.conditional for field in message.fields):
+            what = f"{message.name} has fields that may be absent, so an empty one is not all its defaults"
+            self._error("bad-condition", (*path[:-1], "empty_request"), what, "remove empty_request")
         if isinstance(self._frame, MarkedFrame):
             for field in message.fields:
                 self._check_marker(field, self._frame.marker, path)
@@ -217,6 +220,10 @@ class MessageBuilder:
                 what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length or terminator"
                 self._error("no-frame-end", (*path, field.name), what, hint)
+            if field.optional:
+                what = f"{field.name} is optional, but without a length a receiver waits for it"
+                hint = "give it a condition, or give the frame a length"
+                self._error("no-frame-end", (*path, field.name, "optional"), what, hint)
         if message.empty_is_default and message.max_size:
             what = f"an empty {message.name} cannot be distinguished from a full one: the frame has no length"
             self._error("no-frame-end", (*path[:-1], "empty_request"), what, "remove empty_request")
@@ -233,8 +240,10 @@ class MessageBuilder:
             )
             self._error("bad-frame", path, what, hint)
         for field in message.variable:
-            assert not isinstance(field.type, Scalar | Bits | Record)
-            if field.type.size_of(1) % step:
+            kind, change = field.type, field.max_size
+            if not isinstance(kind, Scalar | Bits | Record) and not kind.length.fixed:
+                change = kind.size_of(1)
+            if change % step or (field.conditional and field.full_min_size % step):
                 what = (
                     f"the size of {field.name} varies by less than the {step} bytes of a step of the length"
                 )

@@ -158,9 +158,12 @@ def _attributes(values: Iterable[Value], path: Path, *, c: bool) -> Iterator[tup
         place = (*path, value.field.name, *inside)
         called = f"'{value.name}' in {value.field.name}" if inside else f"'{value.name}'"
         yield spelt(value.name), called, place
-        if c and isinstance(value.type, Array | Blob | Records) and not value.field.fixed:
+        if c and isinstance(value.type, Array | Blob | Records) and not value.type.length.fixed:
             suffix = value.type.quantity
             yield f"{value.name}_{suffix}", f"the {suffix} of '{value.name}'", place
+        if c and value.field.conditional:
+            name = value.field.name
+            yield f"has_{name}", f"whether '{name}' is present", (*path, name)
 
 
 def _classes(file: SchemaFile) -> Iterator[tuple[str, str, Path]]:

@@ -195,3 +195,66 @@ def type_text(text: str) -> TypeText:
     raise ValueError(
         f"{shown(text)} is not a type; write u16, i32, bytes[0..25], u16[4] or the name of a type"
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A value, or a range of them; a name is a member of an enum.
+
+    Attributes:
+        text: for messages.
+        name: name of a member of an enum.
+        first: first number.
+        last: last number.
+        truth: it is true or false.
+    """
+
+    text: str
+    name: str = ""
+    first: int = 0
+    last: int = 0
+    truth: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TestText:
+    """What a condition asks of one field."""
+
+    field: str
+    wanted: tuple[Wanted, ...]
+    negated: bool
+
+
+def condition(value: object) -> tuple[TestText, ...]:
+    """``{kind: 3}``, ``{kind: not 1..5, mode: [auto, 7]}``, or the name of a bool. Raises ValueError."""
+    if isinstance(value, str) and value:
+        return (TestText(value, (Wanted("'true'", first=1, last=1, truth=True),), negated=False),)
+    if not isinstance(value, dict) or not value:
+        what = f"{shown(value)} is not a condition"
+        raise ValueError(f"{what}; write {{FIELD: value}}, or the name of a bool")
+    return tuple(_test(str(name), wanted) for name, wanted in value.items())
+
+
+def _test(name: str, value: object) -> TestText:
+    negated = isinstance(value, str) and value.startswith("not ")
+    given = value.removeprefix("not ").strip() if isinstance(value, str) else value
+    items = given if isinstance(given, list) else [given]
+    if not items:
+        raise ValueError(f"{name} has no values; write at least one")
+    return TestText(name, tuple(map(_wanted, items)), negated)
+
+
+def _wanted(value: object) -> Wanted:
+    if isinstance(value, bool):
+        return Wanted(shown(value), first=int(value), last=int(value), truth=True)
+    if isinstance(value, str) and value in ("true", "false"):
+        return _wanted(value == "true")
+    try:
+        found = range_of(value)
+    except ValueError:
+        if isinstance(value, str) and re.fullmatch(r"[A-Za-z_]\w*", value, re.ASCII):
+            return Wanted(shown(value), name=value)
+        raise
+    if found.first.denominator != 1 or found.last.denominator != 1:
+        raise ValueError(f"{shown(value)} is not a whole number; conditions compare numbers on the wire")
+    return Wanted(shown(value), first=int(found.first), last=int(found.last))

@@ -15,7 +15,7 @@ from qlinkgen.schema.source import Path
 #: Maximum number of records inside each other.
 _MAX_DEPTH = 2
 #: Keys of a field that apply to a record.
-_KEYS = frozenset({"type", "echo", *Fact.model_fields})
+_KEYS = frozenset({"type", "echo", "when", "optional", *Fact.model_fields})
 
 
 class RecordBuilder:

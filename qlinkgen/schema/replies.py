@@ -174,7 +174,7 @@ class ReplyBuilder:
                 yield Case(first, last, means, name)
 
     def _switch(self, name: str, message: Message, path: Path) -> Scalar | None:
-        known = {value.name: value.type for value in message.values}
+        known = {value.name: value.type for value in message.values if not value.field.conditional}
         place, needs = (*path, "switch"), ((*path, "switch"), (*path[:-1], "fields"))
         kind = known.get(name)
         if kind is None:

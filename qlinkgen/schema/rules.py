@@ -134,6 +134,13 @@ _ALL = (
         "Use separate fields for values that differ.",
     ),
     Rule(
+        "bad-condition",
+        "A field that may be absent depends on earlier values, or is at the end of the payload.",
+        "Receivers decide field by field whether it is present: an earlier field that is always present has "
+        "a value for it, or the payload ends before it. Fields after one that takes the rest are always "
+        "present, and a count has the condition of the field that it counts.",
+    ),
+    Rule(
         "bad-record",
         "A record has a fixed size and at least one value.",
         "Arrays of it are divided by that size. Give its fields a number of items, like [4]; a text of "

@@ -62,8 +62,13 @@ class TypeBuilder:
         self._checked.add(name)
         self._chain += 1
         before = len(self._report.faults)
-        for key in ("counts", "echo"):
-            if getattr(spec, key):
+        for attribute, key in (
+            ("counts", "counts"),
+            ("echo", "echo"),
+            ("when", "if"),
+            ("optional", "optional"),
+        ):
+            if getattr(spec, attribute):
                 what = f"'{key}' has no effect on a named type"
                 self._report.error("not-applicable", (*path, key), what, "put it on a field", of_key=True)
         if self.build(spec, path, (name,)) is None or len(self._report.faults) > before:

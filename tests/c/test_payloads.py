@@ -157,6 +157,7 @@ def told(message: MessagePlan, payload: bytes) -> str:
 
 
 def shown(raw: Raw) -> str:
+    assert raw is not None
     if isinstance(raw, int):
         return str(raw)
     return raw.hex() or "-" if isinstance(raw, bytes) else ",".join(map(str, raw)) or "-"

@@ -64,6 +64,8 @@ class _Source:
             f"static void show_{self.names.stem(message)}(const {self.names.function(message)}_t *m)", "{"
         )
         for value in message.values:
+            if told := _presence(message, value):
+                self._add(f'    printf(" %d", m->{told} ? 1 : 0);')
             self._add(*(f"    {line}" for line in _printed(value, "m->")))
         self._add("}")
 
@@ -87,6 +89,8 @@ class _Source:
         for value in self.protocol.frame_values:
             self._add(*(f"    {line}" for line in _parsed(value, "parts.")))
         for value in message.values:
+            if told := _presence(message, value):
+                self._add(f"    m.{told} = strtoul(word(), NULL, 0) != 0ul;")
             self._add(*(f"    {line}" for line in _parsed(value, "m.")))
         call = "&m, " if has_struct else ""
         if message.fields:
@@ -329,6 +333,12 @@ class _Source:
             self._add('    printf("ok %llu", (unsigned long long)@p@_check_finish(value));', "}")
         else:
             self._add("    (void)size;", '    printf("usage");', "}")
+
+
+def _presence(message: Message, value: Value) -> str:
+    """The member that tells whether the field of a value is present, before its first value."""
+    first = next(each for each in message.values if each.field is value.field)
+    return f"has_{value.field.name}" if value.field.conditional and first == value else ""
 
 
 def _parsed(value: Value, owner: str, depth: int = 0) -> list[str]:

@@ -54,9 +54,10 @@ def record_head(layout: Layout) -> list[str]:
 def field_rows(payload: PayloadPlan) -> list[str]:
     """The layout: offset, type and name of each field, in wire order."""
     rows: list[tuple[str, str, str]] = []
+    moving = [step for segment in payload.segments[1:] for step in segment.steps]
     for step in payload.steps:
         offset = step.place.offset
-        place = "..." if offset is None else str(offset)
+        place = "..." if offset is None or step in moving else str(offset)
         if isinstance(step, BitsStep):
             rows.append((place, _wire_type(step), ""))
             rows += [("", f"  bits {m.shift}..{m.shift + m.bits - 1}", m.name) for m in step.members]

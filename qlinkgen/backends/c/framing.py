@@ -132,7 +132,10 @@ def _payload_lines(names: Names, plan: MessagePlan, has_struct: bool) -> tuple[l
     size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
     lines = []
     if message.variable:
-        lines.append(f"const size_t payload_size = {size_terms(message, 'message->')};")
+        size = size_terms(message, "message->")
+        if plan.payload.walked:
+            size = f"{names.function(message)}_size_(message)"
+        lines.append(f"const size_t payload_size = {size};")
         size, fits = "payload_size", f"{p}_fits_(capacity, payload_size)"
     start = f"(int){size}"
     if message.variable and is_wide(plan):

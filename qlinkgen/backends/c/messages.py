@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.backends import c_text
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.describe import field_rows, member_note, message_head, record_head
 from qlinkgen.backends.c.encode import Encoder
@@ -13,6 +14,7 @@ from qlinkgen.backends.c.framing import struct_parameter
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, is_wide, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Kind, Types
+from qlinkgen.backends.c.walked import WalkedDecoder, WalkedEncoder, size_lines
 from qlinkgen.model import naming
 from qlinkgen.model.fields import Layout, Value
 from qlinkgen.plan.payload import (
@@ -21,6 +23,7 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Member,
     PayloadPlan,
+    Presence,
     RecordsStep,
     RecordStep,
     RunStep,
@@ -58,6 +61,7 @@ class MessageView:
     members: list[StructMember]
     notes: list[str]
     initialiser: str
+    measure: list[str]
     encode: list[str] | None
     decode: list[str] | None
     scales: list[Kind]
@@ -112,7 +116,7 @@ class MessageWriter:
         head = message_head(self._names.command_of(message), message)
         values = zip(message.values, payload.settable, strict=True)
         notes = {value.name: member_note(value, step) for value, step in values}
-        members = [member for each in payload.settable for member in self._members(each, notes[each.name])]
+        members = self._struct(payload, notes)
         shape = payload, tuple(member.declaration for member in members)
         return MessageView(
             function=self._names.function(message),
@@ -129,7 +133,8 @@ class MessageWriter:
             same_struct=self._same("struct", shape, plan) if members else "",
             members=members,
             notes=[f"{name}: {note}" for name, note in notes.items() if note],
-            initialiser=", ".join(map(self._initialiser, payload.settable)),
+            initialiser=self._initialisers(payload),
+            measure=self._measure(payload, self._same("size", shape, plan)) if plan.encoded else [],
             encode=self._encode(plan, self._same("encode", shape, plan)) if plan.encoded else None,
             decode=self._decode(plan, self._same("decode", shape, plan)) if plan.decoded else None,
             scales=self._scales(self._names.function(message), payload),
@@ -150,10 +155,43 @@ class MessageWriter:
         first = self._first.setdefault((what, shape), own)
         return "" if first == own else first
 
+    def _struct(self, payload: PayloadPlan, notes: Mapping[str, str]) -> list[StructMember]:
+        """The members of a struct; one more tells whether a field that may be absent is present."""
+        members: list[StructMember] = []
+        for before, each in self._with_presence(payload):
+            if before is not None:
+                note = c_text.comment_line(f"whether {before.field} is present")
+                members.append(StructMember(f"bool has_{before.field};", note))
+            members += self._members(each, notes[each.name])
+        return members
+
+    def _initialisers(self, payload: PayloadPlan) -> str:
+        found: list[str] = []
+        for before, each in self._with_presence(payload):
+            found += [str(before.given).lower()] if before is not None else []
+            found.append(self._initialiser(each))
+        return ", ".join(found)
+
+    @staticmethod
+    def _with_presence(payload: PayloadPlan) -> Iterator[tuple[Presence | None, Holder]]:
+        """Each value, with what decides about its field if it is the first of it."""
+        last = None
+        for each in payload.settable:
+            yield each.presence if each.presence != last else None, each
+            last = each.presence
+
+    def _measure(self, payload: PayloadPlan, same: str) -> list[str]:
+        if not payload.walked:
+            return []
+        return [f"return {same}_size_(message);"] if same else size_lines(payload)
+
     def _encode(self, plan: MessagePlan, same: str) -> list[str]:
         own = "message, " if plan.payload.settable else ""
         if same:
             return [f"return {same}_encode({own}payload, capacity);"]
+        if plan.payload.walked:
+            encoder = WalkedEncoder(plan.payload, self._layouts, function=self._names.function(plan.message))
+            return [*encoder.statements(), "return (int)size;"]
         size = f"{self._names.constant(plan.message)}_MAX_SIZE" if plan.payload.fixed else "size"
         return [*Encoder(plan.payload, self._layouts).statements(), f"return (int){size};"]
 
@@ -161,6 +199,9 @@ class MessageWriter:
         own, ok = "message, " if plan.payload.settable else "", f"return {self._names.upper}_OK;"
         if same:
             return [f"return {same}_decode({own}payload, size);"]
+        if plan.payload.walked:
+            init = f"{self._names.constant(plan.message)}_INIT"
+            return [*WalkedDecoder(plan.payload, self._layouts, init=init).statements(), ok]
         decoder, empty = Decoder(plan.payload, self._layouts), list[str]()
         if plan.payload.empty_is_default and plan.payload.least > 0:
             empty = ["if (size == 0U) {", *(f"    {line}" for line in [*self._defaults(plan), ok]), "}"]
@@ -207,8 +248,8 @@ class MessageWriter:
             rows=field_rows(payload),
             size=payload.most,
             size_text=_size_text(payload.least, payload.most),
-            members=[m for each in payload.settable for m in self._members(each, notes[each.name])],
-            initialiser=", ".join(map(self._initialiser, payload.settable)),
+            members=self._struct(payload, notes),
+            initialiser=self._initialisers(payload),
             check=Encoder(payload, self._layouts).checks() if encoded else [],
             put=Encoder(payload, self._layouts).writes() if encoded else [],
             get=Decoder(payload, self._layouts).record() if decoded else [],

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from qlinkgen.backends.c.checks import broken, refusal
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, grouped
+from qlinkgen.backends.c.walked_size import walked_size_lines
 from qlinkgen.model.message import Message
 from qlinkgen.plan.expr import Size, Term, Within
 from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place, payload_plan
@@ -73,8 +74,12 @@ class Learner:
         return self.layouts.peek(count.integer, "payload", index_of(count.place, local))
 
     def learn(self, count: CountStep) -> None:
-        """Assign the number of items of the run and check it."""
-        integer, number, wide = count.integer, self.number(count), count.integer.bits > 16
+        """Declare the number of items of the run and check it."""
+        self.take(count, self.number(count), "const size_t ")
+
+    def take(self, count: CountStep, number: str, kind: str = "") -> None:
+        """Assign the number of items of the run and check it; ``kind`` declares it."""
+        integer, wide = count.integer, count.integer.bits > 16
         held, bounds = Within(0, integer.mask), count.bounds  # negative numbers are outside of them
         if wide:  # may exceed a size_t
             self.refuse(broken([bounds], number, held, integer.bits), "LENGTH")
@@ -82,9 +87,7 @@ class Learner:
             self.refuse([f"({number} % {count.scale}U) != 0U"], "LENGTH")
             number, held = f"{number} / {count.scale}U", Within(0, integer.mask // count.scale)
             bounds = Within(bounds.low // count.scale, bounds.high // count.scale)
-        self.lines.append(
-            f"const size_t {local(count.run)} = {f'(size_t){grouped(number)}' if wide else number};"
-        )
+        self.lines.append(f"{kind}{local(count.run)} = {f'(size_t){grouped(number)}' if wide else number};")
         if not wide:
             self.refuse(broken([bounds], local(count.run), held, 16), "LENGTH")
         self.known.append(count.run)
@@ -112,6 +115,8 @@ def _statements(learner: Learner) -> list[str]:
     """Lines of the case, which end with a return."""
     upper = learner.layouts.prefix.upper()
     ok, truncated = f"{upper}_OK", f"{upper}_ERROR_TRUNCATED"
+    if learner.payload.walked:
+        return walked_size_lines(learner)
     learner.lines.append(f"*size = {learner.payload.least}U;")
     for each in learner.payload.sizing:
         if isinstance(each, Learn):

@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.backends.conformance import streams
 from qlinkgen.backends.conformance.layout import call, comment, folded, numbers, row_lines
-from qlinkgen.backends.conformance.rows import Right, Row, Wrong
+from qlinkgen.backends.conformance.rows import Right, Row, Wrong, presences
 from qlinkgen.backends.conformance.sources import Header
 from qlinkgen.backends.conformance.streams import INTACT, Stream
 from qlinkgen.backends.conformance.unsent import Unsent, unsent
@@ -217,7 +217,13 @@ class Entries:
 
     def _rows_of(self, struct: str, inside: str, payload: PayloadPlan) -> list[str]:
         """The rows of the values of a message or a record."""
-        return [line for step in payload.settable for line in self._member(struct, inside, step)]
+        lines: list[str] = []
+        before = presences(payload.settable)
+        for step in payload.settable:
+            if step.name in before:
+                lines.append(f"NUMBER({struct}, {inside}has_{before[step.name].field}),")
+            lines += self._member(struct, inside, step)
+        return lines
 
     def _member(self, struct: str, inside: str, step: Holder) -> list[str]:
         name = inside + naming.member(step.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import assert_never
 
@@ -19,6 +19,7 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Member,
     PayloadPlan,
+    Presence,
     RecordsStep,
     RecordStep,
     RunStep,
@@ -135,6 +136,17 @@ def held(message: MessagePlan) -> Sequence[Holder]:
     return (*(member for _, member in message.envelope.values), *message.payload.settable)
 
 
+def presences(held: Sequence[Holder]) -> dict[str, Presence]:
+    """What decides about fields that may be absent, by the first value of each."""
+    found: dict[str, Presence] = {}
+    last = None
+    for step in held:
+        if step.presence is not None and step.presence != last:
+            found[step.name] = step.presence
+        last = step.presence
+    return found
+
+
 def _beside(plan: Plan, header: Header, entry: JsonObject) -> bytes:
     """The values of the frame."""
     found = b""
@@ -148,21 +160,23 @@ def _beside(plan: Plan, header: Header, entry: JsonObject) -> bytes:
 
 def most_values(header: Header, holders: Sequence[Holder]) -> int:
     """Maximum size of these values in a vector."""
-    return sum(_most(header, step) for step in holders)
+    return sum(_most(header, step) for step in holders) + len(presences(holders))
 
 
 def value_sizes(header: Header, holders: Sequence[Holder], values: bytes) -> list[int]:
     """Size of each value in a vector."""
     sizes: list[int] = []
+    before = presences(holders)
     for step in holders:
+        told = int(step.name in before)
         match step:
             case ValueStep() | Member() | RecordStep():
-                sizes.append(_most(header, step))
+                sizes.append(told + _most(header, step))
             case BytesStep() | ItemsStep() | RecordsStep():
-                at, counted = sum(sizes), _counted(header, step)
+                at, counted = sum(sizes) + told, _counted(header, step)
                 most = step.length.maximum
                 count = int.from_bytes(values[at : at + counted], "big") if counted else most
-                sizes.append(counted + _item(header, step) * count)
+                sizes.append(told + counted + _item(header, step) * count)
             case _:
                 assert_never(step)
     return sizes
@@ -202,8 +216,20 @@ def _values(
     header: Header, stated: Sequence[Value], payload: PayloadPlan, fields: JsonObject, raw: JsonObject
 ) -> bytes:
     """The values of a message or a record."""
-    pairs = zip(stated, payload.settable, strict=True)
-    return b"".join(_value(header, value, step, fields, raw.get(value.name)) for value, step in pairs)
+    before, data = presences(payload.settable), b""
+    for value, step in zip(stated, payload.settable, strict=True):
+        absent = step.presence is not None and _native(value, fields) is None
+        data += bytes((not absent,)) if value.name in before else b""
+        if absent:
+            data += _value(header, _always(value), step, {}, None)
+        else:
+            data += _value(header, value, step, fields, raw.get(value.name))
+    return data
+
+
+def _always(value: Value) -> Value:
+    """The value with its default, which the struct holds where its field is absent."""
+    return replace(value, field=replace(value.field, given=True))
 
 
 def _value(header: Header, value: Value, step: Holder, fields: JsonObject, raw: object) -> bytes:

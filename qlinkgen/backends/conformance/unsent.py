@@ -36,6 +36,9 @@ def _spoilt(header: Header, holders: Sequence[Holder], values: bytes) -> Iterato
     at = 0
     for step, size in zip(holders, value_sizes(header, holders, values), strict=True):
         own, after = values[at : at + size], values[at + size :]
+        if step.presence is not None:
+            at += size
+            continue
         if isinstance(step, ValueStep | Member):
             for number in _outside(step.number, size):
                 yield f"{step.name} is {number}", values[:at] + number_bytes(number, size) + after

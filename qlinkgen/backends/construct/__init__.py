@@ -37,9 +37,10 @@ _SUPPORT = {
     "Fletcher Id IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
     "_ended": "Add Cobs Digits EndedFrame Escape Insert Pair",
     "_frecords": "Record",
+    "_fwalks": "Walked",
 }
 #: Copied only if a tree uses them.
-_OPTIONAL = ("_ended", "_frecords", "_packed")
+_OPTIONAL = ("_ended", "_frecords", "_fwalks", "_packed")
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
 }
@@ -69,7 +70,11 @@ def _imports(everything: tuple[Definition, ...]) -> str:
     by_origin: dict[str, list[str]] = {}
     for name in sorted(names, key=_order):
         by_origin.setdefault(_ORIGINS.get(name, "construct"), []).append(name)
-    blocks = (["decimal"], ["construct"], ["._ended", "._fields", "._frames", "._frecords", "._packed"])
+    blocks = (
+        ["decimal"],
+        ["construct"],
+        ["._ended", "._fields", "._frames", "._frecords", "._fwalks", "._packed"],
+    )
     lines = (
         "".join(_import(origin, by_origin[origin]) for origin in block if origin in by_origin)
         for block in blocks

@@ -34,7 +34,7 @@ from qlinkgen.plan.framing import (
     PayloadPart,
     Rescan,
 )
-from qlinkgen.plan.payload import Member
+from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -81,9 +81,20 @@ def _message(message: MessagePlan, types: Types) -> Call:
         settings["empty_is_default"] = True
     if message.message.seeds:
         settings["seeds"] = message.message.seeds
+    if message.payload.walked:
+        settings["presence"] = Sequence(tuple(_presence(message.payload)))
+    name = "Walked" if message.payload.walked else "Message"
     return Call(
-        "Message", (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
+        name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )
+
+
+def _presence(payload: PayloadPlan) -> Iterator[Node]:
+    """The fields that may be absent, and what decides."""
+    for segment in payload.segments:
+        if presence := segment.presence:
+            tests: tuple[Node, ...] = tuple((each.value, each.ranges, each.negated) for each in presence.when)
+            yield presence.field, tests, presence.given
 
 
 # Frames

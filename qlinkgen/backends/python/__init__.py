@@ -28,7 +28,7 @@ A codec needs only the standard library and `_support` in this folder.
 def generate(protocol: Protocol, options: Options) -> Outputs:
     """The module of a protocol and the files of its package, by path."""
     text = render(plan_of(protocol, options))
-    shared = [name for name in ("_rules", "_records") if f"\nfrom .{name} import" in text]
+    shared = [name for name in ("_rules", "_rwalks", "_records") if f"\nfrom .{name} import" in text]
     support = ["_support.py", *(f"{name}.py" for name in shared)]
     folder = importlib.resources.files(__package__)
     return {

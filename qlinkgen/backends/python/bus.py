@@ -119,6 +119,7 @@ class BusView:
     table: Sequence[str]
     imports: Sequence[str]
     decimals: bool
+    new: bool
     public: Sequence[str]
     callers: Sequence[Caller]
     handlers: Sequence[Method]
@@ -158,6 +159,7 @@ class BusModule:
             if fits
             else [f"{source}(", *(f"    {each}," for each in classes), ")"],
             decimals="Decimal" in self._place.used,
+            new="NEW" in self._place.used,
             public=sorted([*(each.name for each in callers), *(["SlaveHandlers"] if handlers else [])]),
             callers=callers,
             handlers=handlers,

@@ -15,6 +15,7 @@ from qlinkgen.backends.python.layout import WIDTH, calls, in_hex, indented, list
 from qlinkgen.backends.python.measure import measure_lines
 from qlinkgen.backends.python.names import attribute, class_name, constant_name, natural
 from qlinkgen.backends.python.place import Place
+from qlinkgen.backends.python.walked import WalkedDecoder, WalkedEncoder
 from qlinkgen.model.fields import Layout, Value
 from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
@@ -59,6 +60,8 @@ class ClassModel:
     constants: Sequence[str] = field(default_factory=tuple)
     body_size: int | None = None
     has_codec: bool = False
+    #: Encoding can fail because a field is absent or present.
+    walked: bool = False
 
     @property
     def refusable(self) -> bool:
@@ -166,9 +169,12 @@ class ClassBuilder:
     def _with_codec(self, message: MessagePlan, head: ClassModel, title: str, number: str) -> ClassModel:
         """A class with its code; ``title`` is a part of the names of its constants, ``number`` is its id."""
         scales = self._scales_of(message)
-        encoder = Encoder(message, self._place, title, number, scales)
-        decoder = Decoder(message, self._place, title, scales)
+        walked = message.payload.walked
+        make_encoder, make_decoder = (WalkedEncoder, WalkedDecoder) if walked else (Encoder, Decoder)
+        encoder = make_encoder(message, self._place, title, number, scales)
+        decoder = make_decoder(message, self._place, title, scales)
         name = "" if self._place.envelope is None else "body"
+        encode = encoder.statements(name)
         held = (*self._place.beside, *message.payload.settable)
         names = sorted((attribute(each.name) for each in held), key=natural)
         return replace(
@@ -176,12 +182,13 @@ class ClassBuilder:
             slots=listing("__slots__ = (", [f'"{name}"' for name in names], ")", 4),
             facts=[*head.facts, *self._facts(message, scales)],
             init=self._init(message),
-            encode=encoder.statements(name),
+            encode=encode,
             decode=decoder.statements(),
             measure=measure_lines(message.payload) if self._measured and number else [],
             constants=[*encoder.constants, *decoder.constants],
             body_size=self._body_size(message),
             has_codec=True,
+            walked=any("misplaced(" in line for line in encode),
         )
 
     @property

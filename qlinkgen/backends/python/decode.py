@@ -316,7 +316,7 @@ class Decoder:
             )
             lines += [
                 *self._start(row.start),
-                *_assigned(row.targets, f"{name}({place.data}, {self._from(row.start)})"),
+                *assigned_targets(row.targets, f"{name}({place.data}, {self._from(row.start)})"),
             ]
         if payload.fixed and not (alone and rows):
             size = payload.most + place.overhead
@@ -331,12 +331,12 @@ class Decoder:
         text = place.prefix + format_of([*row.codes, *trailer])
         if run is None:
             self.constants.append(f'{name} = {place.use("Struct")}("{text}").unpack')
-            return _assigned(row.targets, f"{name}({place.data})")
+            return assigned_targets(row.targets, f"{name}({place.data})")
         fixed = self.message.payload.size.fixed + place.overhead
         key = f"{fixed} + n * {run.item_size}" if fixed else f"n * {run.item_size}"
         place.use("Struct")
         self.constants += table(name, text, "unpack", run, key)
-        return _assigned(row.targets, f"{name}[len({place.data})]({place.data})")
+        return assigned_targets(row.targets, f"{name}[len({place.data})]({place.data})")
 
     # Sizes
 
@@ -357,11 +357,11 @@ class Decoder:
                 left = f"len({self.place.data})"
                 if others != "0":
                     left += f" - {others}" if others.isdecimal() else f" - ({others})"
-                return _divided(sizing.run, left, sizing.run.item_size, self._bad_layout)
+                return divided(sizing.run, left, sizing.run.item_size, self._bad_layout)
             case Learn():
                 run = self.message.payload.run(sizing.count.run)
                 start, number = self._count(sizing.count)
-                return [*start, *_divided(run, number, sizing.count.scale, self._bad_layout)]
+                return [*start, *divided(run, number, sizing.count.scale, self._bad_layout)]
             case Compare():
                 start, number = self._count(sizing.count)
                 return [*start, f"if {number} != {_expected(sizing.count)}:", self._bad_layout]
@@ -388,9 +388,9 @@ class Decoder:
                 self._value(step, at)
             case ConstantStep():
                 number = self._get(step.integer, f"{step.name}_raw", at)
-                self._put_together(step.integer, number, step.name, _offset(step))
+                self._put_together(step.integer, number, step.name, self._offset(step))
                 rule = Within(step.value, step.value)
-                self._refuse(integers.broken(rule, number), step.name, number, _offset(step))
+                self._refuse(integers.broken(rule, number), step.name, number, self._offset(step))
             case ReservedStep():
                 self._row(at).codes.append(f"{step.integer.size}x")
             case CountStep():
@@ -405,6 +405,12 @@ class Decoder:
                 self._records(step, at)
             case _:
                 assert_never(step)
+
+    def _offset(self, step: Step) -> str:
+        """The offset of a step in the payload: from its beginning, negative from its end, or computed."""
+        if step.place.offset is not None:
+            return str(step.place.offset)
+        return str(-step.place.back) if step.place.back is not None else integers.size_text(step.place.front)
 
     def _refuse(self, test: str, name: str, seen: str, offset: str, data: str = "") -> None:
         call = wrapped(
@@ -428,9 +434,9 @@ class Decoder:
             self._get(step.integer, raw, at, target)
             return
         self._get(step.integer, raw, at)
-        self._put_together(step.integer, raw, step.name, _offset(step))
+        self._put_together(step.integer, raw, step.name, self._offset(step))
         for rule in step.conditions:
-            self._refuse(integers.broken(rule, raw), step.name, raw, _offset(step))
+            self._refuse(integers.broken(rule, raw), step.name, raw, self._offset(step))
         self._values += assigned(target, step.number, raw, self.scales.get(step.name, ""), self.place)
 
     def _float(self, step: ValueStep, kind: Float, target: str, at: Size) -> None:
@@ -443,12 +449,12 @@ class Decoder:
             taken = f'{self.place.use("unpack")}("{floats.format_of(kind, step.integer)}", {raw})'
             self._values.append(f"({number},) = {taken}")
         if legal:
-            self._refuse(f"not {legal[0]}", step.name, raw, _offset(step))
+            self._refuse(f"not {legal[0]}", step.name, raw, self._offset(step))
             self._values.append(f"{target} = {raw}")
 
     def _count_step(self, step: CountStep, at: Size) -> None:
         """A count has been read with the sizes, except in a payload with a single struct."""
-        local, offset = f"{step.name}_raw", _offset(step)
+        local, offset = f"{step.name}_raw", self._offset(step)
         if self._tabled:
             number = self._size(step.integer, local, at, step.name, offset)
             items = f"len({_items_of(self._tabled)})"
@@ -464,11 +470,11 @@ class Decoder:
     def _bits(self, step: BitsStep, at: Size) -> None:
         whole = f"{step.name}_whole"
         self._get(step.integer, whole, at)
-        self._put_together(step.integer, whole, step.name, _offset(step))
+        self._put_together(step.integer, whole, step.name, self._offset(step))
         for member in step.members:
             mask = (1 << member.bits) - 1
             taken = f"{whole} >> {member.shift} & 0x{mask:X}" if member.shift else f"{whole} & 0x{mask:X}"
-            self._member(member, taken, _offset(step))
+            self._member(member, taken, self._offset(step))
 
     def _member(self, member: Member, taken: str, offset: str, data: str = "") -> None:
         raw, target = f"{member.name}_raw", f"message.{attribute(member.name)}"
@@ -497,7 +503,7 @@ class Decoder:
             value = raw if step.text else target
             self._values.append(f"{value} = {raw}.rstrip({literal(step.pad)})")
         if step.text:
-            self._refuse(f"not {raw}.isascii()", step.name, raw, _offset(step))
+            self._refuse(f"not {raw}.isascii()", step.name, raw, self._offset(step))
             self._values.append(f'{target} = {raw}.decode("ascii")')
 
     def _slice(self, step: RunStep, target: str) -> None:
@@ -538,7 +544,7 @@ class Decoder:
         rules = [integers.holds(rule, "item") for rule in step.conditions]
         for rule in floats.holds(kind, "item") if isinstance(kind, Float) else rules:
             test = f"not all({rule} for item in {target})"
-            self._refuse(test, step.name, target, _offset(step))
+            self._refuse(test, step.name, target, self._offset(step))
         if not plain:
             item = converted(step.number, "item", self.scales.get(step.name, ""), self.place)
             self._values.append(f"{whole} = [{item} for item in {target}]")
@@ -557,7 +563,7 @@ class Decoder:
             else:
                 self._open = False
                 given.append(f"{step.name}_count")
-        seen = ["error", "cls", f'"{name}"', _offset(step), place.payload]
+        seen = ["error", "cls", f'"{name}"', self._offset(step), place.payload]
         self._values += [
             *self._start(at),
             "try:",
@@ -610,7 +616,7 @@ class Decoder:
             self._slice(step, raw)
         places = f"for index in range(0, len({raw}), {size})"
         if item.bcd:
-            self._refuse(f"{raw} and not {raw}.hex().isdecimal()", step.name, raw, _offset(step))
+            self._refuse(f"{raw} and not {raw}.hex().isdecimal()", step.name, raw, self._offset(step))
         if item.byteorder is not None:
             number = integers.from_bytes(item, f"{raw}[index : index + {size}]")
         else:
@@ -618,7 +624,7 @@ class Decoder:
             for index, chunk in enumerate(item.chunks):
                 if chunk.bits < 8:
                     seen = f"max({raw}[{index}::{size}], default=0)"
-                    self._refuse(f"{seen} > 0x{chunk.mask:02X}", step.name, raw, _offset(step))
+                    self._refuse(f"{seen} > 0x{chunk.mask:02X}", step.name, raw, self._offset(step))
             number = " | ".join(integers.group_terms(item, sources))
             if item.signed:
                 number = integers.sign_extended(f"({number})", item.bits)
@@ -678,7 +684,7 @@ def _expected(count: CountStep) -> str:
     return integers.term_text(count.term)
 
 
-def _divided(run: RunStep, number: str, unit: int, otherwise: str) -> list[str]:
+def divided(run: RunStep, number: str, unit: int, otherwise: str) -> list[str]:
     """Statements that derive the count of a run from a number of units and check it."""
     count, odd = f"{run.name}_count", ""
     bounds = integers.broken(Within(run.length.minimum, run.length.maximum), count)
@@ -690,14 +696,8 @@ def _divided(run: RunStep, number: str, unit: int, otherwise: str) -> list[str]:
     return [first, f"if {odd}{bounds}:", otherwise]
 
 
-def _offset(step: Step) -> str:
-    """The offset of a step in the payload: from its beginning, negative from its end, or computed."""
-    if step.place.offset is not None:
-        return str(step.place.offset)
-    return str(-step.place.back) if step.place.back is not None else integers.size_text(step.place.front)
-
-
-def _assigned(targets: Sequence[str], call: str) -> list[str]:
+def assigned_targets(targets: Sequence[str], call: str) -> list[str]:
+    """The statement that assigns what a call returns to several targets."""
     if len(targets) == 1:
         return [f"({targets[0]},) = {call}"]
     line = f"{', '.join(targets)} = {call}"

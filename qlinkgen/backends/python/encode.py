@@ -158,6 +158,10 @@ class Encoder:
             case _:
                 assert_never(part)
 
+    def _size(self, part: LengthPart) -> str:
+        """What a length counts, in bytes."""
+        return integers.size_text(self.message.payload.size + part.bias)
+
     def _addressed(self) -> str:
         """The address, which must be legal."""
         number = f"self.{self.place.address}"
@@ -169,7 +173,7 @@ class Encoder:
         """The integer of a part."""
         match part:
             case LengthPart():
-                size = integers.size_text(self.message.payload.size + part.bias)
+                size = self._size(part)
                 return f"({size}) // {part.scale}" if part.scale > 1 else size
             case IdPart():
                 return self.number

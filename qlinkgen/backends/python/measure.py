@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from qlinkgen.backends.python import integers
+from qlinkgen.backends.python.walked import walked_measure_lines
 from qlinkgen.plan.expr import Within
 from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, term_of
 
@@ -15,6 +16,8 @@ def measure_lines(payload: PayloadPlan) -> list[str]:
     """
     if payload.fixed:
         return []
+    if payload.walked:
+        return walked_measure_lines(payload)
     lines = [f"size = {payload.least}"]
     for each in payload.sizing:
         if isinstance(each, Learn):

@@ -32,7 +32,8 @@ _STRUCT = ("Struct", "pack", "unpack", "unpack_from")
 _RULES = ("FloatRule", "ListRule", "PaddedRule")
 _RECORD = "BaseRecord"
 _RECORDS = (_RECORD, "RecordRule", "RecordsRule", "inside", "read_record", "read_records")
-_ELSEWHERE = ("Decimal", "index", *_STRUCT, *_RULES, *_RECORDS)
+_WALKS = ("MaybeRule", "Misplaced", "NEW", "misplaced")
+_ELSEWHERE = ("Decimal", "index", *_STRUCT, *_RULES, *_RECORDS, *_WALKS)
 
 
 def render(plan: Plan) -> str:
@@ -68,6 +69,7 @@ class Imports:
     rules: Sequence[str]
     support: Sequence[str]
     records: Sequence[str]
+    walks: Sequence[str]
     callable: bool
     typing: Sequence[str]
 
@@ -177,6 +179,7 @@ class Module:
         used |= (
             {"REFUSALS", "settled"} if any(each.has_codec and each.refusable for each in models) else set()
         )
+        used |= {"Misplaced"} if any(each.walked for each in models) else set()
         typing = {"ClassVar", "Literal", "Self"}
         typing |= {"Final"} if plan.flags else set()
         check = None if isinstance(view, PacketView) else view.check
@@ -208,6 +211,7 @@ class Module:
             rules=[name for name in _RULES if name in used],
             support=sorted(used - set(_ELSEWHERE), key=imported),
             records=sorted(used & set(_RECORDS), key=imported),
+            walks=sorted(used & set(_WALKS), key=imported),
             callable=isinstance(view, UniqueView),
             typing=sorted(typing),
         )

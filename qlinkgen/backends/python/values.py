@@ -29,6 +29,7 @@ from qlinkgen.plan.payload import (
     ReservedStep,
     Step,
     ValueStep,
+    holders,
     is_required,
 )
 from qlinkgen.plan.tree import MessagePlan
@@ -36,6 +37,11 @@ from qlinkgen.plan.tree import MessagePlan
 
 def annotation(each: Holder, place: Place) -> str:
     """Type of the attribute."""
+    kind = _annotation(each, place)
+    return f"{kind} | None" if each.presence is not None else kind
+
+
+def _annotation(each: Holder, place: Place) -> str:
     match each:
         case ItemsStep():
             return f"list[{_number_type(each.number, place)}]"
@@ -68,7 +74,11 @@ def argument(each: Holder, place: Place) -> str:
     kind, name = annotation(each, place), attribute(each.name)
     if is_required(each):
         return f"{name}: {kind}"
+    if each.presence is not None and not each.presence.given:
+        return f"{name}: {kind} = None"
     if isinstance(each, ItemsStep | RecordStep | RecordsStep):
+        if each.presence is not None:
+            return f"{name}: {kind} = {place.use('NEW')}"
         return f"{name}: {kind} | None = None"
     return f"{name}: {kind} = {default(each, place)}"
 
@@ -76,6 +86,13 @@ def argument(each: Holder, place: Place) -> str:
 def assignment(each: Holder, place: Place) -> str:
     """The statement that stores an argument; each message gets a new list or record as a default."""
     name = attribute(each.name)
+    if each.presence is not None:
+        new = each.presence.given and isinstance(each, ItemsStep | RecordStep | RecordsStep)
+        return (
+            f"self.{name} = {default(each, place)} if {name} is NEW else {name}"
+            if new
+            else f"self.{name} = {name}"
+        )
     if isinstance(each, ItemsStep | RecordStep | RecordsStep) and not each.required:
         return f"self.{name} = {default(each, place)} if {name} is None else {name}"
     return f"self.{name} = {name}"
@@ -166,6 +183,19 @@ def _rule(place: Place, kind: str, name: str, *arguments: object, unit: str = ""
 
 
 def _rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
+    """The rules of a step."""
+    rules = _plain_rules(step, place, scales)
+    settable = {attribute(each.name) for each in holders((step,))}
+    if step.presence is None:
+        return rules
+    return [_maybe(each, place) if each.arguments[0].strip('"') in settable else each for each in rules]
+
+
+def _maybe(rule: Call, place: Place) -> Call:
+    return Call(place.use("MaybeRule"), [rule.flat])
+
+
+def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Call]:
     name = attribute(step.name)
     match step:
         case ConstantStep():

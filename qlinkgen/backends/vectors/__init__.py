@@ -156,6 +156,8 @@ def _has_other_raws(plan: PayloadPlan) -> bool:
 
 def _numbers(step: RecordStep | RecordsStep, raw: Raw) -> Json:
     """The raw numbers of records."""
+    if raw is None:
+        return None
     if isinstance(raw, Mapping):
         return _numbers_of(step.record.payload, raw)
     assert isinstance(raw, Sequence)
@@ -168,7 +170,7 @@ def _numbers_of(plan: PayloadPlan, raw: Mapping[str, Raw]) -> Json:
         value = raw[each.name]
         if isinstance(each, RecordStep | RecordsStep):
             found[each.name] = _numbers(each, value)
-        elif isinstance(each, ItemsStep):
+        elif isinstance(each, ItemsStep) and value is not None:
             assert isinstance(value, list)
             found[each.name] = value
         elif isinstance(value, int):

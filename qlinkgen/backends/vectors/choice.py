@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import assert_never
 
 from qlinkgen.model.integer import Integer, unpack_chunks
@@ -20,12 +20,16 @@ from qlinkgen.plan.payload import (
     ItemsStep,
     Member,
     PayloadPlan,
+    Presence,
     RecordsStep,
     RecordStep,
     ReservedStep,
+    Step,
     ValueStep,
     conditions,
+    holders,
 )
+from qlinkgen.plan.walk import present
 
 
 class Chance:
@@ -70,30 +74,14 @@ class Rule:
     def values(self, plan: PayloadPlan) -> dict[str, Raw]:
         """The raw values of a payload."""
         found: dict[str, Raw] = {}
+        sent = True
         for step in plan.steps:
-            match step:
-                case ValueStep():
-                    found[step.name] = self._chosen(step.number, self._bits(step.integer))
-                case BitsStep():
-                    bits = self._bits(step.integer)
-                    for member in step.members:
-                        found[member.name] = self._chosen(member.number, bits >> member.shift)
-                case BytesStep():
-                    mask = 0x7F if step.text else 0xFF
-                    octets = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
-                    found[step.name] = step.stripped(octets)
-                case ItemsStep():
-                    bits, count = self._bits(step.item), self._count(step.length)
-                    found[step.name] = [self._chosen(step.number, bits) for _ in range(count)]
-                case RecordStep():
-                    found[step.name] = self.values(step.record.payload)
-                case RecordsStep():
-                    count = self._count(step.length)
-                    found[step.name] = [self.values(step.record.payload) for _ in range(count)]
-                case ConstantStep() | ReservedStep() | CountStep():
-                    pass
-                case _:
-                    assert_never(step)
+            if step.presence is not None:
+                sent = self._sends(step.presence, found, sent=sent)
+                if not sent:
+                    found |= {each.name: None for each in holders((step,))}
+                    continue
+            found |= self._of(step)
         return found
 
     def beside(self, envelope: Envelope) -> dict[str, Raw]:
@@ -102,6 +90,37 @@ class Rule:
             member.name: self._chosen(member.number, self._bits(part.integer) >> member.shift)
             for part, member in envelope.values
         }
+
+    def _sends(self, presence: Presence, found: Mapping[str, Raw], *, sent: bool) -> bool:
+        """Whether a field that may be absent is sent; an optional one is not if the one before it was not."""
+        if presence.optional:
+            return sent and self._count(Length(0, 1)) == 1
+        return present(presence, {name: raw for name, raw in found.items() if isinstance(raw, int)}, 0)
+
+    def _of(self, step: Step) -> dict[str, Raw]:
+        """The raw values of a step."""
+        match step:
+            case ValueStep():
+                return {step.name: self._chosen(step.number, self._bits(step.integer))}
+            case BitsStep():
+                bits = self._bits(step.integer)
+                return {each.name: self._chosen(each.number, bits >> each.shift) for each in step.members}
+            case BytesStep():
+                mask = 0x7F if step.text else 0xFF
+                octets = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
+                return {step.name: step.stripped(octets)}
+            case ItemsStep():
+                bits, count = self._bits(step.item), self._count(step.length)
+                return {step.name: [self._chosen(step.number, bits) for _ in range(count)]}
+            case RecordStep():
+                return {step.name: self.values(step.record.payload)}
+            case RecordsStep():
+                count = self._count(step.length)
+                return {step.name: [self.values(step.record.payload) for _ in range(count)]}
+            case ConstantStep() | ReservedStep() | CountStep():
+                return {}
+            case _:
+                assert_never(step)
 
     def _bits(self, integer: Integer) -> int:
         if not integer.chunks:  # in a row of bits
@@ -173,6 +192,8 @@ def defaults(plan: PayloadPlan) -> dict[str, Raw]:
 
 def _default(each: Holder) -> Raw:
     match each:
+        case _ if each.presence is not None and not each.presence.given:
+            return None
         case ItemsStep():
             rules = each.conditions
             return [each.number.default if broken(rules, item) else item for item in each.default]

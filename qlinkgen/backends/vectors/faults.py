@@ -17,7 +17,7 @@ from qlinkgen.backends.vectors.writer import Json
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.coding import Insertion
-from qlinkgen.plan.content import Raw, count_items, pack, pack_items, unpack_items
+from qlinkgen.plan.content import Raw, pack, pack_items, places, unpack_items
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
 from qlinkgen.plan.framing import (
     AddressPart,
@@ -268,9 +268,7 @@ class _Frame:
 
     def _payloads(self) -> Iterator[tuple[str, bytes]]:
         plan, payload, length = self._message.payload, self._good.payload, self._envelope.length
-        counts = count_items(plan, payload)
-        for step in plan.steps:
-            at = step.place.front.value(counts)
+        for step, at in places(plan, payload):
             for name, number, data in _spoilt(step, payload[at:]):
                 yield f"{name} is {number}", payload[:at] + data + payload[at + len(data) :]
         if length is None or length.integer.unpack(self._cells[length.name]) < length.integer.maximum:

@@ -10,6 +10,7 @@ from tests.support.whole.reference import Raw, Reference
 from tests.support.whole.reference.document import Message, Number, Record, Records, Value
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.special import Packets
+from tests.support.whole.reference.values import holds
 
 
 def mark(reference: Reference) -> int:
@@ -30,7 +31,15 @@ def request(reference: Reference, message: Message, rng: random.Random) -> bytes
 
 def values(message: Message, rng: random.Random, mark: int) -> dict[str, Raw]:
     """Legal values, often bounds and the stuffed byte."""
-    return {name: _value(kind, rng, mark) for name, kind in message.values()}
+    found: dict[str, Raw] = {name: _value(kind, rng, mark) for name, kind in message.beside}
+    left_out = False
+    for slot in message.slots:
+        sent = holds(slot, {name: raw for name, raw in found.items() if isinstance(raw, int)})
+        if slot.optional:
+            left_out = left_out or rng.random() < 0.3
+            sent = not left_out
+        found |= {name: _value(kind, rng, mark) if sent else None for name, kind in slot.values()}
+    return found
 
 
 def _value(kind: Value, rng: random.Random, mark: int) -> Raw:

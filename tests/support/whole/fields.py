@@ -61,6 +61,8 @@ class FieldMaker:
     records: dict[str, Structure] = field(default_factory=dict)
     #: Fraction of fields that are records.
     structured: float = 0.12
+    #: Fraction of messages in which fields may be absent.
+    conditional: float = 0.25
 
     def types(self) -> Doc:
         """Enums, flags and named types."""
@@ -159,6 +161,7 @@ class FieldMaker:
             if size <= room.left:
                 made.append((name, spec))
                 room.left -= size
+        fixed = room.fixed
         count = rng.choice((0, 1, 1, 2, 3, 3, 4, 5, 7))
         for _ in range(count):
             self._add_field(made, taken, room)
@@ -166,7 +169,76 @@ class FieldMaker:
             made.append((self.words.name(taken), "u8"))
         if self.shape.word > 1:
             self._fill_words(made, taken)
+        if not fixed and not room.least and self.rng.random() < self.conditional:
+            self._add_conditions(made, set(begun or {}))
         return dict(made)
+
+    def _add_conditions(self, made: list[tuple[str, Any]], kept: set[str]) -> None:
+        """Conditions on some fields, and optional fields at the end; `kept` fields stay as they are."""
+        rng = self.rng
+        opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
+        specs: dict[str, Doc] = {
+            name: dict(spec) if isinstance(spec, dict) else {"type": spec} for name, spec in made
+        }
+        if any("packed" in spec and ".." in spec["type"] for spec in specs.values()):
+            return
+        order = [name for name, _ in made]
+        for at in range(opened):
+            name = order[at]
+            spec = specs[name]
+            if name in kept or "counts" in spec or rng.random() < 0.5:
+                continue
+            counts = [each for each in order if specs[each].get("counts") == name]
+            before = order[: min([order.index(each) for each in counts] + [at])]
+            choices = [
+                each for other in before if "if" not in specs[other] for each in self._tests(other, specs)
+            ]
+            if choices:
+                for each in (name, *counts):
+                    specs[each]["if"] = choices[0] if len(choices) == 1 else choices[len(choices) // 2]
+        while order and opened == len(made) and self.shape.has_length and rng.random() < 0.4:
+            name = order.pop()
+            run = ".." in specs[name]["type"] or specs[name]["type"] in ("bytes", "text")
+            if run or name in kept or {"if", "const", "reserved", "counts"} & specs[name].keys():
+                break
+            specs[name]["optional"] = True
+        made[:] = [(name, specs[name] if len(specs[name]) > 1 else spec) for name, spec in made]
+
+    def _tests(self, name: str, specs: dict[str, Doc]) -> list[Any]:
+        """A condition on a field, or on some of its bits."""
+        spec = specs[name]
+        kind = spec["type"]
+        if "bits" in spec:
+            return [self._test(f"{name}.{bit}", *self._bit_limits(each)) for bit, each in spec["bits"].items()
+                    if isinstance(each, int | str)]  # fmt: skip
+        if set(spec) - {"type", "byteorder", "default", "doc", "unit"} or "[" in kind:
+            return []
+        if kind == "bool":
+            return [self.rng.choice((name, {name: True}, {name: False}))]
+        if kind in self.enums:
+            members = list(self.enums[kind]["values"])
+            number = self.enums[kind]["values"][members[-1]]
+            return [self.rng.choice(({name: members[0]}, {name: f"not {members[0]}"}, {name: members[:2]},
+                                     {name: number}))]  # fmt: skip
+        return [self._test(name, *_limits(kind))] if kind[:1] in "ui" and kind[1:].isdigit() else []
+
+    @staticmethod
+    def _bit_limits(spec: int | str) -> tuple[int, int]:
+        first, _, last = str(spec).partition("..")
+        return 0, (1 << int(last or first) + 1 - int(first)) - 1
+
+    def _test(self, ref: str, low: int, high: int) -> Any:
+        middle = (low + high) // 2
+        return self.rng.choice(
+            (
+                {ref: low},
+                {ref: high},
+                {ref: f"{low}..{middle}"},
+                {ref: f"not {low}..{middle}"},
+                {ref: [high, low]},
+                {ref: f"not {high}"},
+            )
+        )
 
     def _add_field(self, made: list[tuple[str, Any]], taken: set[str], room: Room) -> None:
         roll = self.rng.random()

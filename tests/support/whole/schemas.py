@@ -184,7 +184,8 @@ class _Maker:
         counters = [name for name, spec in request.items() if spec in ("u8", "u16")]
         if counters and rng.random() < 0.4:
             command["repeat"] = {"counter": rng.choice(counters)}
-        if shape.has_length and request and not shape.least and rng.random() < 0.15:
+        absent = any(isinstance(spec, dict) and {"if", "optional"} & spec.keys() for spec in request.values())
+        if shape.has_length and request and not shape.least and not absent and rng.random() < 0.15:
             command["empty_request"] = "defaults"
         if rng.random() < 0.2:
             command["in_flight"] = rng.randint(1, 3)

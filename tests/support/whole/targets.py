@@ -30,6 +30,7 @@ from tests.support.whole.reference import Event, Raw, Reference, Seen, Wrong
 from tests.support.whole.reference.document import Message, Number, Record, Records, Run, Value
 from tests.support.whole.reference.frames import Frame
 from tests.support.whole.reference.values import decode as decode_payload
+from tests.support.whole.reference.values import default
 
 _EXACT = Context(prec=200)
 
@@ -82,7 +83,9 @@ class Target:
 
 
 def native(kind: Value, raw: Any) -> Any:
-    """An int, bool, float or Decimal in the unit; bytes, text, a list; a dict for a record."""
+    """An int, bool, float or Decimal in the unit, bytes, text, lists, dicts for records; None if absent."""
+    if raw is None:
+        return None
     if isinstance(kind, Record):
         return {name: native(each, raw[name]) for name, each in kind.values()}
     if isinstance(kind, Records):
@@ -108,6 +111,8 @@ def native(kind: Value, raw: Any) -> Any:
 
 def raw_of(kind: Value, found: Any) -> Raw:
     """The integer that represents a value. Raises TypeError or ValueError for a value without one."""
+    if found is None:
+        return None
     if isinstance(kind, Record):
         return _record_of(kind, found)
     if isinstance(kind, Records):
@@ -136,6 +141,8 @@ def _number_of(kind: Number, found: Any) -> int:
 
 def told(kind: Value, raw: Any) -> Raw:
     """A raw value without what a NaN does not preserve."""
+    if raw is None:
+        return None
     if isinstance(kind, Record):
         return {name: told(each, raw[name]) for name, each in kind.values()}
     if isinstance(kind, Records):
@@ -374,7 +381,7 @@ class CTarget(Target):
             "encode",
             message.name,
             place,
-            *(w for name, kind in message.values() for w in _words(kind, given[name])),
+            *_message_words(message, given),
         )
         return _bytes(payload), _bytes(wire)
 
@@ -383,7 +390,11 @@ class CTarget(Target):
         context = (request.hex(),) if request else ()
         address, *found = self._ask("decode", message.name, wire.hex() or "-", *context)
         words = iter(found)
-        values = {name: told(kind, _raw(kind, words)) for name, kind in message.values()}
+        values: dict[str, Raw] = {name: told(kind, _raw(kind, words)) for name, kind in message.beside}
+        for slot in message.slots:
+            absent = slot.conditional and slot.values() and next(words) == "0"
+            read = {name: told(kind, _raw(kind, words)) for name, kind in slot.values()}
+            values |= dict.fromkeys(read) if absent else read
         assert not list(words)
         return Seen(message.name, None if address == "-" else int(address), values)
 
@@ -410,6 +421,19 @@ class CTarget(Target):
             raise Wrong(answer[0])
         assert status == "ok", (status, words)
         return answer
+
+
+def _message_words(message: Message, given: Mapping[str, Any]) -> Iterator[str]:
+    """The words of all values; a field that may be absent has one more, which tells whether it is present."""
+    for name, number in message.beside:
+        yield from _words(number, given[name])
+    for slot in message.slots:
+        values = slot.values()
+        if slot.conditional and values:
+            yield str(int(given[values[0][0]] is not None))
+        for name, kind in values:
+            raw = given[name]
+            yield from _words(kind, default(kind) if raw is None else raw)
 
 
 def _words(kind: Value, raw: Any) -> Iterator[str]:

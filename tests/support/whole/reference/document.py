@@ -182,10 +182,24 @@ class Slot:
     role: Role = "value"
     counts: str = ""
     counts_in: str = "items"
+    #: Tests of earlier values: name, ranges, whether they are excluded.
+    when: tuple[tuple[str, tuple[tuple[int, int], ...], bool], ...] = ()
+    optional: bool = False
+    #: A new message has it.
+    given: bool = True
+
+    @property
+    def conditional(self) -> bool:
+        """Whether it may be absent."""
+        return self.optional or bool(self.when)
+
+    def values(self) -> tuple[tuple[str, Value], ...]:
+        """Its values."""
+        return tuple(_values((self,)))
 
     @property
     def fixed(self) -> bool:
-        """Whether its size is constant."""
+        """Whether its size is constant, where it is present."""
         return not isinstance(self.kind, Run | Records) or self.kind.low == self.kind.high
 
     @property
@@ -235,9 +249,15 @@ class Message:
         yield from _values(self.slots)
 
     @property
+    def walked(self) -> bool:
+        """Whether fields may be absent."""
+        return any(slot.conditional for slot in self.slots)
+
+    @property
     def sizes(self) -> tuple[int, int]:
         """Minimum and maximum size of the payload."""
-        return sum(slot.least_bytes for slot in self.slots), sum(slot.most_bytes for slot in self.slots)
+        always = [slot for slot in self.slots if not slot.conditional]
+        return sum(slot.least_bytes for slot in always), sum(slot.most_bytes for slot in self.slots)
 
     def allows(self, address: int) -> bool:
         """Whether the address is legal for the message."""
@@ -327,7 +347,40 @@ class Fields:
         return tuple(_bounded(slot, room, counts.get(slot.name)) for slot in slots)
 
     def _slots(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
-        return tuple(self._slot(name, self._resolved(spec)) for name, spec in fields.items())
+        slots: list[Slot] = []
+        for name, spec in fields.items():
+            resolved = self._resolved(spec)
+            slots.append(self._conditional(self._slot(name, resolved), resolved, slots))
+        return tuple(slots)
+
+    def _conditional(self, slot: Slot, spec: Doc, before: list[Slot]) -> Slot:
+        """The slot with what decides whether it is present."""
+        given = spec.get("if", {})
+        wanted = {given: True} if isinstance(given, str) else given
+        values = dict(_values(before))
+        tests, holds = [], True
+        for ref, value in wanted.items():
+            name = ref.split(".")[-1]
+            number = values[name]
+            assert isinstance(number, Number)
+            excluded = str(value).startswith("not ")
+            items = value if isinstance(value, list) else [str(value).removeprefix("not ")]
+            ranges = tuple(self._wanted(each) for each in items)
+            tests.append((name, ranges, excluded))
+            holds = holds and any(low <= number.default <= high for low, high in ranges) != excluded
+        optional = spec.get("optional", False)
+        return replace(slot, when=tuple(tests), optional=optional, given=holds and not optional)
+
+    def _wanted(self, item: object) -> tuple[int, int]:
+        text = str(item)
+        if text.lower() in ("true", "false"):
+            return (int(text.lower() == "true"),) * 2
+        for enum in self._document.get("enums", {}).values():
+            if text in enum["values"]:
+                member = enum["values"][text]
+                number = member["value"] if isinstance(member, dict) else member
+                return number, number
+        return whole_or_negative(text)
 
     def beside(self, name: str, given: Any) -> tuple[Slot, tuple[tuple[str, int, Number], ...]]:
         """A part of a frame with values: its integer, and the name, lowest bit and number of each."""

@@ -26,7 +26,7 @@ from tests.support.whole.reference.document import (
     size_of,
     whole_span,
 )
-from tests.support.whole.reference.values import Raw, Wrong, get, items_of, put
+from tests.support.whole.reference.values import Raw, Wrong, get, holds, items_of, note, put
 from tests.support.whole.reference.values import check as check_range
 
 
@@ -642,8 +642,11 @@ class Splitter:
 def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) -> bytes:
     """The bytes of a payload whose end follows from its counts."""
     counted: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     payload = b""
     for slot in message.slots:
+        if not holds(slot, numbers):
+            continue
         kind = slot.kind
         size = (
             kind.bytes_of(counted.get(slot.name, kind.most))
@@ -652,6 +655,7 @@ def _measured(message: Message, take: Callable[[int], bytes], cursor: Cursor) ->
         )
         data = take(size)
         payload += data
+        note(slot, data, numbers)
         if slot.counts and slot.counts not in counted:
             assert isinstance(kind, Number)
             try:

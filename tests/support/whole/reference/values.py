@@ -19,7 +19,7 @@ from tests.support.whole.reference.document import (
 )
 
 #: A raw value: a number, a list of numbers, bytes, a record, or a list of records.
-Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | Sequence[Mapping[str, Raw]]"
+Raw: TypeAlias = "int | list[int] | bytes | Mapping[str, Raw] | Sequence[Mapping[str, Raw]] | None"
 
 
 class Wrong(Exception):
@@ -75,7 +75,25 @@ def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
 
 
 def _fields(slots: Sequence[Slot], values: Mapping[str, Raw]) -> bytes:
-    return b"".join(_encoded(slots, slot, values) for slot in slots)
+    data, left_out = b"", False
+    for slot in slots:
+        given = {values[name] is not None for name, _ in slot.values()}
+        sent = holds(slot, {name: raw for name, raw in values.items() if isinstance(raw, int)})
+        if slot.optional:
+            sent = given == {True} and not left_out
+            left_out = not sent
+        if given - {sent}:
+            raise Wrong("range", f"{slot.name} is absent, or is not")
+        data += _encoded(slots, slot, values) if sent else b""
+    return data
+
+
+def holds(slot: Slot, numbers: Mapping[str, int]) -> bool:
+    """Whether the conditions of a field hold."""
+    return all(
+        any(low <= numbers[name] <= high for low, high in ranges) != excluded
+        for name, ranges, excluded in slot.when
+    )
 
 
 def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> bytes:
@@ -99,7 +117,7 @@ def _encoded(slots: Sequence[Slot], slot: Slot, values: Mapping[str, Raw]) -> by
         counted = next(each.kind for each in slots if each.name == slot.counts)
         given = values[slot.counts]
         assert isinstance(counted, Run | Records)
-        assert not isinstance(given, int)
+        assert not isinstance(given, int | None)
         told = counted.bytes_of(len(given)) if slot.counts_in == "bytes" else len(given)
         return put(kind.pieces, told)
     return _put(kind, _number(kind, values[slot.name]) if slot.role == "value" else kind.default)
@@ -127,7 +145,7 @@ def _number(number: Number, raw: Raw) -> int:
 
 
 def _encoded_run(kind: Run, given: Raw) -> bytes:
-    assert not isinstance(given, int)
+    assert not isinstance(given, int | None)
     if kind.pad and isinstance(given, bytes):
         given = given.ljust(kind.most, kind.pad)
     if not kind.low <= len(given) <= kind.most:
@@ -152,10 +170,66 @@ def decode(message: Message, payload: bytes) -> dict[str, Raw]:
     """The values of a payload. Raises Wrong, for wrong lengths before values out of range."""
     if not payload and message.empty_is_default:
         return {name: default(kind) for name, kind in message.values()}
+    if message.walked:
+        return _walked(message, payload)
     values: dict[str, Raw] = {}
     for slot, data, number in _cut(message, payload):
         values |= _decoded(slot, data, number)
     return values
+
+
+def _segments(message: Message) -> list[list[Slot]]:
+    """Consecutive fields of constant size that are always present, and each other field alone."""
+    segments: list[list[Slot]] = []
+    joined = False
+    for slot in message.slots:
+        if joined and slot.fixed and not slot.conditional:
+            segments[-1].append(slot)
+        else:
+            segments.append([slot])
+        joined = slot.fixed and not slot.conditional
+    return segments
+
+
+def _walked(message: Message, payload: bytes) -> dict[str, Raw]:
+    """The values of a payload in which fields may be absent: the size of a segment, then its values."""
+    values: dict[str, Raw] = {}
+    numbers: dict[str, int] = {}
+    counted: dict[str, int] = {}
+    at = 0
+    for segment in _segments(message):
+        first, left = segment[0], len(payload) - at
+        if not (left > 0 if first.optional else holds(first, numbers)):
+            values |= dict.fromkeys(name for name, _ in first.values())
+            continue
+        sizes = [_size(slot, counted) for slot in segment]
+        if sizes == [None]:
+            behind = message.slots[message.slots.index(first) + 1 :]
+            sizes = [left - sum(slot.most_bytes for slot in behind)]
+            _demand(first.kind, sizes[0] or 0)
+        if sum(size or 0 for size in sizes) > left:
+            raise Wrong("length", first.name)
+        for slot, size in zip(segment, sizes, strict=True):
+            data = payload[at : at + (size or 0)]
+            number = len(data) // slot.kind.step if isinstance(slot.kind, Run | Records) else None
+            values |= _decoded(slot, data, None if slot.fixed else number)
+            note(slot, data, numbers)
+            if slot.counts:
+                _note(message, slot, data, counted)
+            at += len(data)
+    if at != len(payload):
+        raise Wrong("length", "bytes are left")
+    return values
+
+
+def note(slot: Slot, data: bytes, numbers: dict[str, int]) -> None:
+    """Note the raw numbers of a field, legal or not."""
+    if isinstance(slot.kind, Number):
+        numbers[slot.name] = _signed(slot.kind, get(slot.kind.pieces, data))
+    elif isinstance(slot.kind, Packed):
+        whole = get(slot.kind.pieces, data)
+        for name, shift, number in slot.kind.members:
+            numbers[name] = _signed(number, whole >> shift)
 
 
 def _decoded(slot: Slot, data: bytes, number: int | None) -> dict[str, Raw]:

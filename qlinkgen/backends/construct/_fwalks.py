@@ -1,0 +1,246 @@
+"""Messages in which fields may be absent: walked field by field, in wire order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from io import BytesIO
+from typing import Any, BinaryIO
+
+from construct import (
+    Construct,
+    Container,
+    Default,
+    RangeError,
+    Renamed,
+    ValidationError,
+    stream_read_entire,
+    stream_write,
+)
+
+from ._fields import BitFields, Bits, Count, Groups, Message, Values, _signed
+
+#: A test of an earlier value: its name, ranges of raw numbers, whether they are excluded.
+Test = tuple[str, Sequence[tuple[int, int]], bool]
+#: A field that may be absent: its name, what decides (() if it is optional), whether it is sent by default.
+Presence = tuple[str, Sequence[Test], bool]
+
+
+class Walked(Message):
+    """A message in which fields may be absent; an absent field is None.
+
+    Consecutive fields of fixed size that are always present are a segment: its size is checked first, then
+    its values. Any other field is a segment of its own.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        message_id: int,
+        *fields: Renamed,
+        presence: Sequence[Presence] = (),
+        addresses: Sequence[tuple[int, int]] = (),
+        checksum: bool = True,
+    ) -> None:
+        super().__init__(
+            name, message_id, *fields, addresses=addresses, checksum=checksum
+        )
+        self.presence = {field: tests for field, tests, _ in presence}
+        self.tested = {test[0] for _, tests, _ in presence for test in tests}
+        absent = {field for field, _, given in presence if not given}
+        for field in fields:
+            if field.name in absent:
+                self.defaults.update(dict.fromkeys(_values(field)))
+        always = [field for field in fields if field.name not in self.presence]
+        self.least = sum(self._least(field) for field in always)
+
+    def _least(self, field: Renamed) -> int:
+        run = self.runs.get(field.name)
+        return self._size(field, {field.name: run.minimum} if run else {})
+
+    def _varies(self, field: Renamed) -> bool:
+        return field.name in self.runs and field.name not in self.known
+
+    def _segments(self) -> Iterator[list[Renamed]]:
+        segment: list[Renamed] = []
+        for field in self.fields:
+            if self._varies(field) or field.name in self.presence:
+                if segment:
+                    yield segment
+                    segment = []
+                yield [field]
+            else:
+                segment.append(field)
+        if segment:
+            yield segment
+
+    def _present(self, field: Renamed, numbers: Mapping[str, int], left: int) -> bool:
+        tests = self.presence.get(field.name)
+        if tests is None:
+            return True
+        if not tests:
+            return left > 0
+        return all(
+            any(low <= numbers[name] <= high for low, high in ranges) != excluded
+            for name, ranges, excluded in tests
+        )
+
+    def _note(self, field: Renamed, cell: bytes, numbers: dict[str, int]) -> None:
+        """Note the raw numbers of a field that conditions test."""
+        if isinstance(field.subcon, BitFields):
+            whole = _number(field.subcon.integer, cell)
+            for inner in field.subcon.fields:
+                if inner.name in self.tested:
+                    numbers[inner.name] = _bits(inner, whole)
+        elif field.name in self.tested:
+            numbers[field.name] = _number(field, cell)
+
+    def _learn(
+        self, field: Renamed, cell: bytes, counts: dict[str, int], path: str
+    ) -> None:
+        if isinstance(field.subcon, Count):
+            number = self._learned(field, cell, path, counts)
+            if counts.setdefault(field.subcon.of, number) != number:
+                raise RangeError(
+                    f"{field.name} does not agree with {field.subcon.of}", path=path
+                )
+
+    def measured(self, take: Callable[[int], bytes]) -> bytes:
+        """Read a payload with ``take``; its size follows from counts and tested values."""
+        data, at = b"", 0
+        counts, numbers = dict(self.known), dict[str, int]()
+        for segment in self._segments():
+            if not self._present(segment[0], numbers, 1):
+                continue
+            for field in segment:
+                size = self._size(field, counts)
+                inner = (
+                    field.subcon.fields
+                    if isinstance(field.subcon, BitFields)
+                    else [field]
+                )
+                counting = (
+                    isinstance(field.subcon, Count) and field.subcon.of not in counts
+                )
+                if counting or any(each.name in self.tested for each in inner):
+                    data += take(at + size - len(data))
+                    self._note(field, data[at : at + size], numbers)
+                    self._learn(field, data[at : at + size], counts, "")
+                at += size
+        return data + take(at - len(data))
+
+    def _parse(self, stream: BinaryIO, context: Container, path: str) -> Container:
+        data, at = stream_read_entire(stream, path), 0
+        counts, numbers = dict(self.known), dict[str, int]()
+        values = Container()
+        for segment in self._segments():
+            left = len(data) - at
+            if not self._present(segment[0], numbers, left):
+                values.update(
+                    dict.fromkeys(name for each in segment for name in _values(each))
+                )
+                continue
+            self._infer(segment[0], counts, left, path)
+            if left < (needed := sum(self._size(each, counts) for each in segment)):
+                raise RangeError(
+                    f"{left} bytes are left, {segment[0].name} needs {needed}",
+                    path=path,
+                )
+            for field in segment:
+                cell = data[at : at + self._size(field, counts)]
+                found = field.parse(cell)
+                if isinstance(field.subcon, BitFields):
+                    values.update(found)
+                elif isinstance(field.subcon, Default):
+                    values[field.name] = found
+                self._note(field, cell, numbers)
+                self._learn(field, cell, counts, path)
+                at += len(cell)
+        if at != len(data):
+            raise RangeError(f"{len(data) - at} bytes follow {self.name}", path=path)
+        return values
+
+    def _infer(
+        self, field: Renamed, counts: dict[str, int], left: int, path: str
+    ) -> None:
+        """The number of items of a run that takes the rest of the payload."""
+        run = self.runs.get(field.name)
+        if run is None or field.name in counts:
+            return
+        after = self.fields[self.fields.index(field) + 1 :]
+        number, odd = divmod(
+            left - sum(int(each.sizeof()) for each in after), run.size
+        )
+        if odd:
+            raise RangeError(
+                f"the bytes left do not divide into items of {field.name}", path=path
+            )
+        counts[field.name] = run.checked(number, path)
+
+    def _build(
+        self, obj: Values, stream: BinaryIO, context: Container, path: str
+    ) -> Values:
+        if unknown := sorted(set(obj) - set(self.defaults)):
+            raise ValidationError(
+                f"{self.name} has no field {', '.join(map(str, unknown))}", path=path
+            )
+        values = Container(self.defaults)
+        values.update(obj)
+        numbers: dict[str, int] = {}
+        left_out = False
+        for field in self.fields:
+            given = [values[name] is not None for name in _values(field)]
+            present = self._present(field, numbers, 0)
+            if self.presence.get(field.name) == ():
+                present = given[0] and not left_out
+                left_out = not present
+            if any(each != present for each in given):
+                raise ValidationError(
+                    f"{field.name} is given where it must be absent, or the reverse",
+                    path=path,
+                )
+            if present:
+                cell = self._cell(field, values, path)
+                self._note(field, cell, numbers)
+                stream_write(stream, cell, len(cell), path)
+        return obj
+
+    def _cell(self, field: Renamed, values: Container, path: str) -> bytes:
+        stream = BytesIO()
+        whole = (
+            values
+            if isinstance(field.subcon, BitFields)
+            else values.get(field.name)
+        )
+        try:
+            field._build(whole, stream, values, path)
+        except TypeError as error:
+            raise ValidationError(
+                f"{self.name} has a value of the wrong type: {error}", path=path
+            ) from None
+        return stream.getvalue()
+
+
+def _values(field: Renamed) -> list[str]:
+    """Names of the values of a field."""
+    inside = field.subcon.fields if isinstance(field.subcon, BitFields) else (field,)
+    return [each.name for each in inside if isinstance(each.subcon, Default)]
+
+
+def _innermost(subcon: Construct) -> Any:
+    # Any: construct has no type hints.
+    while hasattr(subcon, "subcon"):
+        subcon = subcon.subcon
+    return subcon
+
+
+def _number(subcon: Construct, data: bytes) -> int:
+    """The integer of wire bytes, without regard to what is legal."""
+    inner = _innermost(subcon)
+    return int(inner.number(data) if isinstance(inner, Groups) else inner.parse(data))
+
+
+def _bits(field: Renamed, whole: int) -> int:
+    inner = _innermost(field)
+    assert isinstance(inner, Bits)
+    value = whole >> inner.first & (1 << inner.bits) - 1
+    return int(_signed(value, inner.bits)) if inner.signed else value

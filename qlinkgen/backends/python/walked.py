@@ -1,0 +1,315 @@
+"""Generates the statements of messages in which fields may be absent: straight code with a running offset."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from qlinkgen.backends.python import integers
+from qlinkgen.backends.python.decode import Decoder, assigned_targets, divided
+from qlinkgen.backends.python.encode import Encoder, Row
+from qlinkgen.backends.python.layout import indented
+from qlinkgen.backends.python.names import attribute
+from qlinkgen.backends.python.structs import format_of
+from qlinkgen.model.condition import Test
+from qlinkgen.model.integer import Integer
+from qlinkgen.plan.expr import OneOf, Size, Within
+from qlinkgen.plan.framing import LengthPart
+from qlinkgen.plan.payload import (
+    BitsStep,
+    BytesStep,
+    CountStep,
+    PayloadPlan,
+    Presence,
+    RunStep,
+    Segment,
+    Step,
+    ValueStep,
+    holders,
+)
+
+
+def condition(tests: Sequence[Test], number: str) -> str:
+    """The expression of a condition; ``number`` is the format of the name of a value."""
+    terms = [_test(each, number.format(each.value)) for each in tests]
+    return " and ".join(terms) if len(terms) > 1 else terms[0].removeprefix("(").removesuffix(")")
+
+
+def _test(test: Test, number: str) -> str:
+    rule = OneOf(tuple(Within(*each) for each in test.ranges))
+    return integers.broken(rule, number) if test.negated else integers.holds(rule, number)
+
+
+def condition_text(presence: Presence) -> str:
+    """What decides whether a field is present, in words."""
+    if presence.optional:
+        return "all fields before it are given"
+    return " and ".join(_test_text(test) for test in presence.when)
+
+
+def _test_text(test: Test) -> str:
+    ranges = (str(low) if low == high else f"{low}..{high}" for low, high in test.ranges)
+    return f"{attribute(test.value)} is {'not ' if test.negated else ''}{' or '.join(ranges)}"
+
+
+@dataclass
+class WalkedEncoder(Encoder):
+    """Collects the code that encodes one message segment by segment."""
+
+    _packed: int = 0
+
+    def statements(self, name: str) -> list[str]:
+        """Statements that assign the bytes to the local ``name``, or return them if it is empty."""
+        self._tabled = None
+        lines = [line for run in self.message.payload.runs for line in self._counted(run)]
+        lines.append('data = b""')
+        before = ""
+        for segment in self.message.payload.segments:
+            lines += self._segment(segment, before)
+            if segment.presence is not None and segment.presence.optional:
+                before = segment.presence.field
+        return [*lines, *self._framed(name)]
+
+    def _flushed(self) -> list[str]:
+        """The statements collected so far."""
+        lines = [*self._lines, *self._guard(), *self._late]
+        for piece in self._pieces:
+            lines += self._piece(piece, [], "data += ")
+        self._lines, self._terms, self._late, self._pieces = [], [], [], []
+        return lines
+
+    def _counted(self, run: RunStep) -> list[str]:
+        """The statements that count a run, and check its number of items."""
+        source = f"self.{attribute(run.name)}"
+        if isinstance(run, BytesStep):
+            source = self._octets(run)
+        self._lines.append(f"{run.name}_count = len({source})")
+        bounds = Within(run.length.minimum, run.length.maximum)
+        self._terms.append(integers.holds(bounds, f"{run.name}_count"))
+        lines = self._flushed()
+        if run.presence is None:
+            return lines
+        given = f"if self.{attribute(run.name)} is not None:"
+        return [f"{run.name}_count = 0", given, *indented(lines)]
+
+    def _segment(self, segment: Segment, before: str) -> list[str]:
+        for step in segment.steps:
+            self._step(step)
+        lines = self._flushed()
+        presence = segment.presence
+        if presence is None:
+            return lines
+        values = [attribute(each.name) for each in holders(segment.steps)]
+        if presence.optional:
+            given = f"if self.{values[0]} is not None:"
+            left_out = [f"if self.{attribute(before)} is None:", *self._misplaced(presence, values[0])]
+            return [given, *indented([*(left_out if before else []), *lines])]
+        missing = [line for each in values for line in self._unless(presence, each, "is None")]
+        surplus = [line for each in values for line in self._unless(presence, each, "is not None")]
+        test = condition([_python(each) for each in presence.when], "self.{}")
+        found = [f"if {test}:", *indented([*missing, *lines])]
+        return [*found, "else:", *indented(surplus)] if surplus else found
+
+    def _unless(self, presence: Presence, value: str, wrong: str) -> list[str]:
+        return [f"if self.{value} {wrong}:", *self._misplaced(presence, value)]
+
+    def _misplaced(self, presence: Presence, value: str) -> list[str]:
+        given = f'self, "{value}", "{condition_text(presence)}"'
+        return [f"    raise {self.place.use('misplaced')}({given})"]
+
+    def _framed(self, name: str) -> list[str]:
+        if not self.place.front and not self.place.back:
+            return [f"{name} = data" if name else "return data"]
+        for part in self.place.front:
+            self._part(part)
+        head, self._pieces = self._pieces, []
+        for part in self.place.back:
+            self._part(part)
+        tail, lines = self._pieces, [*self._lines, *self._guard()]
+        lines += self._piece(head[0], [], f"{name} = ") if head else [f'{name} = b""']
+        lines.append(f"{name} += data")
+        for piece in tail:
+            lines += self._piece(piece, [], f"{name} += ")
+        return lines
+
+    def _size(self, part: LengthPart) -> str:
+        return f"len(data) + {part.bias}" if part.bias else "len(data)"
+
+    def _call(self, row: Row, rows: list[Row], before: str) -> list[str]:  # noqa: ARG002 - as in the base
+        self._packed += 1
+        name = f"_PACK_{self._packed}_{self.title}"
+        text = self.place.prefix + format_of(row.codes)
+        self.constants.append(f'{name} = {self.place.use("Struct")}("{text}").pack')
+        return [f"{before}{name}({', '.join(row.arguments)})"]
+
+
+@dataclass
+class WalkedDecoder(Decoder):
+    """Collects the code that decodes one message segment by segment."""
+
+    _unpacked: int = 0
+    #: Offsets count from the local ``at``.
+    _walking: bool = False
+    _counted_runs: set[str] = field(default_factory=set)
+
+    def statements(self) -> list[str]:
+        """Lines of the function body."""
+        place = self.place
+        self._tabled = None
+        at = Size(-place.header)
+        for part in place.front:
+            self._part(part, at)
+            at += part.size
+        lines = ["message = _new(cls)", *self._flushed()]
+        end = f"len({place.data}) - {place.trailer}" if place.trailer else f"len({place.data})"
+        lines += [f"at = {place.header}", f"end = {end}"]
+        self._walking = True
+        for segment in self.message.payload.segments:
+            lines += self._segment(segment)
+        lines += ["if at != end:", self._bad_layout]
+        at = Size()
+        for part in self._needed_back():
+            self._part(part, at)
+            at += part.size
+        return [*lines, *self._flushed(), "return message"]
+
+    def _segment(self, segment: Segment) -> list[str]:
+        run = segment.run
+        lines = [] if run is None else self._measured(run, segment)
+        size = str(segment.size) if run is None else _times(run)
+        if run is None or segment.rest is None:
+            lines += [f"if end - at < {size}:", self._bad_layout]
+        for step in segment.steps:
+            self._step(step)
+        lines += [*self._flushed(), f"at += {size}"]
+        presence = segment.presence
+        if presence is None:
+            return lines
+        test = "at < end"
+        if not presence.optional:
+            test = condition([_python(each) for each in presence.when], "message.{}")
+        absent = [f"message.{attribute(each.name)} = None" for each in holders(segment.steps)]
+        found = [f"if {test}:", *indented(lines)]
+        return [*found, "else:", *indented(absent)] if absent else found
+
+    def _measured(self, run: RunStep, segment: Segment) -> list[str]:
+        """The statements that count a run which takes the rest."""
+        if segment.rest is None:
+            return []
+        left = f"end - at - {segment.rest}" if segment.rest else "end - at"
+        return divided(run, left, run.item_size, self._bad_layout)
+
+    def _flushed(self) -> list[str]:
+        """The statements collected so far: unpack the rows, then check and assign values."""
+        lines: list[str] = []
+        for row in self._rows:
+            while row.codes and row.codes[-1].endswith("x"):
+                row.codes.pop()
+            if row.targets:
+                self._unpacked += 1
+                name = f"_UNPACK_{self._unpacked}_{self.title}"
+                text = self.place.prefix + format_of(row.codes)
+                self.constants.append(f'{name} = {self.place.use("Struct")}("{text}").unpack_from')
+                lines += assigned_targets(row.targets, f"{name}({self.place.data}, {self._from(row.start)})")
+        lines += [*self._sizes, *self._slices, *self._values]
+        self._rows, self._sizes, self._slices, self._values = [], [], [], []
+        self._open = False
+        return lines
+
+    def _from(self, size: Size) -> str:
+        if not self._walking:
+            return super()._from(size)
+        return f"at + {size.fixed}" if size.fixed else "at"
+
+    def _offset(self, step: Step) -> str:
+        more = step.place.front.fixed - self.place.header
+        return f"at + {more}" if more > 0 else f"at - {-more}" if more else "at"
+
+    def _count_step(self, step: CountStep, at: Size) -> None:
+        number = self._get(step.integer, f"{step.name}_raw", at)
+        self._put_together(step.integer, number, step.name, self._offset(step))
+        run, count = self.message.payload.run(step.run), f"{step.run}_count"
+        if step.run in self._counted_runs:
+            expected = f"{step.scale} * {count}" if step.scale > 1 else count
+            self._values += [f"if {number} != {expected}:", self._bad_layout]
+            return
+        self._counted_runs.add(step.run)
+        self._values += divided(run, number, step.scale, self._bad_layout)
+
+
+def _times(run: RunStep) -> str:
+    count = f"{run.name}_count"
+    return f"{run.item_size} * {count}" if run.item_size > 1 else count
+
+
+def _python(test: Test) -> Test:
+    """The test of an attribute."""
+    return Test(attribute(test.value), test.ranges, test.negated)
+
+
+def walked_measure_lines(payload: PayloadPlan) -> list[str]:
+    """Body of the method that finds the size of a walked payload from its beginning, see `measure_lines`."""
+    tested = {test.value for each in payload.segments if each.presence for test in each.presence.when}
+    lines, known = [f"size = {payload.least}", "start = at"], set[str]()
+    for segment in payload.segments:
+        own = [line for step in segment.steps for line in _decided(payload, step, tested, known)]
+        run = segment.run
+        size = str(segment.size) if run is None else _times(run)
+        more = size
+        if run is not None and segment.presence is None and run.length.minimum:
+            more = f"{size} - {run.item_size * run.length.minimum}"
+        presence = segment.presence
+        if run is not None or presence is not None:
+            own.append(f"size += {more}")
+        own.append(f"start += {size}")
+        if presence is None:
+            lines += own
+        else:
+            lines += [f"if {condition(presence.when, '{}_raw')}:", *indented(own)]
+    return [*_without_last_start(lines), "return size"]
+
+
+def _number(integer: Integer, read: str) -> str:
+    """A number that was read: without unused bits, and with its sign."""
+    if integer.size == 1 and integer.bits < 8:
+        read = f"{read} & 0x{integer.mask:X}"
+    if integer.signed and (integer.size == 1 or integer.byteorder is None):
+        return integers.sign_extended(f"({read})", integer.bits)
+    return read
+
+
+def _without_last_start(lines: list[str]) -> list[str]:
+    while lines and lines[-1].lstrip().startswith("start += ") and not lines[-1].startswith(" "):
+        lines = lines[:-1]
+    return lines
+
+
+def _decided(payload: PayloadPlan, step: Step, tested: set[str], known: set[str]) -> Iterable[str]:
+    """The statements that read a step which decides later sizes."""
+    names = {each.name for each in holders((step,))} & tested
+    if step.run in known if isinstance(step, CountStep) else not names:
+        return
+    assert isinstance(step, ValueStep | BitsStep | CountStep)
+    front = step.place.front.fixed
+
+    def at(more: int) -> str:
+        return f"start + {front + more}" if front + more else "start"
+
+    end = at(step.integer.size)
+    yield f"if len(data) < {end}:"
+    yield "    return size"
+    number = integers.read(step.integer, "data", at)
+    if isinstance(step, ValueStep):
+        yield f"{step.name}_raw = {_number(step.integer, number)}"
+    elif isinstance(step, BitsStep):
+        yield f"{step.name}_whole = {number}"
+        for member in step.members:
+            if member.name in tested:
+                taken = f"{step.name}_whole >> {member.shift} & 0x{(1 << member.bits) - 1:X}"
+                signed = member.number.signed
+                yield f"{member.name}_raw = " + (
+                    integers.sign_extended(f"({taken})", member.bits) if signed else taken
+                )
+    else:
+        known.add(step.run)
+        yield from divided(payload.run(step.run), number, step.scale, f"    return -({end})")

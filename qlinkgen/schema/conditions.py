@@ -1,0 +1,159 @@
+"""Second pass, conditions: which fields of a message may be absent, and what decides that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from qlinkgen.model.condition import Condition, Test
+from qlinkgen.model.fields import Field, Records, Value, values_of
+from qlinkgen.model.types import Array, Blob, Count, Enum, Float, Scalar
+from qlinkgen.schema.file_model import Fields
+from qlinkgen.schema.notation import TestText, Wanted, shown
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+_RULE = "bad-condition"
+
+
+class ConditionBuilder:
+    """Adds the conditions to the fields of one message."""
+
+    def __init__(self, specs: Fields, path: Path, report: Reporter) -> None:
+        """``specs`` are the fields as written."""
+        self._specs = specs
+        self._path = path
+        self._report = report
+
+    def build(self, fields: Sequence[Field]) -> list[Field]:
+        """The fields with their conditions, checked against each other."""
+        found: list[Field] = []
+        for field in fields:
+            spec = self._specs[field.name]
+            when = self._condition(field, spec.when or (), found)
+            given = not spec.optional and self._holds(when, found)
+            found.append(replace(field, when=when, optional=spec.optional, given=given))
+        for field in found:
+            self._check(field, found)
+            if any(each.conditional for each in found) and _is_packed_run(field):
+                what = f"{field.name} is packed and of variable size, in a message whose fields may be absent"
+                hint = "give it a fixed number of items"
+                self._report.error(_RULE, (*self._path, field.name), what, hint, of_key=True)
+        return found
+
+    def _error(self, field: str, key: str, what: str, hint: str) -> None:
+        place = (*self._path, field)
+        self._report.error(_RULE, (*place, key), what, hint, of_key=True, needs=(place, self._path))
+
+    # Conditions
+
+    def _condition(self, field: Field, texts: Sequence[TestText], before: Sequence[Field]) -> Condition:
+        return tuple(test for text in texts for test in self._test(field, text, before))
+
+    def _test(self, field: Field, text: TestText, before: Sequence[Field]) -> Iterator[Test]:
+        value = self._tested(field, text, before)
+        if value is None:
+            return
+        assert isinstance(value.type, Scalar)
+        ranges = [self._range(field, each, value.type) for each in text.wanted]
+        if None not in ranges:
+            yield Test(value.name, tuple(each for each in ranges if each), text.negated)
+
+    def _tested(self, field: Field, text: TestText, before: Sequence[Field]) -> Value | None:
+        """The value that a condition names: of an earlier field, or of its bits."""
+        values = {value.name: value for value in values_of(before)}
+        owner, _, bit = text.field.partition(".")
+        value = values.get(bit or owner)
+        if value is None or (bit and value.field.name != owner):
+            hint = did_you_mean(text.field, values, f"earlier fields with a value: {listed(values)}")
+            what = f"{field.name} has no field {shown(text.field)} with a value before it"
+            self._error(field.name, "if", what, hint)
+            return None
+        kind = value.type
+        plain = isinstance(kind, Scalar) and kind.scaling is None and not kind.bcd
+        if not plain or (isinstance(kind, Scalar) and isinstance(kind.meaning, Float)):
+            what = f"{text.field} cannot decide whether {field.name} is present"
+            self._error(field.name, "if", what, "name a whole number, an enum or a bool")
+            return None
+        if value.field.conditional:
+            what = f"{text.field} may itself be absent"
+            self._error(field.name, "if", what, "name a field that is always present")
+            return None
+        return value
+
+    def _range(self, field: Field, wanted: Wanted, number: Scalar) -> tuple[int, int] | None:
+        members = number.meaning.members if isinstance(number.meaning, Enum) else ()
+        names = {member.name: member.value for member in members}
+        if wanted.name and wanted.name not in names:
+            hint = did_you_mean(wanted.name, names, "write a number, a range, true, false or a name")
+            self._error(field.name, "if", f"{wanted.text} is not a value of the tested field", hint)
+            return None
+        if wanted.truth and number.meaning != "bool":
+            what = f"{wanted.text} is not a value of the tested field, which is not a bool"
+            self._error(field.name, "if", what, "write {FIELD: value}")
+            return None
+        first = names[wanted.name] if wanted.name else wanted.first
+        last = names[wanted.name] if wanted.name else wanted.last
+        if not number.minimum <= first <= last <= number.maximum:
+            hint = f"use {number.minimum}..{number.maximum}"
+            self._error(field.name, "if", f"{wanted.text} is outside the range of the tested field", hint)
+            return None
+        return first, last
+
+    @staticmethod
+    def _holds(when: Condition, before: Sequence[Field]) -> bool:
+        """Whether a condition holds for the defaults."""
+        values = {value.name: value.type for value in values_of(before)}
+        kinds = [(test, values[test.value]) for test in when]
+        return all(test.holds(kind.default) for test, kind in kinds if isinstance(kind, Scalar))
+
+    # Checks
+
+    def _check(self, field: Field, fields: Sequence[Field]) -> None:
+        after = fields[fields.index(field) + 1 :]
+        if field.optional:
+            self._check_optional(field, after)
+        counts = [each for each in fields if _counts(each) == field.name]
+        for count in counts:
+            if count.when != field.when or field.optional:
+                what = f"{count.name} counts {field.name}, but one may be absent where the other is not"
+                self._error(
+                    field.name if field.conditional else count.name, "if", what, "give both the same if"
+                )
+        if not _is_run(field) or counts:
+            return
+        if field.when:
+            what = f"{field.name} takes the rest of the payload, so its absence is not seen"
+            self._error(field.name, "if", what, "give it a count or a fixed size")
+        elif not field.optional and (later := next((each for each in after if each.conditional), None)):
+            what = f"{field.name} takes the rest of the payload, but {later.name} after it may be absent"
+            self._error(
+                later.name, "optional" if later.optional else "if", what, f"give {field.name} a count"
+            )
+
+    def _check_optional(self, field: Field, after: Sequence[Field]) -> None:
+        if field.when:
+            what, hint = f"{field.name} has a condition, so it is not optional", "remove one of them"
+            self._error(field.name, "optional", what, hint)
+        elif _is_run(field) or not tuple(values_of((field,))):
+            what = f"{field.name} cannot be optional"
+            self._error(field.name, "optional", what, "use it on fields of fixed size that have a value")
+        elif later := next((each for each in after if not each.optional), None):
+            what = f"{later.name} follows {field.name}, which may be left out"
+            hint = f"make {later.name} optional too, or move it before {field.name}"
+            self._error(field.name, "optional", what, hint)
+
+
+def _counts(field: Field) -> str:
+    """The field that a field counts, "" if it is not a count."""
+    kind = field.type
+    return kind.role.run if isinstance(kind, Scalar) and isinstance(kind.role, Count) else ""
+
+
+def _is_packed_run(field: Field) -> bool:
+    return isinstance(field.type, Array) and field.type.packed is not None and _is_run(field)
+
+
+def _is_run(field: Field) -> bool:
+    """Whether the number of items varies."""
+    return isinstance(field.type, Blob | Array | Records) and not field.type.length.fixed
