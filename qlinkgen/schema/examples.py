@@ -7,7 +7,6 @@ from decimal import Decimal
 from typing import TYPE_CHECKING, cast
 
 from qlinkgen.model.message import Example, Message, Value
-from qlinkgen.model.naming import record_key
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import BadValue, Json, default_of, from_json, to_json
 from qlinkgen.schema.file_model import ExampleSpec, SchemaFile
@@ -63,7 +62,7 @@ class _Checker:
         parts = {each: value for each, value in spec.parts.items() if each != key}
         self._compare_address(message, decoded, parts, path)
         beside = {member.name: member for _, member in decoded.message.envelope.values}
-        names = {record_key(value.name): (value, beside[value.name]) for value in self._protocol.frame_values}
+        names = {_key(value.name): (value, beside[value.name]) for value in self._protocol.frame_values}
         self._compare("the frame", names, decoded.beside, parts, path)
         steps = zip(message.values, decoded.message.payload.settable, strict=True)
         inside = {value.name: (value, step) for value, step in steps}
@@ -129,8 +128,8 @@ class _Checker:
     ) -> None:
         """Compare the address, and remove it from the values given."""
         name = self._protocol.address_name if message.addresses else None
-        if name and given.pop(record_key(name), message.default_address) != decoded.address:
-            place = (*path, record_key(name))
+        if name and given.pop(_key(name), message.default_address) != decoded.address:
+            place = (*path, _key(name))
             self._error(place, f"{name} is {decoded.address} in these bytes", "correct one of both")
 
     def _compare(
@@ -160,6 +159,11 @@ class _Checker:
             if to_json(value, native) != found:
                 what = f"{key} is {_text(found)} in these bytes"
                 self._error((*path, key), what, "correct one of both", of_key=key not in given)
+
+
+def _key(name: str) -> str:
+    """The key of a value of the frame, apart from those that every example may have."""
+    return f"{name}_" if name in ExampleSpec.model_fields else name
 
 
 def _text(value: Json) -> str:

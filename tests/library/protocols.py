@@ -34,6 +34,7 @@ Record = Mapping[str, Any]
 PEERS: Mapping[str, tuple[str, str]] = {
     "cobs": ("cobs", "cobs"),
     "crsf": ("crsf_parser", "crsf-parser"),
+    "dnp3": ("dnp3", "dnp3py"),
     "dynamixel_2": ("dynamixel_sdk", "dynamixel-sdk"),
     "mavlink_1": ("pymavlink", "pymavlink"),
     "modbus_ascii": ("pymodbus", "pymodbus"),
