@@ -152,6 +152,31 @@ def xlsx(
     return _written(file, output, lambda notes: read_xlsx(file, notes, options))
 
 
+@command.command("mavlink")
+@click.argument("file", metavar="FILE.xml", type=click.Path())
+@click.option(
+    "--version", type=click.Choice(["1"]), default="1", show_default=True, help="Version of the frame."
+)
+@click.option("--only", metavar="NAME", multiple=True, help="Import only this message; repeatable.")
+@_common
+def mavlink(file: str, version: str, only: tuple[str, ...], name: str, output: str | None) -> int:
+    """Import a dialect of MAVLink with the files that it includes from its folder.
+
+    Fields are in their order on the wire, each message has the checksum of its definition, and enums that
+    fields have are taken with their descriptions.
+
+    \b
+    qlinkgen import mavlink common.xml -o mavlink.yaml
+    qlinkgen import mavlink common.xml --only HEARTBEAT --only ATTITUDE
+    """  # noqa: D301  # click takes the character \b for "do not wrap"
+    from qlinkgen.importers.mavlink import read_mavlink  # noqa: PLC0415
+
+    number: Literal[1, 2] = 2 if version == "2" else 1
+    return _written(
+        file, output, lambda notes: read_mavlink(file, notes, name=name, version=number, only=only)
+    )
+
+
 @command.command("ksy")
 @click.argument("file", metavar="FILE.ksy", type=click.Path())
 @_common

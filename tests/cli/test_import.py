@@ -9,7 +9,7 @@ import pytest
 
 from tests.cli.conftest import Run
 
-FORMATS = ["header", "csv", "xlsx", "ksy"]
+FORMATS = ["header", "csv", "xlsx", "mavlink", "ksy"]
 HEADER = "struct state {\n  uint8_t a;\n  void *p;\n};\nstruct level { uint16_t level; };\n"
 
 

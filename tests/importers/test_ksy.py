@@ -27,7 +27,7 @@ REFUSED = {
 }
 EMPTY = {"calculated_endian", "imported_types", "processed"}
 #: Files that need parts of the language which are not built yet.
-WAITING = {"conditions", "serial_frame", "strings", "switch_field", "until"}
+WAITING = {"conditions", "strings", "switch_field", "until"}
 
 
 def taken(file: Path) -> str:

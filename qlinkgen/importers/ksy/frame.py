@@ -20,6 +20,8 @@ from qlinkgen.importers.notes import Notes
 LARGEST = 1024
 _CHECKS = ("crc", "checksum", "chksum", "lrc", "fcs")
 _MOST_NESTED = 10
+#: Bytes of other parts that a length may count.
+_MOST_AROUND = 32
 
 
 @dataclass
@@ -154,12 +156,40 @@ class _Framer:
         if attribute.id == self._on:
             keys = {"role": "message", **keys}
         elif length is not None and attribute.id == length.name:
-            keys |= {"counts": [called[self._choice.id]]}
+            around = self._around(-length.offset, attribute) if length.scale == 1 else None
+            counted = [each.id for each in around or [self._choice]]
+            keys |= {"counts": [called[each] for each in counted]}
             keys |= {"scale": length.scale} if length.scale != 1 else {}
-            keys |= {"offset": length.offset} if length.offset else {}
+            keys |= {"offset": length.offset} if length.offset and around is None else {}
         else:
             keys |= self._value(attribute, found)
         return {**keys, "doc": attribute.doc} if attribute.doc else keys
+
+    def _around(self, size: int, length: Attribute) -> list[Attribute] | None:
+        """The payload with parts beside it of a size together, None if there are none.
+
+        A length that is greater than that of the payload counts other parts too, and which ones makes no
+        difference if their size is the same.
+        """
+        at = self._attributes.index(self._choice)
+        first = self._attributes.index(length) + 1
+        if not 0 < size <= _MOST_AROUND:
+            return None
+        for begin in range(at, max(first, at - size) - 1, -1):
+            for end in range(at + 1, min(len(self._attributes), at + 1 + size) + 1):
+                found = self._attributes[begin:end]
+                if sum(self._size(each) for each in found) == size:
+                    return list(found)
+        return None
+
+    def _size(self, attribute: Attribute) -> int:
+        """Bytes of a part; the payload has none here."""
+        if attribute is self._choice:
+            return 0
+        if attribute.node.get("contents") is not None:
+            return len(contents(attribute))
+        found = self._integer(attribute)
+        return found.size if found else 0
 
     def _value(self, attribute: Attribute, found: Scalar) -> dict[str, Value]:
         if any(word in attribute.id for word in _CHECKS):

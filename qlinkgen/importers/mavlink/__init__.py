@@ -17,11 +17,25 @@ from qlinkgen.importers.notes import Notes
 
 __all__ = ["read_mavlink"]
 
+#: Names that a note lists.
+_SHOWN = 5
 _TYPES = {
     **{each: f"{'u' if each.startswith('u') else 'i'}{8 * size}" for each, size in SIZES.items()},
     "char": "u8",
     "float": "f32",
     "double": "f64",
+}
+#: Units of a fraction of another one that no one writes: steps in one of it, and its name.
+_STEPS = {
+    "degE7": (10**7, "deg"),
+    "degE5": (10**5, "deg"),
+    "cdeg": (100, "deg"),
+    "ddeg": (10, "deg"),
+    "cdegC": (100, "degC"),
+    "cA": (100, "A"),
+    "dA": (10, "A"),
+    "c%": (100, "%"),
+    "d%": (10, "%"),
 }
 _COVERED = {
     1: ["length", "sequence", "system", "component", "number", "data"],
@@ -56,8 +70,7 @@ def read_mavlink(
     names = Names(notes, "message")
     items = tuple(_message(each, names, enums, dialect, version) for each in messages)
     if left := enums.unused():
-        shown = ", ".join(left[:5]) + (f" and {len(left) - 5} more" if len(left) > 5 else "")
-        notes.add(0, f"enums of no field are left out: {shown}")
+        notes.add(0, f"enums of no field are left out: {_some(left)}")
     return Document(
         protocol={
             "name": name or schema_name(file.stem, "protocol"),
@@ -67,10 +80,15 @@ def read_mavlink(
         },
         byteorder="little",
         frame=_frame(version),
-        bus={"kind": "link", "nodes": between(1, 255)},
+        bus={"kind": "master_slave", "nodes": between(1, 255)},
         sections={"enums": enums.enums, "flags": enums.flags, "messages": items},
         attributes={"crc_extra": {"type": "u8", "doc": "Checksum of the definition of the message"}},
     )
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
 
 
 def _chosen(dialect: Dialect, notes: Notes, version: Literal[1, 2], only: Sequence[str]) -> list[MessageOf]:
@@ -80,12 +98,9 @@ def _chosen(dialect: Dialect, notes: Notes, version: Literal[1, 2], only: Sequen
             raise notes.error(0, f"message {name} is not in the dialect")
     wanted = [by_name[schema_name(name)] for name in only] or list(dialect.messages.values())
     found = sorted(wanted, key=lambda each: each.id)
-    if version == 1:
-        for each in found:
-            if each.id > 0xFF:
-                each.notes.add(
-                    each.line, f"message {each.name} is left out: its id {each.id} needs MAVLink 2"
-                )
+    far = [each.name for each in found if version == 1 and each.id > 0xFF]
+    if far:
+        notes.add(0, f"messages with ids above 255 need MAVLink 2 and are left out: {_some(far)}")
         found = [each for each in found if each.id <= 0xFF]
     return found
 
@@ -122,8 +137,9 @@ def _field(found: FieldOf, names: Names, enums: Enums, dialect: Dialect, notes: 
             )
     elif type_[0] in "ui" and not found.version:
         keys |= _scale(element.get("multiplier"), element.line, notes)
-    if element.get("units"):
-        keys["unit"] = element.get("units")
+    keys |= _unit(
+        element.get("units"), scaled="scale" in keys, whole=type_[0] in "ui" and not element.get("enum")
+    )
     if found.count:
         type_, keys = _array(found, type_, keys)
     invalid = f"Invalid: {element.get('invalid')}." if element.get("invalid") else ""
@@ -148,6 +164,14 @@ def _scale(multiplier: str, line: int, notes: Notes) -> dict[str, Value]:
     return {} if value == 1 else {"scale": Notation(cells.spelt(value))}
 
 
+def _unit(unit: str, *, scaled: bool, whole: bool) -> dict[str, Value]:
+    """The unit of a field; that of integers without its decimal prefix, if it is not one of SI."""
+    if unit in _STEPS and whole and not scaled:
+        steps, plain = _STEPS[unit]
+        return {"scale": Notation(f"1/{steps}"), "unit": plain}
+    return {"unit": unit} if unit else {}
+
+
 def _frame(version: Literal[1, 2]) -> Value:
     head: dict[str, Value] = {"start": Notation("FD" if version == 2 else "FE")}
     head["length"] = {"type": "u8", "counts": ["data"]}
@@ -162,8 +186,8 @@ def _frame(version: Literal[1, 2]) -> Value:
     }
     parts: dict[str, Value] = {
         **head,
-        "sequence": {"role": "counter", "type": "u8", "per": "frame"},
-        "system": {"role": "source", "type": "u8"},
+        "sequence": {"type": "u8", "default": 0},
+        "system": {"role": "address", "type": "u8"},
         "component": {"type": "u8", "default": 1},
         "number": {"role": "message", "type": "u24" if version == 2 else "u8"},
         "data": {**data, "trim": "zeros"} if version == 2 else data,
