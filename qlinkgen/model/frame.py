@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
@@ -158,6 +159,14 @@ class Stuffing:
     section: Text = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Silence:
+    """An idle line that ends a frame early: ``byte_times`` on the bus, but at least ``seconds``."""
+
+    byte_times: Fraction
+    seconds: Fraction
+
+
 @dataclass(frozen=True)
 class DelimitedFrame:
     """Parts in wire order; a terminator, otherwise a length, otherwise the message determines the end.
@@ -169,6 +178,7 @@ class DelimitedFrame:
     stuffing: Stuffing | None = None
     coding: tuple[Coding, ...] = ()
     coded: tuple[str, ...] = ()
+    idle: Silence | None = None
     doc: Text = ""
     section: Text = ""
 

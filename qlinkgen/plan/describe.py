@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import assert_never
 
 from qlinkgen.model.condition import Test
+from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import Chunk, Integer
 from qlinkgen.model.types import (
     Constant,
@@ -416,6 +417,19 @@ def id_text(frame: FramePlan, number: int) -> str:
 
 def end_text(frame: FramePlan) -> str:
     """The rule that determines the end of a frame."""
+    return _end_text(frame) + (f"; {idle_text(frame.idle)} ends it early" if frame.idle else "")
+
+
+def idle_text(silence: Silence) -> str:
+    """The duration of an idle line."""
+    times = f"{float(silence.byte_times):g} byte times" if silence.byte_times else ""
+    clock = f"{float(silence.seconds * 1_000_000):g} us" if silence.seconds else ""
+    if times and clock:
+        return f"an idle line of {times}, at least {clock},"
+    return f"an idle line of {times or clock}"
+
+
+def _end_text(frame: FramePlan) -> str:
     end = frame.end
     match end:
         case ByLength():

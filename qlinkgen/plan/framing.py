@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import assert_never
 
-from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
+from qlinkgen.model.frame import ATTRIBUTE, DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits, Silence
 from qlinkgen.model.frame import Part as StatedPart
 from qlinkgen.model.integer import Chunk, Integer, byte_chunks
 from qlinkgen.model.message import Direction
@@ -612,6 +612,7 @@ class FramePlan:
         receiver: how frames are found in a stream.
         address: name of the address, "" if there is none.
         id_name: name of the message number.
+        idle: silence on the line that ends a frame early, None if the document states none.
     """
 
     envelopes: Mapping[Direction, Envelope]
@@ -620,6 +621,7 @@ class FramePlan:
     receiver: Receiver
     address: str
     id_name: str
+    idle: Silence | None = None
 
     @property
     def envelope(self) -> Envelope:
@@ -716,6 +718,7 @@ def _delimited(frame: DelimitedFrame) -> FramePlan:
         receiver=_receiver(envelope, transparency),
         address=address.name if address else "",
         id_name=frame.id_bits[-1].name if frame.id_bits else "",
+        idle=frame.idle,
     )
 
 

@@ -71,6 +71,10 @@ class Receiver:
         self.ended = True
         yield from self.give_up()
 
+    def gap(self) -> Iterator[Event]:
+        """The line was idle: an unfinished frame ends, and the next byte begins anew."""
+        yield from self.finish()
+
     def give_up(self) -> Iterator[Event]:
         """The events of the bytes left at the end of the stream."""
         raise NotImplementedError

@@ -183,7 +183,7 @@ class _OneOrMore:
 
 
 PartRole = Literal[
-    "constant", "length", "message", "address", "direction", "payload", "checksum", "terminator"
+    "constant", "length", "message", "address", "direction", "payload", "checksum", "terminator", "idle"
 ]
 #: What a part turns out to be: its role, an integer with bits of several roles, a derived one, or a value.
 PartKind = PartRole | Literal["bits", "derived", "value"]
@@ -292,6 +292,8 @@ class PartSpec(Fact):
     raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
     default: ScalarValue | None = Field(default=None, description="Default of a value, in the unit")
     shared: StrictBool = Field(default=False, description="A terminator that may begin the next frame too")
+    time: Time | None = Field(default=None, description="Silence on the line that ends a frame")
+    at_least: Time | None = Field(default=None, description="Its minimum at high speed")
     counts: PartNames | None = Field(default=None, description="Part, or parts, whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
     algorithm: AnyAlgorithm | None = Field(

@@ -89,6 +89,10 @@ class FrameBuilder:
         path: Path = ("frame", "parts")
         if not self._parts.roles_fit(specs, ("payload",), path):
             return None
+        idle = next((name for name, part in specs.items() if part.told == "idle"), "")
+        last = bool(idle) and list(specs)[-1] == idle
+        silence = self._parts.silence(specs[idle], (*path, idle), last=last) if idle else None
+        specs = {name: part for name, part in specs.items() if name != idle}
         main = _main_check(specs)
         parts = placed(
             tuple(
@@ -100,7 +104,7 @@ class FrameBuilder:
         stuffing = build_stuffing(spec.stuffing, parts, self._parts, self._report) if spec.stuffing else None
         codings = CodingBuilder(parts, self._parts, self._report)
         coding, coded = codings.build(spec.coding)
-        frame = DelimitedFrame(parts, stuffing, coding, coded, spec.doc, spec.section)
+        frame = DelimitedFrame(parts, stuffing, coding, coded, silence, spec.doc, spec.section)
         self._check_pieces(frame, path)
         self._check_order(frame, path)
         self._check_empty(frame, path)

@@ -219,6 +219,8 @@ class MessageBuilder:
                 neither = f"neither the frame nor {message.name} has a length"
                 what = f"the end of {field.name} is unknown: {neither}"
                 hint = "give it a count or a fixed size, or give the frame a length or terminator"
+                if isinstance(self._frame, DelimitedFrame) and self._frame.idle:
+                    hint = f"{hint}; receivers do not rely on an idle line alone"
                 self._error("no-frame-end", (*path, field.name), what, hint)
             if field.optional:
                 what = f"{field.name} is optional, but without a length a receiver waits for it"

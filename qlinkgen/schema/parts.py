@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from qlinkgen.model import checksum as catalogue
-from qlinkgen.model.frame import ATTRIBUTE, Checksum, Derivation, Part, Role
+from qlinkgen.model.frame import ATTRIBUTE, Checksum, Derivation, Part, Role, Silence
 from qlinkgen.model.types import Chunk, Scalar, byte_chunks
 from qlinkgen.schema.file_model import CrcSpec, PartKind, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
-from qlinkgen.schema.notation import shown
+from qlinkgen.schema.notation import Duration, shown
 from qlinkgen.schema.pieces import PieceBuilder
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
@@ -19,7 +19,7 @@ from qlinkgen.schema.synonyms import type_hint
 from qlinkgen.schema.types import TypeBuilder
 
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
-_SINGLE_ROLES = ("length", "address", "direction", "payload", "terminator")
+_SINGLE_ROLES = ("length", "address", "direction", "payload", "terminator", "idle")
 _VALUE_KEYS = ("scale", "offset", "unit", "range", "raw_range", "default")
 _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "constant": ("value", "text", "type", "byteorder", "const"),
@@ -33,6 +33,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "payload": ("size",),
     "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent"),
     "terminator": ("value", "text", "shared"),
+    "idle": ("time", "at_least"),
 }
 _KEYS = (
     "type",
@@ -44,6 +45,8 @@ _KEYS = (
     "equals",
     "bits",
     "shared",
+    "time",
+    "at_least",
     "counts",
     "size",
     "algorithm",
@@ -104,6 +107,7 @@ class PartBuilder:
         """The part described by a mapping; missing keys are reported and replaced by placeholders."""
         role = spec.told
         assert role is not None
+        assert role != "idle"
         self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS[role]], role, path)
         if role == "constant" and spec.const is not None:
             self.reject(spec, ("value", "text"), "constant with a type", path)
@@ -157,6 +161,20 @@ class PartBuilder:
             self._report.error("bad-value", (*path, key), what, f"use a whole number from {least}")
             return least
         return int(given)
+
+    def silence(self, spec: PartSpec, path: Path, *, last: bool) -> Silence | None:
+        """The silence on the line that ends a frame."""
+        self.reject(spec, [key for key in _KEYS if key not in _ROLE_KEYS["idle"]], "silence", path)
+        if not last:
+            self.fault("bad-frame", path, f"{path[-1]} is not the last part", "move it to the end")
+        least = spec.at_least or Duration()
+        if least.byte_times:
+            what = "the minimum of an idle time depends on the speed of the line"
+            self.fault("bad-value", (*path, "at_least"), what, "write a time like 1750 us")
+        if spec.time is None:
+            self._lacks("time", "add time: 3.5 bytes", path)
+            return None
+        return Silence(spec.time.byte_times, max(spec.time.seconds, least.seconds))
 
     def _value(self, name: str, spec: PartSpec, path: Path) -> Part:
         """A part with a value of every frame, or several in its bits."""

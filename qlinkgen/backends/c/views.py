@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -51,6 +52,7 @@ class FrameView:
     body_size: int
     check_optional: bool
     max_wire: int
+    idle: tuple[int, int] | None
 
 
 def frame_view(
@@ -85,7 +87,17 @@ def frame_view(
         body_size=body_size,
         check_optional=check_optional,
         max_wire=max_wire,
+        idle=_idle(plan),
     )
+
+
+def _idle(plan: Plan) -> tuple[int, int] | None:
+    """Bits and microseconds of a silence that ends a frame."""
+    silence = plan.frame.idle
+    if silence is None:
+        return None
+    bits = math.ceil(silence.byte_times * plan.protocol.bus.bits_per_byte)
+    return bits, math.ceil(silence.seconds * 1_000_000)
 
 
 def _directed(plan: Plan) -> bool:

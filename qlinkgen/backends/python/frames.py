@@ -11,6 +11,7 @@ from qlinkgen.backends.python.coding import CodingView, coding_view
 from qlinkgen.backends.python.layout import in_hex, literal, slice_of, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.checksum import Algorithm, Checksum, Fletcher, Sum, Xor, catalogue
+from qlinkgen.model.frame import Silence
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_argument, address_attribute
@@ -99,6 +100,7 @@ class UniqueView:
     """A frame with a preamble that occurs nowhere else."""
 
     title: str
+    idle: tuple[float, float] | None
     check: CheckView
     address: AddressView | None
     preamble: str
@@ -250,6 +252,7 @@ class PartsView:
     length: LengthView | None
     stuffing: StuffingView | None
     ended: EndedView | None
+    idle: tuple[float, float] | None
     preamble: str
     begins_with: str
     header: int
@@ -491,6 +494,7 @@ def _unique(plan: Plan, receiver: Hunt, title: str, sizes: Sequence[int]) -> Uni
     address = _address_view(plan)
     return UniqueView(
         title=title,
+        idle=_idle(plan.frame.idle),
         check=_check_view(check.check),
         address=address,
         preamble=literal(envelope.preamble),
@@ -562,6 +566,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         address=address,
         length=length,
         stuffing=_stuffing(plan),
+        idle=_idle(plan.frame.idle),
         ended=_ended(plan, plan.frame.end, bare=receiver.bare)
         if isinstance(plan.frame.end, ByTerminator)
         else None,
@@ -613,6 +618,10 @@ def _tail_tests(envelope: Envelope, part: Part) -> Iterator[str]:
     if isinstance(part, ConstantPart):
         yield f"not frame[{-envelope.from_end(part)}:].startswith({literal(part.data)})"
     yield from pieces.wrong(envelope, part, "frame")
+
+
+def _idle(silence: Silence | None) -> tuple[float, float] | None:
+    return (float(silence.byte_times), float(silence.seconds)) if silence else None
 
 
 def _ended(plan: Plan, end: ByTerminator, *, bare: bool) -> EndedView:

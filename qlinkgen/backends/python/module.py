@@ -230,7 +230,7 @@ class Module:
             case MarkedView():
                 names += ["MARKING", "Marking"]
             case UniqueView() | PartsView():
-                pass
+                names += ["IDLE"] if view.idle else []
         if not isinstance(view, PacketView):
             names += ["encode", *(["Codec"] if view.check and view.check.selectable else [])]
         return sorted(set(names), key=by_kind)

@@ -84,6 +84,10 @@ def choose(rng: random.Random, words: _Words) -> Shape:
         shape = _Parts(rng, words).make_ended(endings.choose(rng))
     else:
         shape = _Parts(rng, words).make(hunted=kind == "hunted")
+    if "parts" in shape.frame and rng.random() < 0.15:
+        time = rng.choice(("3.5 bytes", "20 ms", "4 bytes"))
+        least = {"at_least": rng.choice(("1750 us", "1 ms"))} if rng.random() < 0.5 else {}
+        shape.frame["parts"]["silence"] = {"role": "idle", "time": time, **least}
     for key in ("parts", "packet"):
         parts: Doc = shape.frame.get(key, {})
         for name, spec in parts.items():

@@ -267,6 +267,12 @@ class Message:
 def load(text: str) -> Doc:
     """The plain data of a schema file."""
     document: Doc = yaml.load(text, _Loader)
+    parts = document["frame"].get("parts", {})
+    # Silence has no bytes, and frames end without it.
+    for name in [
+        name for name, spec in parts.items() if isinstance(spec, dict) and spec.get("role") == "idle"
+    ]:
+        del parts[name]
     return document
 
 
