@@ -44,6 +44,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "ppp": ("yahdlc", "python4yahdlc"),
     "slip": ("sliplib", "sliplib"),
     "ubx": ("pyubx2", "pyubx2"),
+    "visca": ("pyvisca", "pyvisca"),
     "vesc": ("pyvesc", "pyvesc"),
 }
 NAMES = library()
