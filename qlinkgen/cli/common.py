@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -19,6 +20,8 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.spelling import similar
 from qlinkgen.model.texts import visible
 
+_VERSION = re.compile(r"[0-9]{1,9}(\.[0-9]{1,9}){0,5}", re.ASCII)
+
 
 def find_schema(name: str) -> Path:
     """Return the file of a schema, given by shipped name or path."""
@@ -30,12 +33,12 @@ def find_schema(name: str) -> Path:
         raise Failure(f"unknown schema '{name}'; {error.faults[0].hint}") from None
 
 
-def load_protocol(name: str, crc: str | None = None) -> Protocol:
+def load_protocol(name: str, crc: str | None = None, version: str | None = None) -> Protocol:
     """Load a protocol by shipped name or path. Raises SchemaError."""
     from qlinkgen.schema import load  # noqa: PLC0415  # pydantic is slow to import
 
     path = find_schema(name)
-    protocol = load(path)
+    protocol = load(path, version=version)
     if crc is None:
         return protocol
     from qlinkgen.plan.framing import frame_plan  # noqa: PLC0415  # only this option needs the plan
@@ -43,7 +46,7 @@ def load_protocol(name: str, crc: str | None = None) -> Protocol:
     if frame_plan(protocol.frame).check is None:
         raise Failure(f"--set crc={crc}: the frame of {protocol.name} has no checksum; omit the option")
     try:
-        protocol = load(path, crc=crc)
+        protocol = load(path, crc=crc, version=version)
         if names := [each.name for each in candidates(crc)]:
             warn(f"--set crc={crc}: several algorithms have this name; write one of {', '.join(names)}")
         return protocol
@@ -128,4 +131,20 @@ crc_option = click.option(
     metavar="crc=NAME",
     callback=_crc,
     help="Use another checksum algorithm from the catalogue.",
+)
+
+
+def _version(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:  # noqa: ARG001
+    if value is not None and not _VERSION.fullmatch(value):
+        raise Failure(f"--protocol-version {value}: write numbers with dots between them, like 2.1")
+    return value
+
+
+#: ``--protocol-version V``; the command gets it as ``version``.
+version_option = click.option(
+    "--protocol-version",
+    "version",
+    metavar="VERSION",
+    callback=_version,
+    help="A version of the protocol, see since and until in the schema; by default the newest.",
 )

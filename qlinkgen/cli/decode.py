@@ -15,7 +15,7 @@ import click
 from qlinkgen.cli import jsonlines
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
 from qlinkgen.cli.codec import fields, load_codec
-from qlinkgen.cli.common import crc_option, load_protocol, parse_hex, warn, warn_unconfirmed
+from qlinkgen.cli.common import crc_option, load_protocol, parse_hex, version_option, warn, warn_unconfirmed
 from qlinkgen.cli.conversations import Answers, Conversation
 from qlinkgen.cli.encode import asked
 from qlinkgen.cli.hex_text import HexError, HexReader
@@ -41,6 +41,7 @@ _COMMENT = re.compile(rb"#[^\n]*")
 @click.option("--request", "request", metavar="HEX", help="Packets: the request of the responses.")
 @click.option("--raw", is_flag=True, help="Standard input is binary, not hex text.")
 @crc_option
+@version_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
     hex_: tuple[str, ...],
@@ -48,6 +49,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     request: str | None,
     raw: bool,
     crc: str | None,
+    version: str | None,
 ) -> int:
     """Print every frame of a stream as a JSON object; bytes between frames are skipped.
 
@@ -68,7 +70,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen decode mc1231a --direction response --request 4a 0012d687d6e3
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     chunks = _input(hex_, raw=raw)
-    loaded = load_protocol(protocol, crc)
+    loaded = load_protocol(protocol, crc, version)
     codec = load_codec(loaded)
     stream = _stream(loaded, codec, direction, request)
     printer = _Printer(loaded)

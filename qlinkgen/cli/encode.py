@@ -17,6 +17,7 @@ from qlinkgen.cli.common import (
     find_message,
     load_protocol,
     parse_hex,
+    version_option,
     warn_unconfirmed,
 )
 from qlinkgen.cli.describe import addresses_text
@@ -50,6 +51,7 @@ json_option = click.option(
 @json_option
 @click.option("--request", "request", metavar="HEX", help="Packets: the request of a response.")
 @crc_option
+@version_option
 def command(  # noqa: PLR0917  # click passes them by name
     protocol: str,
     message: str | None,
@@ -58,6 +60,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     object_: str | None,
     request: str | None,
     crc: str | None,
+    version: str | None,
 ) -> None:
     """Print the wire bytes of a message as lower-case hex, with length, checksum and stuffing.
 
@@ -73,7 +76,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     qlinkgen encode trio direct_variable_transfer --address 2 number=7 value=-0.25
     qlinkgen encode mc1231a get_pos.response --request 4a value=1234567
     """  # noqa: D301  # click takes the character \b for "do not wrap"
-    loaded = load_protocol(protocol, crc)
+    loaded = load_protocol(protocol, crc, version)
     codec, found, built = compose(loaded, message, assignments, addresses, object_)
     try:
         click.echo(_frame(loaded, codec, found, built, request).hex())

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import click
 
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, load_protocol, on_terminal, parse_hex
+from qlinkgen.cli.common import crc_option, load_protocol, on_terminal, parse_hex, version_option
 from qlinkgen.cli.findings import finding, notes
 from qlinkgen.cli.span_text import value_of
 from qlinkgen.cli.streams import PROGRESS
@@ -34,8 +34,14 @@ Line = tuple[int, str, str, str, bool]
     "--request", "request", metavar="HEX", help="Packets: the request; HEX is then only its response."
 )
 @crc_option
-def command(
-    protocol: str, hex_: tuple[str, ...], direction: Direction | None, request: str | None, crc: str | None
+@version_option
+def command(  # noqa: PLR0917  # click passes them by name
+    protocol: str,
+    hex_: tuple[str, ...],
+    direction: Direction | None,
+    request: str | None,
+    crc: str | None,
+    version: str | None,
 ) -> int:
     """Describe every byte of one frame; for each error, the rule broken and the likely cause.
 
@@ -46,7 +52,7 @@ def command(
     qlinkgen explain qlink a5a50783 01a500ffa500e305
     qlinkgen explain mc1231a 4a 0012d687d6e3
     """  # noqa: D301  # click takes the character \b for "do not wrap"
-    loaded = load_protocol(protocol, crc)
+    loaded = load_protocol(protocol, crc, version)
     data = parse_hex(" ".join(hex_))
     if not data:
         raise Failure("HEX is empty; give the bytes of one frame")

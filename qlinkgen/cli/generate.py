@@ -15,7 +15,14 @@ from qlinkgen._resources import schemas_dir
 from qlinkgen.backends.base import OWN, SHIPPED, Options
 from qlinkgen.cli import hand_vectors, reconcile
 from qlinkgen.cli.boundary import FINE, WRONG, Failure
-from qlinkgen.cli.common import crc_option, did_you_mean, find_schema, load_protocol, on_terminal
+from qlinkgen.cli.common import (
+    crc_option,
+    did_you_mean,
+    find_schema,
+    load_protocol,
+    on_terminal,
+    version_option,
+)
 from qlinkgen.cli.depfile import Depfile
 from qlinkgen.cli.drift import Folder
 from qlinkgen.cli.manifest import schema_of, ships
@@ -41,6 +48,7 @@ Role = Literal["both", "master", "slave"]
     "--check", is_flag=True, help="Write nothing; show differences and exit with 1 if there are any."
 )
 @crc_option
+@version_option
 @click.option(
     "--role", type=click.Choice(["both", "master", "slave"]), default="both", help="Generate only this side."
 )
@@ -61,6 +69,7 @@ def command(  # noqa: PLR0917  # click passes them by name
     output: str,
     check: bool,
     crc: str | None,
+    version: str | None,
     role: Role,
     only: tuple[str, ...],
     package: str | None,
@@ -85,8 +94,8 @@ def command(  # noqa: PLR0917  # click passes them by name
     """  # noqa: D301  # click takes the character \b for "do not wrap"
     from qlinkgen.schema import shipped  # noqa: PLC0415  # pydantic is slow to import
 
-    protocols = _load(schemas or shipped(), crc)
-    if mismatches := _mismatches(protocols) if crc is None else []:
+    protocols = _load(schemas or shipped(), crc, version)
+    if mismatches := _mismatches(protocols) if crc is None and version is None else []:
         click.echo("\n".join(mismatches), err=True)
         return WRONG
     options = Options(role=role, only=_kept(only, list(protocols.values())))
@@ -110,13 +119,13 @@ def command(  # noqa: PLR0917  # click passes them by name
     return FINE
 
 
-def _load(schemas: Sequence[str], crc: str | None) -> dict[str, Protocol]:
+def _load(schemas: Sequence[str], crc: str | None, version: str | None) -> dict[str, Protocol]:
     """Load every protocol, by its schema as given; the faults of all files are reported together."""
     protocols: dict[str, Protocol] = {}
     faults: list[Fault] = []
     for schema in schemas:
         try:
-            protocols[schema] = load_protocol(schema, crc)
+            protocols[schema] = load_protocol(schema, crc, version)
         except SchemaError as error:
             faults += error.faults
     if faults:

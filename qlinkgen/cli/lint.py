@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from qlinkgen.cli.boundary import FINE, USAGE, WRONG, Failure
-from qlinkgen.cli.common import find_schema, on_terminal
+from qlinkgen.cli.common import find_schema, on_terminal, version_option
 from qlinkgen.errors import Fault
 from qlinkgen.model.texts import visible
 
@@ -24,8 +24,11 @@ _MARK = re.compile(r"""^\{?\s*["']?qlinkgen["']?\s*:""", re.MULTILINE)
 @click.option(
     "--format", "form", type=click.Choice(["text", "json"]), default="text", help="json: one list of objects."
 )
-def command(schemas: tuple[str, ...], form: str) -> int:
+@version_option
+def command(schemas: tuple[str, ...], form: str, version: str | None) -> int:
     """Check schema files and report every error: file:line:col: error[RULE]: description; hint.
+
+    Without --protocol-version every version is checked that the file names in since and until.
 
     In a folder, every .yaml and .yml file in it and below with a key "qlinkgen" is checked and listed.
 
@@ -33,7 +36,7 @@ def command(schemas: tuple[str, ...], form: str) -> int:
     explains the rules.
     """
     files = [file for schema in schemas for file in _files(schema)]
-    faults = [fault for file in files for fault in _faults(file)]
+    faults = [fault for file in files for fault in _faults(file, version)]
     if form == "json":
         click.echo(json.dumps([dataclasses.asdict(fault) for fault in faults], indent=2))
     else:
@@ -77,10 +80,10 @@ def _is_schema(file: Path) -> bool:
         return True
 
 
-def _faults(file: Path) -> list[Fault]:
+def _faults(file: Path, version: str | None) -> list[Fault]:
     from qlinkgen.schema import lint  # noqa: PLC0415  # pydantic is slow to import
 
-    return lint(file)
+    return lint(file, version=version)
 
 
 def _coloured(fault: Fault) -> str:

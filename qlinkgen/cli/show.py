@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from qlinkgen.cli import bitmap, describe
-from qlinkgen.cli.common import find_message, load_protocol, warn_unconfirmed
+from qlinkgen.cli.common import find_message, load_protocol, version_option, warn_unconfirmed
 from qlinkgen.cli.layout import UNCONFIRMED, show_enum, show_flags, show_message
 from qlinkgen.cli.plan_text import envelopes, parts_table, show_frame_plan, show_message_plan
 from qlinkgen.cli.tables import Table, heading, paragraph
@@ -21,7 +21,8 @@ from qlinkgen.plan.framing import ByMark
 @click.argument("protocol")
 @click.argument("message", required=False)
 @click.option("--plan", "planned", is_flag=True, help="Show how it is built and decoded; see docs/plan.md.")
-def command(protocol: str, message: str | None, *, planned: bool) -> None:
+@version_option
+def command(protocol: str, message: str | None, *, planned: bool, version: str | None) -> None:
     """Show a protocol: its frame, bus and transactions. With MESSAGE: layout, sizes, values.
 
     With --plan, show how code builds and decodes it: the parts of a frame, the coverage of the check value,
@@ -30,7 +31,7 @@ def command(protocol: str, message: str | None, *, planned: bool) -> None:
     MESSAGE is a message (motion.response), or a command (motion) for request and response together. Sizes
     are in bytes; `on the wire` is the size of the frame with worst-case stuffing.
     """
-    shown = load_protocol(protocol)
+    shown = load_protocol(protocol, version=version)
     plan = plan_of(shown)
     if message is None:
         show_frame_plan(plan) if planned else _protocol(plan)

@@ -38,6 +38,8 @@ class Protocol:
     schema_hash: str
     #: File name of the schema, without its folder.
     schema_file: Text
+    #: The version of the protocol that was chosen, "" for the newest one.
+    version: Text = ""
     #: False after `without_texts`.
     texts: bool = True
     examples: tuple[Example, ...] = ()

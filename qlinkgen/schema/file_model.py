@@ -43,6 +43,7 @@ from qlinkgen.schema.kinds import (
     Text,
     Time,
     Values,
+    Version,
     WholeRange,
 )
 from qlinkgen.schema.notation import answer_id, shown
@@ -63,6 +64,14 @@ class Fact(_Mapping):
     confirmed: StrictBool = Field(default=True, description="false: the source is weak; users are warned")
 
 
+class Lifetime(_Mapping):
+    """The versions of the protocol that have something."""
+
+    since: Version | None = Field(default=None, description="First version of the protocol that has it")
+    until: Version | None = Field(default=None, description="Last version of the protocol that has it")
+    deprecated: Version | None = Field(default=None, description="Version since which it is not to be used")
+
+
 class ProtocolSpec(_Mapping):
     """Name and source of the protocol."""
 
@@ -80,7 +89,7 @@ class GroupSpec(_Mapping):
     first: Literal["least", "most"] = Field(description="The group of a number that is sent first")
 
 
-class EnumValueSpec(_Mapping):
+class EnumValueSpec(Lifetime):
     """A named number."""
 
     value: StrictInt = Field(description="The number")
@@ -96,7 +105,7 @@ class EnumSpec(Fact):
     )
 
 
-class FlagSpec(_Mapping):
+class FlagSpec(Lifetime):
     """A named bit."""
 
     bit: Id = Field(description="Number of the bit, 0 is the least significant")
@@ -132,7 +141,7 @@ class BitSpec(_Mapping):
     doc: Text = Field(default="", description="Description, in one sentence")
 
 
-class FieldSpec(Fact):
+class FieldSpec(Fact, Lifetime):
     """A field of a message, or a named type that fields can have."""
 
     type: str = Field(description="u8, i32, f64, bool, fixed32.32, bytes[..], text[..], u16[..] or a name")
@@ -619,7 +628,7 @@ class ExampleSpec(_Mapping):
         return self.model_extra or {}
 
 
-class CommandSpec(Fact):
+class CommandSpec(Fact, Lifetime):
     """A transaction: request, response and their conditions."""
 
     section: Text | None = Field(  # type: ignore[assignment]  # None: that of `defaults`
@@ -649,7 +658,7 @@ class CommandSpec(Fact):
     examples: list[ExampleSpec] = Field(default_factory=list, description="Frames of the source document")
 
 
-class MessageSpec(Fact):
+class MessageSpec(Fact, Lifetime):
     """A message without a response."""
 
     id: MessageId | None = Field(

@@ -137,6 +137,11 @@ AnyCondition = Annotated[
         "{FIELD: value, range, list of them, or `not` one}, or the name of a truth value", "object", "string"
     ),
 ]
+Version = Annotated[
+    notation.Version,
+    PlainValidator(notation.version),
+    _json("Numbers with dots between them: 2, 2.1, 1.0.3", "string", "number"),
+]
 Time = Annotated[
     notation.Duration, PlainValidator(notation.duration), _json("3 bytes, 260 us, 10 ms or 1 s", "string")
 ]

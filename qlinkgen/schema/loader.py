@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -18,6 +19,8 @@ from qlinkgen.schema.frames import FrameBuilder, payload_bounds
 from qlinkgen.schema.including import include
 from qlinkgen.schema.messages import MessageBuilder
 from qlinkgen.schema.names import check_names
+from qlinkgen.schema.notation import Version
+from qlinkgen.schema.notation import version as as_version
 from qlinkgen.schema.reading import read_regular, reason_of
 from qlinkgen.schema.report import Reporter, did_you_mean
 from qlinkgen.schema.seeds import check_references, check_types
@@ -26,6 +29,7 @@ from qlinkgen.schema.structure import check_structure
 from qlinkgen.schema.terminators import check_terminator
 from qlinkgen.schema.types import TypeBuilder
 from qlinkgen.schema.unconfirmed import report_unconfirmed
+from qlinkgen.schema.versions import FIRST, boundaries, check_lifetimes, in_version
 
 
 def shipped() -> tuple[str, ...]:
@@ -53,29 +57,61 @@ def find(protocol: str) -> FilePath:
     raise SchemaError([Fault(protocol, 1, 1, "file-unreadable", "unknown schema", hint)])
 
 
-def lint(path: FilePath | str) -> list[Fault]:
-    """All errors and warnings of a schema file, in order of the text."""
-    return sorted(_load(FilePath(path), None)[1])
+def lint(path: FilePath | str, *, version: str | None = None) -> list[Fault]:
+    """All errors and warnings of a schema file, in order of the text.
+
+    Args:
+        path: The file.
+        version: Version of the protocol; by default the newest one, and the errors of each other one.
+    """
+    faults = _load(FilePath(path), None, version)[1]
+    if version is None:
+        for other in _versions(FilePath(path), faults):
+            found = _load(FilePath(path), None, str(other))[1]
+            known = {(fault.rule, fault.line, fault.column) for fault in faults}
+            faults += [
+                replace(fault, message=f"{fault.message} in version {other} of the protocol")
+                for fault in found
+                if fault.severity == "error"
+                and (fault.rule, fault.line, fault.column) not in known
+                # Before its first version a protocol may be empty.
+                and not (fault.rule == "empty-protocol" and other == FIRST)
+            ]
+    return sorted(faults)
 
 
-def load(path: FilePath | str, *, crc: str | None = None) -> Protocol:
+def _versions(path: FilePath, faults: Sequence[Fault]) -> tuple[Version, ...]:
+    """Versions of a protocol other than the newest one; none if the file has an error."""
+    if any(fault.severity == "error" for fault in faults):
+        return ()
+    source = parse(read_regular(path))
+    report = Reporter(str(path), source)
+    include(source, report)
+    file = check_structure(source.data, report)
+    return boundaries(file) if file else ()
+
+
+def load(path: FilePath | str, *, crc: str | None = None, version: str | None = None) -> Protocol:
     """Read a schema file.
 
     Args:
         path: The file.
         crc: Algorithm that replaces the one in the file.
+        version: Version of the protocol; by default the newest one.
 
     Raises:
         SchemaError: with all errors of the file.
     """
-    protocol, faults = _load(FilePath(path), crc)
+    protocol, faults = _load(FilePath(path), crc, version)
     errors = [fault for fault in faults if fault.severity == "error"]
     if protocol is None or errors:
         raise SchemaError(errors)
     return protocol
 
 
-def loads(text: str, file: str, *, crc: str | None = None) -> tuple[Protocol | None, list[Fault]]:
+def loads(
+    text: str, file: str, *, crc: str | None = None, version: str | None = None
+) -> tuple[Protocol | None, list[Fault]]:
     """The protocol described by a text (None if it has errors), and its faults."""
     source = parse(text)
     report = Reporter(file, source)
@@ -84,23 +120,29 @@ def loads(text: str, file: str, *, crc: str | None = None) -> tuple[Protocol | N
     if any(fault.rule == "yaml-syntax" for fault in source.faults):
         return None, report.faults
     texts = (text, *include(source, report))
-    protocol = _build(source.data, report, "".join(texts), FilePath(file).name, crc)
+    chosen = None if version is None else as_version(version)
+    protocol = _build(source.data, report, "".join(texts), FilePath(file).name, crc=crc, version=chosen)
     return protocol if not report.failed else None, report.faults
 
 
-def _load(path: FilePath, crc: str | None) -> tuple[Protocol | None, list[Fault]]:
+def _load(path: FilePath, crc: str | None, version: str | None) -> tuple[Protocol | None, list[Fault]]:
     try:
         text = read_regular(path)
     except (OSError, UnicodeDecodeError) as error:
         what = f"cannot read it: {reason_of(error)}"
         return None, [Fault(str(path), 1, 1, "file-unreadable", what, "check the path")]
-    return loads(text, str(path), crc=crc)
+    return loads(text, str(path), crc=crc, version=version)
 
 
-def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | None) -> Protocol | None:
-    file = check_structure(data, report)
-    if file is None:
+def _build(
+    data: Data, report: Reporter, text: str, file_name: str, *, crc: str | None, version: Version | None
+) -> Protocol | None:
+    whole = check_structure(data, report)
+    if whole is None:
         return None
+    check_lifetimes(whole, report)
+    file = in_version(whole, version)
+    text += f"\nversion {version}" if version else ""
     payload_max = payload_bounds(file)[1]
     types = TypeBuilder(file, report, payload_max)
     frame = FrameBuilder(file, report, types, crc).build()
@@ -137,7 +179,8 @@ def _build(data: Data, report: Reporter, text: str, file_name: str, crc: str | N
         schema_hash=hashlib.sha256(text.replace("\r\n", "\n").encode()).hexdigest()[:12],
         schema_file=file_name,
         includes=file.include or "",
+        version=str(version) if version else "",
     )
-    # With another checksum the bytes of the document are wrong.
-    examples = build_examples(file, protocol, report) if crc is None else ()
+    # With another checksum, or in another version, the bytes of the document are wrong.
+    examples = build_examples(file, protocol, report) if crc is None and version is None else ()
     return replace(protocol, examples=examples)

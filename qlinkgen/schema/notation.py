@@ -23,6 +23,7 @@ _DURATION = re.compile(
     r"\s*(?P<number>[0-9]{1,12}(?:\.[0-9]{1,12})?)\s*(?P<unit>bytes?|us|ms|s)\s*\Z", re.ASCII
 )
 _TYPE = re.compile(r"\s*(?P<base>[A-Za-z_][\w.]*)\s*(?:\[(?P<count>[^\]]*)\])?\s*\Z", re.ASCII)
+_VERSION = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9}){0,5}\Z", re.ASCII)
 _SECONDS = {"us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
 _MAX_POWER = 128
 _MAX_SHOWN = 60
@@ -42,6 +43,35 @@ class Duration:
 
     byte_times: Fraction = Fraction(0)
     seconds: Fraction = Fraction(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Version:
+    """A version of a protocol: numbers with dots between them; 2 is 2.0."""
+
+    numbers: tuple[int, ...]
+
+    def __str__(self) -> str:
+        return ".".join(map(str, self.numbers))
+
+    def __lt__(self, other: Version) -> bool:
+        return self.key < other.key
+
+    def __le__(self, other: Version) -> bool:
+        return self.key <= other.key
+
+    @property
+    def key(self) -> tuple[int, ...]:
+        """Its numbers without zeros at the end, for comparison."""
+        numbers = self.numbers
+        while numbers and numbers[-1] == 0:
+            numbers = numbers[:-1]
+        return numbers
+
+    @property
+    def next(self) -> Version:
+        """The version just after it."""
+        return Version((*self.numbers, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +161,13 @@ def byte_string(value: object) -> bytes:
     raise ValueError(
         f"{shown(value)} is not a byte string; write one number like 0xA5, or hex pairs like A5 A5"
     )
+
+
+def version(value: object) -> Version:
+    """``2``, ``2.1`` or ``1.0.3``. Raises ValueError."""
+    if isinstance(value, int | Decimal | str) and not isinstance(value, bool) and _VERSION.match(str(value)):
+        return Version(tuple(map(int, str(value).split("."))))
+    raise ValueError(f"{shown(value)} is not a version; write numbers with dots between them, like 2.1")
 
 
 def duration(value: object) -> Duration:

@@ -67,6 +67,7 @@ class TypeBuilder:
             ("echo", "echo"),
             ("when", "if"),
             ("optional", "optional"),
+            *((key, key) for key in ("since", "until", "deprecated")),
         ):
             if getattr(spec, attribute):
                 what = f"'{key}' has no effect on a named type"

@@ -39,8 +39,10 @@ _strip = Protocol.without_texts
 _print = module.render
 
 
-def _loads(text: str, file: str, *, crc: str | None = None) -> tuple[Protocol | None, list[Fault]]:
-    protocol, faults = _read(text, file, crc=crc)
+def _loads(
+    text: str, file: str, *, crc: str | None = None, version: str | None = None
+) -> tuple[Protocol | None, list[Fault]]:
+    protocol, faults = _read(text, file, crc=crc, version=version)
     return protocol, list(faults)
 
 
