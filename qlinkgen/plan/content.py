@@ -261,7 +261,9 @@ def _unpack_walked(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
 
 def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:
     """The number of items of a run that has these bytes."""
-    return {step.name: len(data) // step.item_size} if isinstance(step, RunStep) else {}
+    if not isinstance(step, RunStep) or step.fixed:
+        return {}
+    return {step.name: len(data) // step.item_size}
 
 
 def places(plan: PayloadPlan, payload: bytes) -> Iterator[tuple[Step, int]]:

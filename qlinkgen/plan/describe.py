@@ -550,5 +550,6 @@ def segment_text(segment: Segment) -> str:
     else:
         size = f"{run.item_size}*{run.name}" if run.item_size > 1 else run.name
         if segment.rest is not None:
-            size = f"the rest{f' but {segment.rest} bytes' if segment.rest else ''}"
+            rest = size_text(segment.rest)
+            size = f"the rest{f' but {rest} bytes' if rest != '0' else ''}"
     return f"{names}: {size}" + (f", {presence_text(segment.presence)}" if segment.presence else "")

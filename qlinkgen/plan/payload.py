@@ -318,13 +318,13 @@ class Segment:
             variable size. Their places count from the beginning of the segment.
         presence: what decides whether it is present, None if it always is.
         size: its size if it is present, None for a run of variable size.
-        rest: number of bytes after a run that takes the rest of the payload, None for other segments.
+        rest: size of what follows a run that takes the rest of the payload, None for other segments.
     """
 
     steps: tuple[Step, ...]
     presence: Presence | None
     size: int | None
-    rest: int | None = None
+    rest: Size | None = None
 
     @property
     def run(self) -> RunStep | None:
@@ -605,8 +605,7 @@ class _Planner:
         kind = field.type
         if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
             return Segment((step,), presence, field.max_size)
-        rest = None if kind.length.counted_by else sum(each.max_size for each in after)
-        return Segment((step,), presence, None, rest)
+        return Segment((step,), presence, None, None if kind.length.counted_by else _size_of(after))
 
     def _step(self, field: Field, place: Place) -> Step:
         kind = field.type
@@ -669,6 +668,14 @@ class _Planner:
         kind = self._fields[run].type
         assert isinstance(kind, Blob | Array | Records)
         return kind.length
+
+
+def _size_of(fields: Iterable[Field]) -> Size:
+    """The size of fields that are always present."""
+    size = Size()
+    for field in fields:
+        size = size + field.max_size if field.fixed else size.plus(_term(field.name, field.type))
+    return size
 
 
 def _present(step: Step, presence: Presence | None) -> Step:

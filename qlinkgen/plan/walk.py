@@ -91,7 +91,7 @@ class Walk:
             if left < size:
                 raise Wrong(run.name, at, segment.steps)
             return size
-        size = left - segment.rest
+        size = left - segment.rest.value(self.counts)
         count, odd = divmod(size, run.item_size)
         if odd or not run.length.minimum <= count <= run.length.maximum:
             raise Wrong(run.name, at, segment.steps)

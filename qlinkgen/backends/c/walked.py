@@ -9,11 +9,11 @@ from qlinkgen.backends.c import checks
 from qlinkgen.backends.c.conditions import condition, numbers_of
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.encode import Encoder
-from qlinkgen.backends.c.names import count_type
-from qlinkgen.backends.c.sizes import local, local_size
+from qlinkgen.backends.c.names import count_type, grouped
+from qlinkgen.backends.c.sizes import local, local_size, size_text
 from qlinkgen.model import naming
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.expr import Within
+from qlinkgen.plan.expr import Size, Within
 from qlinkgen.plan.payload import CountStep, PayloadPlan, Presence, RunStep, Segment, Step, holders
 
 
@@ -168,12 +168,13 @@ class WalkedDecoder(Decoder):
             return _guarded(test, inner)
         return [f"message->{member} = {test};", *_guarded(f"message->{member}", inner)]
 
-    def _infer_rest(self, run: RunStep, rest: int) -> None:
+    def _infer_rest(self, run: RunStep, after: Size) -> None:
         length, name = run.length, local(run.name)
-        self.refuse([f"size < {rest}U"] if rest else [], "LENGTH")
-        left = f"size - {rest}U" if rest else "size"
+        rest = grouped(size_text(after, local))
+        self.refuse([f"size < {rest}"] if rest != "0U" else [], "LENGTH")
+        left = f"size - {rest}" if rest != "0U" else "size"
         if run.item_size > 1:
-            left = f"({left})" if rest else left
+            left = grouped(left)
             self.refuse([f"({left} % {run.item_size}U) != 0U"], "LENGTH")
             left = f"{left} / {run.item_size}U"
         self.lines.append(f"{name} = {left};")

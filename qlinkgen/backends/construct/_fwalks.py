@@ -38,12 +38,10 @@ class Walked(Message):
         message_id: int,
         *fields: Renamed,
         presence: Sequence[Presence] = (),
-        addresses: Sequence[tuple[int, int]] = (),
-        checksum: bool = True,
+        **settings: Any,
     ) -> None:
-        super().__init__(
-            name, message_id, *fields, addresses=addresses, checksum=checksum
-        )
+        # Any: the settings of a Message.
+        super().__init__(name, message_id, *fields, **settings)
         self.presence = {field: tests for field, tests, _ in presence}
         self.tested = {test[0] for _, tests, _ in presence for test in tests}
         absent = {field for field, _, given in presence if not given}
@@ -147,7 +145,7 @@ class Walked(Message):
                 )
             for field in segment:
                 cell = data[at : at + self._size(field, counts)]
-                found = field.parse(cell)
+                found = field.parse(cell, number=counts.get(field.name))
                 if isinstance(field.subcon, BitFields):
                     values.update(found)
                 elif isinstance(field.subcon, Default):
@@ -168,7 +166,7 @@ class Walked(Message):
             return
         after = self.fields[self.fields.index(field) + 1 :]
         number, odd = divmod(
-            left - sum(int(each.sizeof()) for each in after), run.size
+            left - sum(self._size(each, counts) for each in after), run.size
         )
         if odd:
             raise RangeError(

@@ -196,7 +196,8 @@ class WalkedDecoder(Decoder):
         """The statements that count a run which takes the rest."""
         if segment.rest is None:
             return []
-        left = f"end - at - {segment.rest}" if segment.rest else "end - at"
+        rest = integers.size_text(segment.rest)
+        left = "end - at" if rest == "0" else f"end - at - ({rest})" if " " in rest else f"end - at - {rest}"
         return divided(run, left, run.item_size, self._bad_layout)
 
     def _flushed(self) -> list[str]:

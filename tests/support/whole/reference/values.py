@@ -205,14 +205,17 @@ def _walked(message: Message, payload: bytes) -> dict[str, Raw]:
         sizes = [_size(slot, counted) for slot in segment]
         if sizes == [None]:
             behind = message.slots[message.slots.index(first) + 1 :]
-            sizes = [left - sum(slot.most_bytes for slot in behind)]
+            sizes = [left - _behind(behind, counted)]
             _demand(first.kind, sizes[0] or 0)
         if sum(size or 0 for size in sizes) > left:
             raise Wrong("length", first.name)
         for slot, size in zip(segment, sizes, strict=True):
             data = payload[at : at + (size or 0)]
-            number = len(data) // slot.kind.step if isinstance(slot.kind, Run | Records) else None
-            values |= _decoded(slot, data, None if slot.fixed else number)
+            kind = slot.kind
+            number = None
+            if isinstance(kind, Run | Records) and not slot.fixed:
+                number = len(data) // kind.step
+            values |= _decoded(slot, data, number)
             note(slot, data, numbers)
             if slot.counts:
                 _note(message, slot, data, counted)
