@@ -72,6 +72,7 @@ def read(wire: bytes, direction: Direction) -> Record | None:
     assert "packet_error" not in found or not found["packet_error"]
     name = next(name for name, code in _CODES.items() if code == found["code"])
     fields: Mapping[str, Any] = {}
-    if direction == "response" and name in _VALUES and board.process_recv_data(found) > 0:
+    if direction == "response" and name in _VALUES and found["dataView"]:
+        assert board.process_recv_data(found) >= 0  # bytes that it leaves
         fields = _VALUES[name](board)
     return {"message": f"{name}.{direction}", "fields": fields}

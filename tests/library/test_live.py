@@ -1,0 +1,134 @@
+"""Masters of other people talk to our slaves over pseudo-terminals."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from qlinkgen.link import SlaveEngine
+from qlinkgen.transport import PtyPort, open_pty
+from qlinkgen.transport.serving import serve
+from tests.library.protocols import described, peer
+
+Handle = Callable[[Any], Any]
+
+
+class Device:
+    """A node whose handler is a function of the request."""
+
+    def __init__(self, number: int, handle: Handle) -> None:
+        self.number = number
+        self._handle = handle
+
+    def handle(self, request: Any, now: float) -> Any:
+        return self._handle(request)
+
+
+@contextlib.contextmanager
+def serving(name: str, number: int, handle: Handle) -> Iterator[PtyPort]:
+    """Serve a device of a protocol on a pseudo-terminal."""
+    stopped = threading.Event()
+    with open_pty() as port:
+        engine = SlaveEngine(described(name).module, Device(number, handle))
+        thread = threading.Thread(target=serve, args=(port, engine), kwargs={"stop": stopped.is_set})
+        thread.start()
+        try:
+            yield port
+        finally:
+            stopped.set()
+            thread.join(10)
+
+
+def test_dynamixel_sdk_reads_and_writes_a_servo() -> None:
+    peer("dynamixel_2")
+    from dynamixel_sdk import COMM_SUCCESS, PortHandler, Protocol2PacketHandler
+
+    codec: Any = described("dynamixel_2").module
+    table = bytearray(range(200))
+
+    def servo(request: Any) -> Any:
+        error, data = codec.Error.NONE, b""
+        match request:
+            case codec.PingRequest():
+                data = bytes((0x06, 0x04, 0x26))
+            case codec.ReadRequest(start=start, size=size) if start + size <= len(table):
+                data = bytes(table[start : start + size])
+            case codec.WriteRequest(start=start, data=written) if start + len(written) <= len(table):
+                table[start : start + len(written)] = written
+            case _:
+                error = codec.Error.DATA_RANGE
+        return codec.Status(node=3, error=error, alert=False, data=data)
+
+    with serving("dynamixel_2", 3, servo) as pty:
+        port, packets = PortHandler(pty.path), Protocol2PacketHandler()
+        assert port.openPort()
+        try:
+            assert packets.ping(port, 3) == (0x0406, COMM_SUCCESS, 0)
+            assert packets.read4ByteTxRx(port, 3, 132) == (0x87868584, COMM_SUCCESS, 0)
+            assert packets.write2ByteTxRx(port, 3, 10, 0x1234) == (COMM_SUCCESS, 0)
+            assert table[10:12] == bytes((0x34, 0x12))
+            assert packets.write2ByteTxRx(port, 3, 199, 1) == (COMM_SUCCESS, codec.Error.DATA_RANGE)
+        finally:
+            port.closePort()
+
+
+def test_pyptzcontroller_asks_for_the_position() -> None:
+    peer("pelco_d")
+    from ptz_control_lib.ptz_controller import PtzControl
+
+    codec: Any = described("pelco_d").module
+    seen = []
+
+    def camera(request: Any) -> Any:
+        seen.append(type(request).NAME)
+        match request:
+            case codec.QueryPanRequest():
+                return codec.QueryPanResponse(node=5, angle=123.45)
+            case codec.QueryTiltRequest():
+                return codec.QueryTiltResponse(node=5, angle=17.5)
+        return None
+
+    with serving("pelco_d", 5, camera) as pty, contextlib.redirect_stdout(io.StringIO()):
+        controller = PtzControl(pty.path, 5, 9600)
+        assert controller.connect()
+        try:
+            controller.move("left", 20)
+            controller.go_to_preset(7)
+            assert controller.get_position() == (123.45, -17.5)
+        finally:
+            controller.disconnect()
+    assert seen == ["left.request", "go_to_preset.request", "query_pan.request", "query_tilt.request"]
+
+
+def test_yamspy_reads_a_flight_controller() -> None:
+    peer("msp")
+    from yamspy import MSPy
+
+    codec: Any = described("msp").module
+
+    def board(request: Any) -> Any:
+        match request:
+            case codec.AttitudeRequest():
+                return codec.AttitudeResponse(roll=-12.5, pitch=3.0, yaw=271)
+            case codec.SetMotorsRequest(motors=motors):
+                outputs.extend(motors)
+                return codec.SetMotorsResponse()
+        return None
+
+    outputs: list[int] = []
+    with serving("msp", 0, board) as pty:
+        master = MSPy(pty.path, loglevel="CRITICAL", logfilename=None)
+        master.INAV = False
+        master.conn.open()
+        try:
+            assert master.send_RAW_msg(MSPy.MSPCodes["MSP_ATTITUDE"]) > 0
+            assert master.process_recv_data(master.receive_msg()) == 0
+            assert master.SENSOR_DATA["kinematics"] == [-12.5, 3.0, 271]
+            master.send_RAW_MOTORS([*range(1000, 1800, 100)])
+            assert master.receive_msg()["code"] == MSPy.MSPCodes["MSP_SET_MOTOR"]
+        finally:
+            master.conn.close()
+    assert outputs == [*range(1000, 1800, 100)]
