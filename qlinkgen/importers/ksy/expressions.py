@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from qlinkgen.importers import cells
 from qlinkgen.importers.document import Notation, Value
+from qlinkgen.importers.names import schema_name
 
 _NAME = r"[a-z][a-z0-9_]*(?:\.[a-z][a-z0-9_]*)*"
 _COUNT = re.compile(rf"\(?\s*(?P<name>{_NAME})\s*(?:(?P<sign>[-+*/])\s*(?P<number>\w+)\s*)?\)?(?:\.as<\w+>)?")
@@ -94,15 +95,16 @@ def _compared(match: re.Match[str], name: str, constant: Constant, limits: Limit
             (match["value"] == "true") is (match["sign"] == "==") if match["sign"] in ("==", "!=") else None
         )
     number = _whole(match["value"])
+    named = "" if number is not None else schema_name(match["value"].rpartition("::")[2])
     number = constant(name, match["value"]) if number is None else number
     if number is None:
         return None
     ends = limits(name)
     match match["sign"]:
         case "==":
-            return number
+            return named or number
         case "!=":
-            return Notation(f"not {number}")
+            return Notation(f"not {named or number}")
         case sign if ends is None:
             del sign
             return None
