@@ -10,6 +10,9 @@ from pydantic import BaseModel
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
+#: Attributes of keys that are words of Python.
+_ATTRIBUTES = {"as": "as_", "if": "when"}
+
 
 @dataclass(frozen=True, slots=True)
 class Location:
@@ -35,7 +38,7 @@ class Location:
     def reject(self, spec: BaseModel, keys: Iterable[str], what: str, hint: str = "remove it") -> None:
         """Report the given keys that do not apply to ``what``."""
         for key in keys:
-            if getattr(spec, "as_" if key == "as" else key) not in (None, False, ""):
+            if getattr(spec, _ATTRIBUTES.get(key, key)) not in (None, False, ""):
                 self.key_fault("not-applicable", key, f"'{key}' has no effect on {what}", hint)
 
     def inner(self, *keys: str, written: Iterable[str] = ()) -> Location:
