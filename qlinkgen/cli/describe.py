@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from decimal import Decimal
+from typing import assert_never
 
 from qlinkgen.model.fields import Record, Records
 from qlinkgen.model.message import Message, Value
-from qlinkgen.model.transaction import Allowance, Command, Reply
+from qlinkgen.model.transaction import Allowance, ByCount, ByField, ByReply, ByTime, Command, Many, Reply
 from qlinkgen.model.values import default_of, to_json
 from qlinkgen.plan.describe import number_text, span_text
 
@@ -51,6 +52,21 @@ def time_text(allowance: Allowance) -> str:
     if allowance.seconds:
         parts.append(f"{number_text(float(allowance.seconds * 1000))} ms")
     return " + ".join(parts)
+
+
+def many_text(many: Many) -> str:
+    """Return where several answers end."""
+    match many:
+        case ByCount():
+            return f"as many answers as {many.field} says" if many.field else f"{many.most} answers"
+        case ByField():
+            return f"answers until {many.field} is {span_text(many.first, many.last)}"
+        case ByReply():
+            return f"answers until {many.reply.name}"
+        case ByTime():
+            return f"all answers within {time_text(many.within)}"
+        case _:
+            assert_never(many)
 
 
 def means_text(reply: Reply) -> str:

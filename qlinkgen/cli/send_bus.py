@@ -51,8 +51,10 @@ def send_on_bus(
         except Refused as refusal:
             click.echo(jsonlines.line(message_record(protocol, cast("Framed", refusal.reply))))
             raise
-    if reply.response is not None:
-        click.echo(jsonlines.line(message_record(protocol, reply.response)))
+    answers = reply.response if isinstance(reply.response, list) else [reply.response]
+    for answer in answers:
+        if answer is not None:
+            click.echo(jsonlines.line(message_record(protocol, answer)))
 
 
 def _tell(port: Port, frame: bytes, bits_per_byte: int) -> None:

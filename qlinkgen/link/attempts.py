@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from qlinkgen.link.codec import Message
 from qlinkgen.link.transaction import Reply
 
 
@@ -49,6 +48,6 @@ class Attempts:
         """Return the bytes of all wrong replies."""
         return b"".join(raw for _, raw in self.wrong)
 
-    def reply(self, response: Message | None, now: float) -> Reply:
+    def reply(self, response: object, now: float) -> Reply:
         """Return the outcome of a successful transaction."""
         return Reply(response, self.number, now - self.started, now, now - self.sent_at)

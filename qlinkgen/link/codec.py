@@ -101,6 +101,20 @@ class OtherReply(Protocol):
         ...
 
 
+class Many(Protocol):
+    """The end of several answers to one request, of a generated module."""
+
+    count: int
+    counted_by: str
+    until: tuple[str, int, int] | None
+    within: tuple[float, float] | None
+
+    @property
+    def reply(self) -> type[Framed] | None:
+        """Class of the reply that follows the last answer."""
+        ...
+
+
 class Command(Protocol):
     """A transaction of a generated module."""
 
@@ -120,6 +134,11 @@ class Command(Protocol):
     @property
     def response(self) -> type[Message] | None:
         """Class of the response, None for a command without a response."""
+        ...
+
+    @property
+    def many(self) -> Many | None:
+        """The end of several answers, None if there is one."""
         ...
 
     @property

@@ -42,6 +42,7 @@ from qlinkgen.link.events import (
     TimedOut,
 )
 from qlinkgen.link.health import HealthBook, HealthPolicy
+from qlinkgen.link.many import Answers
 from qlinkgen.link.master_states import MASTER_MOVES, MasterEvent, MasterState
 from qlinkgen.link.pending import Pending
 from qlinkgen.link.quiet import QuietLine
@@ -56,7 +57,8 @@ EARLY = 0.9
 IDLE, PROBING, WAITING = MasterState.IDLE, MasterState.PROBING, MasterState.WAITING
 
 (
-    _START, _START_PROBE, _PROBED, _SENT, _UNANSWERED, _ANSWERED, _AGAIN, _PENDING, _REPEAT, _FAIL, _ABORT,
+    _START, _START_PROBE, _PROBED, _SENT, _UNANSWERED, _ANSWERED, _AGAIN, _MORE, _PENDING, _REPEAT, _FAIL,
+    _ABORT,
 ) = (Moves(MASTER_MOVES, event) for event in MasterEvent)  # fmt: skip
 
 
@@ -114,6 +116,8 @@ class MasterEngine:
         self._earliest = 0.0
         self._deadline = 0.0
         self._received = b""
+        #: Answers to a request that has several, None to others.
+        self._answers: Answers | None = None
 
     # What a driver calls ------------------------------------------------------------------------------------
 
@@ -170,6 +174,7 @@ class MasterEngine:
             self._look_at_health(now)
         self._received = b""
         self._outcome = None
+        self._answers = None
         if self._line.suspect:
             self._line.await_quiet(now)
         if self._echo.mode == "auto":
@@ -222,7 +227,10 @@ class MasterEngine:
         state = self._state
         if state is WAITING:
             if now >= self._deadline:
-                self._timed_out(now)
+                if self._answers is not None and self._answers.timed and self._answers.items:
+                    self._succeed(self._answers.items[-1], now)
+                else:
+                    self._timed_out(now)
         elif state is PROBING and self._probe.until:
             if now >= self._probe.until:
                 self._probed(found=False, now=now)
@@ -284,6 +292,9 @@ class MasterEngine:
             return frame
         self._earliest = now + EARLY * on_wire if self._paced else now
         self._deadline = now + on_wire + command.answer_time
+        if command.many is not None:
+            self._answers = Answers(command.many, pending.request)
+            self._deadline += self.timing.duration(command.many)
         self._state = _SENT[self._state]
         return frame
 
@@ -332,12 +343,15 @@ class MasterEngine:
         pending, attempts = self._pending, self._attempts
         reply = pending.replied_by(message, self._address(message))
         if reply is None:
-            return False
+            return self._is_one_of_many(message, now)
         means = reply.meaning(message)
         event = OtherAnswer(now, pending.node, pending.request, message, means, attempts.number)
         self.events.append(event)
-        if means == "done":
+        if self._answers is not None and self._answers.ended_by(message):
             self._succeed(message, now)
+        elif means == "done":
+            if not self._is_one_of_many(message, now):
+                self._succeed(message, now)
         elif means == "pending":
             self._wait_on(reply, now)
         else:
@@ -348,6 +362,23 @@ class MasterEngine:
                 self._line.await_quiet(now)
             else:
                 self._refused(reply, message, now)
+        return True
+
+    def _is_one_of_many(self, message: Framed, now: float) -> bool:
+        """Take one of several answers; return whether it is one."""
+        pending, answers = self._pending, self._answers
+        if answers is None or type(message) is not pending.command.response:
+            return False
+        if not pending.answered_by(message, self._address(message)):
+            return False
+        if answers.take(message):
+            self._succeed(message, now)
+            return True
+        self._state = _MORE[self._state]
+        event = OtherAnswer(now, pending.node, pending.request, message, "more", self._attempts.number)
+        self.events.append(event)
+        if not answers.timed:
+            self._deadline = now + pending.command.answer_time
         return True
 
     def _wait_on(self, reply: OtherReply, now: float) -> None:
@@ -404,7 +435,8 @@ class MasterEngine:
     def _succeed(self, response: Framed, now: float) -> None:
         pending, attempts = self._pending, self._attempts
         self._state = _ANSWERED[self._state]
-        self._outcome = reply = attempts.reply(response, now)
+        answers = self._answers
+        self._outcome = reply = attempts.reply(response if answers is None else answers.items, now)
         self._answered(response, now)
         if self.verbose:
             event = Answered(now, pending.node, pending.request, response, reply.attempts, reply.elapsed)

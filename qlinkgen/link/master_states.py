@@ -24,6 +24,7 @@ class MasterEvent(StrEnum):
     UNANSWERED = "sent without a response"  #: the request is sent, and nothing answers it
     ANSWERED = "answered"  #: the answer was received, perhaps a refusal
     AGAIN = "again"  #: a reply asks for the request once more
+    MORE = "more"  #: one of several answers was received, and not the last
     PENDING = "pending"  #: a reply announces the answer
     REPEAT = "repeat"  #: the deadline passed with attempts left
     FAIL = "fail"  #: the deadline of the last attempt passed, or the line did not become quiet in time
@@ -45,6 +46,7 @@ MASTER_MOVES = {
     (_S.GUARD, _E.ABORT): _S.IDLE,
     (_S.WAITING, _E.ANSWERED): _S.IDLE,
     (_S.WAITING, _E.AGAIN): _S.GUARD,
+    (_S.WAITING, _E.MORE): _S.WAITING,
     (_S.WAITING, _E.PENDING): _S.WAITING,
     (_S.WAITING, _E.REPEAT): _S.GUARD,
     (_S.WAITING, _E.FAIL): _S.IDLE,

@@ -24,6 +24,7 @@ from qlinkgen.link.codec import (
     is_message,
 )
 from qlinkgen.link.events import Damaged, Stray
+from qlinkgen.link.many import Answers
 from qlinkgen.link.timing import Timing
 from qlinkgen.link.transaction import Accepts
 
@@ -64,13 +65,14 @@ Heard = Asked | Replied | Unanswered | Stray | Damaged
 class _Pending:
     """The last request, and its deadline."""
 
-    __slots__ = ("answered", "at", "command", "deadline", "reported", "request")
+    __slots__ = ("answered", "answers", "at", "command", "deadline", "reported", "request")
 
     def __init__(self, command: Command, request: Framed, at: float, deadline: float) -> None:
         self.command = command
         self.request = request
         self.at = at
         self.deadline = deadline
+        self.answers = Answers(command.many, request) if command.many is not None else None
         self.answered = command.response is None
         self.reported = self.answered
 
@@ -134,7 +136,9 @@ class Monitor:
         pending = self._pending
         if pending is not None and not pending.reported and now >= pending.deadline:
             pending.reported = True
-            self.heard.append(Unanswered(now, pending.request))
+            answers = pending.answers
+            if answers is None or not (answers.timed and answers.items):  # otherwise that was their end
+                self.heard.append(Unanswered(now, pending.request))
 
     def _sort(
         self, asking: Sequence[Framed | Fault], answering: Sequence[Framed | Fault], now: float
@@ -183,13 +187,22 @@ class Monitor:
         if pending.answered:
             self.heard.append(Stray(now, response, late=True))
             return
-        reply = pending.command.replies.get(type(response))
-        if reply is not None and reply.meaning(response) == "pending":
-            pending.deadline = max(pending.deadline, now + self._timing.patience(pending.command, reply))
+        deadline = self._further_deadline(pending, response, now)
+        if deadline is not None:
+            pending.deadline = max(pending.deadline, deadline)
         else:
             pending.answered = pending.reported = True
         delay = now - pending.at
         self.heard.append(Replied(now, pending.request, response, delay, late, self._codec.encode(response)))
+
+    def _further_deadline(self, pending: _Pending, response: Framed, now: float) -> float | None:
+        """Return the time until which another answer may follow this one, None if it is the last."""
+        reply, answers = pending.command.replies.get(type(response)), pending.answers
+        if reply is not None and reply.meaning(response) == "pending":
+            return now + self._timing.patience(pending.command, reply)
+        if answers is None or type(response) is not pending.command.response or answers.take(response):
+            return None
+        return pending.deadline if answers.timed else now + self._timing.deadline(pending.command, 0)
 
     def _asked(self, request: Framed, now: float) -> None:
         command = self._commands.get(type(request))
@@ -202,6 +215,8 @@ class Monitor:
         repeat = before is not None and not before.answered and before.request == request
         unanswerable = not addresses_that_answer(command, request, self._codec.BUS)
         self._pending = _Pending(command, request, now, now + self._timing.deadline(command, 0))
+        if command.many is not None:
+            self._pending.deadline += self._timing.duration(command.many)
         self._pending.answered = self._pending.reported = unanswerable
         self.heard.append(Asked(now, request, repeat, self._codec.encode(request)))
 

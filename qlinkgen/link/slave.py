@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal, Protocol
 
 from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message, wrong_size
@@ -15,8 +16,8 @@ class Node(Protocol):
     number: int
 
     # Any: a node handles only messages of its own protocol.
-    def handle(self, request: Any, now: float) -> Message | None:
-        """Execute a request; return the response, or None to send nothing."""
+    def handle(self, request: Any, now: float) -> Message | Sequence[Message] | None:
+        """Execute a request; return its answer, a list of several, or None to send nothing."""
         ...
 
 
@@ -114,6 +115,7 @@ class SlaveEngine:
         self._echo = EchoCanceller(echo)
         self._last = b""
         self._answer = b""
+        self._further: list[bytes] = []  #: answers that follow it
         self._due = 0.0
         self._request: Framed | None = None  #: the last one for this node
 
@@ -135,6 +137,7 @@ class SlaveEngine:
         if self._answer:  # the master no longer waits for it, as it sends again
             self.counters.replaced += 1
             self._answer = b""
+            self._further = []
         address = address_of(request)
         if address is not None and address == self._broadcast:
             self.counters.broadcasts += 1
@@ -149,10 +152,17 @@ class SlaveEngine:
             return
         self._request = request
         if response is not None:
-            self._check(request, response)
-            self._answer = self._encode(response)
+            self._queue(request, response)
             inserted = self._encode(request)[-1:] != self._last
             self._due = now + self._turnaround + (self._byte_time if inserted else 0.0)
+
+    def _queue(self, request: Framed, response: Message | Sequence[Message]) -> None:
+        """Encode one answer or several; the further ones follow the first."""
+        several: Sequence[Message] = response if isinstance(response, list | tuple) else (response,)
+        for each in several:
+            self._check(request, each)
+        self._further = [self._encode(each) for each in several]
+        self._answer = self._further.pop(0) if several else b""
 
     def _check(self, request: Framed, response: Message) -> None:
         """Refuse a response of another size than the request asks for, which a master would not accept."""
@@ -166,17 +176,16 @@ class SlaveEngine:
                 f"{asked} of the request asks for {getattr(request, asked)}"
             )
 
-    def _handled(self, request: Framed, now: float) -> Message | None:
+    def _handled(self, request: Framed, now: float) -> Message | Sequence[Message] | None:
         try:
             return self.node.handle(request, now)
         except Refusal as refusal:
             return refusal.reply
 
-    def answer(self, request: Framed, response: Message, now: float) -> None:
+    def answer(self, request: Framed, response: Message | Sequence[Message], now: float) -> None:
         """Send the answer to a request that its handler did not answer; too late after another request."""
         if request is self._request:
-            self._check(request, response)
-            self._answer = self._encode(response)
+            self._queue(request, response)
             self._due = max(self._due, now)
         else:
             self.counters.replaced += 1
@@ -186,7 +195,8 @@ class SlaveEngine:
         answer = self._answer
         if not answer or now < self._due:
             return b""
-        self._answer = b""
+        self._answer = self._further.pop(0) if self._further else b""
+        self._due = now + len(answer) * self._byte_time + self._turnaround
         self.counters.answers += 1
         if self._echo.mode == "expect":
             self._echo.sent(answer)

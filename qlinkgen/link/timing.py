@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from qlinkgen.link.codec import Command, Module, OtherReply, meanings
+from qlinkgen.link.codec import Command, Many, Module, OtherReply, meanings
 from qlinkgen.link.echo import PROBE
 
 #: Byte times after which a line counts as quiet; also Q.link's response time.
@@ -104,6 +104,10 @@ class Timing:
         byte_times, seconds = reply.within
         return self.on_wire(_longest_answer(command)) + self._time(byte_times, seconds) + self.host_slack
 
+    def duration(self, many: Many) -> float:
+        """Return the time in which several answers come, if that is their end."""
+        return self._time(*many.within) if many.within is not None else 0.0
+
     def pause(self, reply: OtherReply) -> float:
         """Return the time until a request is sent again, if a reply asks for it."""
         return self._time(*reply.after)
@@ -133,12 +137,19 @@ class Timing:
     def worst_case(self, command: Command, attempts: int | None = None) -> float:
         """Return the longest duration of a call in seconds, for any traffic on the line.
 
+        Infinite for several answers whose end the device decides.
+
         The first term is the delay before the first attempt: an aborted request that may still be answered (a
         broadcast that is still being sent takes less), or the probe for an echo, with a quiet line before it.
         """
         given_up = self.on_wire(2 * self.longest_frame) + self.longest_allowance + self.host_slack
         search = self.quiet_limit + self.on_wire(len(PROBE)) + self.quiet
         attempt = self.quiet_limit + self.deadline(command)
+        many = command.many
+        if many is not None:
+            endless = many.until is not None or many.reply is not None
+            further = max(many.count - 1, 0) * self.deadline(command)
+            attempt += float("inf") if endless else further + self.duration(many)
         tries = self.attempts_of(command, attempts)
         for reply in command.replies.values():
             if "again" in meanings(reply):

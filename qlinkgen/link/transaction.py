@@ -48,7 +48,7 @@ class CommandTiming:
     """Response and deadlines of a command, computed once instead of for each transaction."""
 
     __slots__ = (
-        "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "plain",
+        "accepts", "allowance", "answer_time", "answers_broadcast", "definition", "echoes", "many", "plain",
         "replies", "response", "sizes", "tries",
     )  # fmt: skip
 
@@ -59,8 +59,11 @@ class CommandTiming:
         self.echoes = command.echoes
         self.sizes = command.sizes
         self.replies = command.replies
-        #: Class of the response if it answers in any case, whatever is in it.
-        self.plain = None if command.response in command.replies else command.response
+        #: Class of the response if it answers in any case, whatever is in it, and is the only one.
+        self.plain = command.response
+        if command.many is not None or command.response in command.replies:
+            self.plain = None
+        self.many = command.many
         self.answers_broadcast = command.addressing == "answered_broadcast"
         self.allowance = timing.gap(command)
         self.answer_time = timing.deadline(command, 0)

@@ -82,6 +82,41 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
+class ByCount:
+    """A fixed number of answers, or as many as a field of the request says, at most ``most``."""
+
+    most: int
+    field: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ByField:
+    """Answers up to one whose field has a raw value from ``first`` to ``last``."""
+
+    field: str
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True)
+class ByReply:
+    """Answers up to a reply, which is not one of them."""
+
+    reply: Message
+
+
+@dataclass(frozen=True, slots=True)
+class ByTime:
+    """All answers that come in a time."""
+
+    within: Allowance
+
+
+#: The end of several answers to one request.
+Many = ByCount | ByField | ByReply | ByTime
+
+
+@dataclass(frozen=True, slots=True)
 class Command:
     """A transaction: a request and its response, None if it is not answered."""
 
@@ -101,6 +136,8 @@ class Command:
     replies: tuple[Reply, ...] = ()
     #: Fields of the response, and the fields of the request that say how many items they have.
     sizes: tuple[tuple[str, str], ...] = ()
+    #: The end of the answers, None if there is one.
+    many: Many | None = None
     #: What the response means, None if it always answers the request.
     outcome: Reply | None = None
     #: Protocol-specific attributes; names and values are declared in the schema.

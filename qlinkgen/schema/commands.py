@@ -8,7 +8,7 @@ from typing import assert_never
 
 from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
 from qlinkgen.model.message import Message
-from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Repeat, Reply
+from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Many, Repeat, Reply
 from qlinkgen.model.types import Scalar
 from qlinkgen.schema.constants import MAX_BITS
 from qlinkgen.schema.file_model import (
@@ -21,6 +21,7 @@ from qlinkgen.schema.file_model import (
 )
 from qlinkgen.schema.kinds import Label
 from qlinkgen.schema.layouts import fields_of, fields_path
+from qlinkgen.schema.many import ManyBuilder
 from qlinkgen.schema.messages import MessageBuilder, Written
 from qlinkgen.schema.notation import AnswerId, Duration, StatedId, shown
 from qlinkgen.schema.replies import ReplyBuilder
@@ -87,6 +88,8 @@ class CommandBuilder:
         defaults = self._file.defaults
         addressing = self._addressing(spec.addressing or defaults.addressing, path)
         request, response = self._directions(name, spec, addressing, path)
+        replies = self._other_replies(name, response, addressing)
+        many = self._many(spec, request, response, replies, path)
         self.commands.append(
             Command(
                 name=name,
@@ -96,8 +99,9 @@ class CommandBuilder:
                 addressing=addressing,
                 response_within=_allowance(spec.response_within or self._file.bus.response_within),
                 repeat=self._repeat(spec.repeat or defaults.repeat, request, path),
-                replies=self._other_replies(name, response, addressing),
+                replies=replies,
                 sizes=self._sizes.get(name, ()),
+                many=many,
                 outcome=self._replies.outcome(name, response),
                 in_flight=spec.in_flight or defaults.in_flight or 1,
                 doc=spec.doc,
@@ -114,6 +118,27 @@ class CommandBuilder:
         known = {message.name for message in self.messages}
         self.messages += [each.message for each in found if each.message.name not in known]
         return found
+
+    def _many(
+        self,
+        spec: CommandSpec,
+        request: Message,
+        response: Message | None,
+        replies: tuple[Reply, ...],
+        path: Path,
+    ) -> Many | None:
+        place = (*path, "many")
+        if spec.many is None:
+            return None
+        if response is None or isinstance(self._frame, PacketFrame):
+            why = "it has no response" if response is None else "answers in packets have no id"
+            what, needs = (
+                f"{path[-1]} cannot have several answers: {why}",
+                (place, (*path, "response"), ("frame",)),
+            )
+            self._report.error("bad-many", place, what, "remove it", of_key=True, needs=needs)
+            return None
+        return ManyBuilder(request, response, replies, self._report).build(spec.many, place)
 
     def _section(self, spec: CommandSpec) -> str:
         return spec.section if spec.section is not None else self._file.defaults.section or ""

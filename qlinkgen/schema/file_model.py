@@ -560,6 +560,27 @@ Response = Annotated[
 ]
 
 
+def _count_form(value: object) -> object:
+    """A number, or ``request.FIELD`` as the name of the field."""
+    if isinstance(value, str) and (match := re.fullmatch(r"\s*request\.(\w+)\s*", value, re.ASCII)):
+        return match[1]
+    if isinstance(value, int) and not isinstance(value, bool) and value > 0:
+        return value
+    raise ValueError(f"{shown(value)} is not a number of answers; write 8 or request.FIELD")
+
+
+class ManySpec(_Mapping):
+    """The end of several answers to one request: exactly one of its keys."""
+
+    count: Annotated[int | str, BeforeValidator(_count_form)] | None = Field(
+        default=None, description="Number of answers: 8, or request.FIELD"
+    )
+    until: str | dict[str, str | StrictInt] | None = Field(
+        default=None, description="{FIELD: value} of the last answer, or the name of a reply after it"
+    )
+    within: Time | None = Field(default=None, description="Time in which answers come")
+
+
 class ReplySpec(Fact):
     """An answer other than the response."""
 
@@ -645,6 +666,7 @@ class CommandSpec(Fact, Lifetime):
     replies: Replies = Field(
         default_factory=dict, description="Answers other than the response; they replace those of the file"
     )
+    many: ManySpec | None = Field(default=None, description="Several answers come, until this end")
     empty_request: Literal["defaults"] | None = Field(
         default=None, description="defaults: an empty payload is a request with every field at its default"
     )

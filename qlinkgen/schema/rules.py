@@ -282,6 +282,11 @@ _ALL = (
         "The master decides by it whether a call fails, repeats the request or waits on.",
     ),
     Rule(
+        "bad-many",
+        "Several answers to a request have one end: a number of them, a field, a reply or a time.",
+        "Without an end a master would wait for a further answer after the last one.",
+    ),
+    Rule(
         "bad-echo",
         "An echo is a field of a response; its request has a field of the same name and type.",
         "It identifies the request that a response belongs to.",

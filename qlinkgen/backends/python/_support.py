@@ -662,6 +662,35 @@ class Marking:
         self.most = most
 
 
+class Many:
+    """The end of several answers to one request; one of its attributes states it.
+
+    Attributes:
+        count: number of answers, or the greatest one if a field of the request says it.
+        counted_by: that field, "" if there is none.
+        until: field of the last answer, and its first and last number; None otherwise.
+        reply: class of the reply that follows the last answer, None if there is none.
+        within: byte times and seconds in which all answers come, None otherwise.
+    """
+
+    __slots__ = ("count", "counted_by", "reply", "until", "within")
+
+    def __init__(
+        self,
+        *,
+        count: int = 0,
+        counted_by: str = "",
+        until: tuple[str, int, int] | None = None,
+        reply: MessageClass | None = None,
+        within: tuple[float, float] | None = None,
+    ) -> None:
+        self.count = count
+        self.counted_by = counted_by
+        self.until = until
+        self.reply = reply
+        self.within = within
+
+
 class OtherReply:
     """An answer other than the response of a command.
 
@@ -723,6 +752,7 @@ class Command:
         repeat_safe: whether the request may be repeated after a missing response.
         repeat_counter: field that distinguishes a repeat from a new request, "" if there is none.
         echoes: fields of the response that repeat the field of the same name in the request.
+        many: end of several answers, None if there is one.
         sizes: fields of the response, and those of the request with their number of items.
         replies: answers other than the response, by class.
         in_flight: maximum number of outstanding requests.
@@ -732,7 +762,8 @@ class Command:
     """
 
     __slots__ = (
-        "addressing", "attributes", "confirmed", "echoes", "id", "in_flight", "name", "repeat_counter",
+        "addressing", "attributes", "confirmed", "echoes", "id", "in_flight", "many", "name",
+        "repeat_counter",
         "repeat_safe", "replies", "request", "response", "response_byte_times", "response_seconds", "section",
         "sizes",
     )  # fmt: skip
@@ -750,6 +781,7 @@ class Command:
         repeat_safe: bool = False,
         repeat_counter: str = "",
         echoes: tuple[str, ...] = (),
+        many: Many | None = None,
         sizes: tuple[tuple[str, str], ...] = (),
         replies: tuple[OtherReply, ...] = (),
         in_flight: int = 1,
@@ -767,6 +799,7 @@ class Command:
         self.repeat_safe = repeat_safe
         self.repeat_counter = repeat_counter
         self.echoes = echoes
+        self.many = many
         self.sizes = sizes
         by_class = {each.message: each for each in replies}
         self.replies: Mapping[MessageClass, OtherReply] = by_class

@@ -102,7 +102,8 @@ class Transaction:
         response = plan.by_name.get(command.response.name)
         kept = [each for each in command.replies if each.message.name in plan.by_name]
         others = tuple(plan.by_name[each.message.name] for each in kept)
-        done = tuple(plan.by_name[each.message.name] for each in kept if "done" in each.meanings)
+        ends = () if command.many else kept  # of several answers: it is not one of them
+        done = tuple(plan.by_name[each.message.name] for each in ends if "done" in each.meanings)
         return cls(command, request, response, others, done) if response else None
 
     @property
@@ -125,6 +126,7 @@ class BusView:
     handlers: Sequence[Method]
     nodes: str
     others: bool
+    many: bool
 
 
 class BusModule:
@@ -165,6 +167,7 @@ class BusModule:
             handlers=handlers,
             nodes=f", {self._nodes()}" if self._nodes() else "",
             others=any(each.done for each in self._transactions),
+            many=any(each.command.many for each in self._transactions),
         )
         template = templates().get_template("templates/bus.j2")
         return fitted(template.render(vars(view)).rstrip("\n") + "\n")
@@ -198,6 +201,8 @@ class BusModule:
         if transaction.response is None:
             return "None"
         names = [self._class(each) for each in (transaction.response, *more)]
+        if transaction.command.many is not None:
+            names[0] = f"list[{' | '.join(names)}]"
         return " | ".join(names if surely else [*names, "None"])
 
     def _asked(self, transaction: Transaction) -> str:
@@ -249,7 +254,8 @@ class BusModule:
         )
         if call.response is None:
             return [*request, f"{wait}self.tell(_request)"]
-        ask = f"return {wait}self.ask(_request, {self._asked(call)})"
+        several = "_many" if call.command.many is not None else ""
+        ask = f"return {wait}self.ask{several}(_request, {self._asked(call)})"
         if call.command.addressing != "either" or node:
             return [*request, ask]
         return [
@@ -336,6 +342,8 @@ class BusModule:
             doc += ["", f"The response repeats {' and '.join(command.echoes)} of the request."]
         if command.response and command.addressing == "either":
             doc += ["", "Return None for a broadcast, which is not answered."]
+        if command.many is not None:
+            doc += ["", "Return a list: several answers are sent."]
         if call.others:
             names = " or ".join(self._class(each) for each in call.others)
             doc += ["", *textwrap.wrap(f"Return {names} to answer in another way.", WIDTH - 8)]

@@ -6,12 +6,13 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import assert_never
 
 from qlinkgen.backends import python_text
 from qlinkgen.backends.python.layout import WIDTH, in_hex, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.texts import one_line
-from qlinkgen.model.transaction import Allowance, Bus, Command, Reply
+from qlinkgen.model.transaction import Allowance, Bus, ByCount, ByField, ByReply, ByTime, Command, Many, Reply
 from qlinkgen.model.types import Enum, Flags, NamedValue
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -92,12 +93,7 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     if within.seconds:
         arguments.append(f"response_seconds={_number(within.seconds)}")
     arguments += _repetition(command)
-    sizes = [f'("{attribute(name)}", "{attribute(asked)}")' for name, asked in command.sizes]
-    if sizes:
-        arguments.append(f"sizes={_tuple(sizes)}")
-    replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
-    if replies:
-        arguments.append(f"replies={_tuple(replies)}")
+    arguments += _answers(command, kept)
     if command.in_flight != 1:
         arguments.append(f"in_flight={command.in_flight}")
     if command.section:
@@ -110,6 +106,36 @@ def _row(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
         )
         arguments.append(f"attributes={{{', '.join(pairs)}}}")
     return wrapped(f'"{command.name}": Command(', arguments, "),", 4)
+
+
+def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
+    """Arguments on the number and size of answers, and on other ones."""
+    arguments = []
+    if command.many is not None:
+        arguments.append(f"many=Many({_end(command.many, kept)})")
+    sizes = [f'("{attribute(name)}", "{attribute(asked)}")' for name, asked in command.sizes]
+    if sizes:
+        arguments.append(f"sizes={_tuple(sizes)}")
+    replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
+    if replies:
+        arguments.append(f"replies={_tuple(replies)}")
+    return arguments
+
+
+def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:
+    """The argument that states the end of several answers."""
+    match many:
+        case ByCount():
+            counted = f', counted_by="{attribute(many.field)}"' if many.field else ""
+            return f"count={many.most}{counted}"
+        case ByField():
+            return f'until=("{attribute(many.field)}", {many.first}, {many.last})'
+        case ByReply():
+            return f"reply={class_name(kept[many.reply.name])}"
+        case ByTime():
+            return f"within={_time(many.within)}"
+        case _:
+            assert_never(many)
 
 
 def _reply(reply: Reply, planned: MessagePlan) -> str:

@@ -216,8 +216,7 @@ class _Maker:
             if sent and rng.random() < 0.3:
                 spec["response"] = rng.choice(sent)
                 continue
-            if shape.has_length and not shape.least and shape.most > 8 and rng.random() < 0.8:
-                self._size_from_request(spec)
+            self._more_of(shape, spec)
             asked = [shape.number(spec["id"])]
             number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None and rng.random() < 0.4:
@@ -237,6 +236,14 @@ class _Maker:
             number = self._answer_id(shape, asked, used, relative=rng.random() < 0.5)
             if number is not None:
                 spec["replies"] = {self.words.name(taken): self._reply(shape, maker, number)}
+
+    def _more_of(self, shape: Shape, command: Doc) -> None:
+        """Several answers, or one of a size that the request says."""
+        rng = self.rng
+        if rng.random() < 0.2:
+            command["many"] = rng.choice(({"count": rng.randint(1, 9)}, {"within": "20 ms"}))
+        if shape.has_length and not shape.least and shape.most > 8 and rng.random() < 0.8:
+            self._size_from_request(command)
 
     def _size_from_request(self, command: Doc) -> None:
         """Let a field of the request say how many items the response has."""

@@ -1,0 +1,98 @@
+"""Second pass, several answers to one request: where they end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from qlinkgen.model.message import Message
+from qlinkgen.model.transaction import Allowance, ByCount, ByField, ByReply, ByTime, Many, Reply
+from qlinkgen.model.types import Enum, Scalar
+from qlinkgen.schema.file_model import ManySpec
+from qlinkgen.schema.notation import shown, whole_range
+from qlinkgen.schema.report import Reporter, did_you_mean, listed
+from qlinkgen.schema.source import Path
+
+_RULE = "bad-many"
+
+
+class ManyBuilder:
+    """Builds the end of the answers of one command."""
+
+    def __init__(
+        self, request: Message, response: Message, replies: Iterable[Reply], report: Reporter
+    ) -> None:
+        """The end may refer to each of these messages."""
+        self._request = request
+        self._response = response
+        self._replies = {reply.name: reply.message for reply in replies}
+        self._report = report
+
+    def build(self, spec: ManySpec, path: Path) -> Many | None:
+        """The end that a command states, None if it is wrong."""
+        given = [key for key in ("count", "until", "within") if getattr(spec, key) is not None]
+        if len(given) != 1:
+            what = f"the answers have {len(given)} ends" if given else "the answers have no end"
+            self._error(path, what, "write one of count, until and within")
+            return None
+        if spec.within is not None:
+            return ByTime(Allowance(spec.within.byte_times, spec.within.seconds))
+        if spec.count is not None:
+            return self._count(spec.count, (*path, "count"))
+        if isinstance(spec.until, str):
+            return self._reply(spec.until, (*path, "until"))
+        return self._field(spec.until or {}, (*path, "until"))
+
+    def _error(self, path: Path, what: str, hint: str) -> None:
+        self._report.error(_RULE, path, what, hint)
+
+    def _count(self, count: int | str, path: Path) -> Many | None:
+        if isinstance(count, int):
+            return ByCount(count)
+        kind = self._number(count, self._request, "request", path)
+        if kind is not None and kind.minimum < 1:
+            what = f"{count} of the request may be {kind.minimum}"
+            self._error(path, what, "give it a range of numbers of answers, like 1..8")
+            return None
+        return ByCount(kind.maximum, count) if kind else None
+
+    def _reply(self, name: str, path: Path) -> Many | None:
+        if name in self._replies:
+            return ByReply(self._replies[name])
+        hint = did_you_mean(name, self._replies, "write {FIELD: value}, or the name of one of the replies")
+        self._error(path, f"the command has no reply {shown(name)}", hint)
+        return None
+
+    def _field(self, until: Mapping[str, str | int], path: Path) -> Many | None:
+        if len(until) != 1:
+            self._error(path, "not exactly one field tells the last answer", "write until: {FIELD: value}")
+            return None
+        [(name, value)] = until.items()
+        kind = self._number(name, self._response, "response", path)
+        if kind is None:
+            return None
+        members = kind.meaning.members if isinstance(kind.meaning, Enum) else ()
+        named = {member.name: member.value for member in members}
+        if value in named:
+            return ByField(name, named[str(value)], named[str(value)])
+        try:
+            return ByField(name, *whole_range(value))
+        except ValueError:
+            hint = did_you_mean(str(value), named, "write a number, a range or a name")
+            self._error((*path, name), f"{shown(value)} is not a value of {name}", hint)
+            return None
+
+    def _number(self, name: str, message: Message, where: str, path: Path) -> Scalar | None:
+        known = {value.name: value.type for value in message.values}
+        kind = known.get(name)
+        if (
+            isinstance(kind, Scalar)
+            and kind.scaling is None
+            and (kind.meaning is None or isinstance(kind.meaning, Enum))
+        ):
+            return kind
+        if kind is None:
+            hint = did_you_mean(name, known, f"its fields are {listed(known)}")
+            self._error(path, f"the {where} has no field {shown(name)}", hint)
+        else:
+            self._error(path, f"{name} of the {where} is not a plain number", "use a whole number or an enum")
+        return None
