@@ -127,9 +127,13 @@ def _fletcher_step(algorithm: Fletcher) -> list[str]:
     return [
         f"{kind} low = ({kind})((sum & {mask}) + byte);",
         f"{kind} high = ({kind})(sum >> {half});",
-        f"low = ({kind})((low >= {modulus}) ? (low - {modulus}) : low);",
+        f"if (low >= {modulus}) {{",
+        f"    low = ({kind})(low - {modulus});",
+        "}",
         f"high = ({kind})(high + low);",
-        f"high = ({kind})((high >= {modulus}) ? (high - {modulus}) : high);",
+        f"if (high >= {modulus}) {{",
+        f"    high = ({kind})(high - {modulus});",
+        "}",
         f"return ({kind})(({kind})(high << {half}) | low);",
     ]
 
