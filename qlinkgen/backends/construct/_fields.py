@@ -462,9 +462,7 @@ class Message(Construct):
             )
         return self.runs[of].checked(number, path)
 
-    def _cells(
-        self, data: bytes, path: str
-    ) -> list[tuple[Renamed, bytes, int | None]]:
+    def _cells(self, data: bytes, path: str) -> list[tuple[Renamed, bytes, int | None]]:
         """The fields with their bytes and numbers of items. Raises RangeError for wrong sizes."""
         if not self.least <= len(data) <= self.most:
             raise RangeError(

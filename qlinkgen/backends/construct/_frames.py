@@ -464,7 +464,9 @@ class Frame(Construct):
             case Constant():
                 return part.data
             case Length():
-                return bytes(part.integer.build((len(payload) + part.bias) // part.scale))
+                return bytes(
+                    part.integer.build((len(payload) + part.bias) // part.scale)
+                )
             case Id():
                 return bytes(part.integer.build(number))
             case Address():
@@ -521,9 +523,7 @@ class Frame(Construct):
             rejected = check.rejected
             refused = rejected is not None and sent == check.packed(rejected)
             kind = "illegal" if refused else "crc"
-            raise FrameError(
-                kind, f"received {sent.hex()}, expected {expected.hex()}"
-            )
+            raise FrameError(kind, f"received {sent.hex()}, expected {expected.hex()}")
 
     def _identify(self, cells: Mapping[str, bytes], found: dict[type, int]) -> None:
         """Set message id and address if all of their parts are known."""
@@ -600,7 +600,6 @@ class Frame(Construct):
                 except ConstructError as error:
                     raise FrameError("range", f"{part.name}; {error}") from None
         return Container(message=message.name, **place, fields=fields)
-
 
     def _compare_blocks(self, cells: Mapping[str, bytes], payload: bytes) -> None:
         for blocks in self.parts:
@@ -747,7 +746,9 @@ class DelimitedFrame(Frame):
     def _sent(self, source: _Wire, part: Payload, numbers: dict[type, int]) -> bytes:
         numbers[Payload] = 0
         if Length in numbers:
-            blocks = next((each for each in self.parts if isinstance(each, Blocks)), None)
+            blocks = next(
+                (each for each in self.parts if isinstance(each, Blocks)), None
+            )
             return source.take(part, 0 if blocks else numbers[Length])
         try:
             return self._known(numbers[Id]).measured(
