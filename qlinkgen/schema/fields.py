@@ -8,6 +8,7 @@ from dataclasses import replace
 from qlinkgen.model.fields import Field, FieldType, Records
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
+from qlinkgen.schema.counted import with_counts
 from qlinkgen.schema.file_model import Fields, FieldSpec, RecordSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown, type_text
@@ -34,6 +35,7 @@ class FieldBuilder:
 
     def build(self, specs: Fields, path: Path) -> tuple[Field, ...]:
         """The fields of one message, without those that cannot be built."""
+        specs = with_counts(specs, path, self._report)
         fields = []
         for name, spec in specs.items():
             kind = self._kind(spec, (*path, name))

@@ -171,7 +171,23 @@ class FieldMaker:
             self._fill_words(made, taken)
         if not fixed and not room.least and self.rng.random() < self.conditional:
             self._add_conditions(made, set(begun or {}))
+        self._name_sizes(made)
         return dict(made)
+
+    def _name_sizes(self, made: list[tuple[str, Any]]) -> None:
+        """Name the count in the brackets of some fields that have one, of items."""
+        specs = dict(made)
+        for name, spec in made:
+            counts = [
+                each for each in specs if isinstance(specs[each], dict) and specs[each].get("counts") == name
+            ]
+            if len(counts) != 1 or specs[counts[0]].get("counts_in") == "bytes" or self.rng.random() < 0.6:
+                continue
+            base, _, bounds = spec["type"].partition("[")
+            count = {key: each for key, each in specs[counts[0]].items() if not key.startswith("counts")}
+            specs[counts[0]] = {**count, "range": bounds.rstrip("]")}
+            specs[name] = {**spec, "type": f"{base}[{counts[0]}]"}
+        made[:] = list(specs.items())
 
     def _add_conditions(self, made: list[tuple[str, Any]], kept: set[str]) -> None:
         """Conditions on some fields, and optional fields at the end; `kept` fields stay as they are."""

@@ -336,6 +336,22 @@ def byte_pieces(size: int, order: str) -> tuple[tuple[int, int], ...]:
     return pieces if order == "little" else pieces[::-1]
 
 
+def _counting(fields: Mapping[str, Any]) -> Doc:
+    """The fields, with sizes that name an earlier field as counts of it."""
+    found = dict(fields)
+    for name, spec in fields.items():
+        written = spec if isinstance(spec, dict) else {"type": spec}
+        base, _, size = str(written["type"]).partition("[")
+        count = found.get(size.rstrip("]"))
+        if count is not None:
+            counter = dict(count) if isinstance(count, dict) else {"type": count}
+            bounds = str(counter.pop("range", ""))
+            bare = base in ("bytes", "text") and not bounds
+            found[size.rstrip("]")] = {**counter, "counts": name}
+            found[name] = {**written, "type": base if bare else f"{base}[{bounds}]"}
+    return found
+
+
 class Fields:
     """Builds fields from their mappings."""
 
@@ -354,7 +370,7 @@ class Fields:
 
     def _slots(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
         slots: list[Slot] = []
-        for name, spec in fields.items():
+        for name, spec in _counting(fields).items():
             resolved = self._resolved(spec)
             slots.append(self._conditional(self._slot(name, resolved), resolved, slots))
         return tuple(slots)
