@@ -1,0 +1,111 @@
+"""Frames of many framings recovered from corrupted streams, by generated stream decoders.
+
+`python -m tests.proof.framings` prints the table of docs/recovery.md.
+"""
+
+from __future__ import annotations
+
+import functools
+import random
+from collections.abc import Iterable, Mapping, Sequence
+
+from qlinkgen.backends import python
+from qlinkgen.schema import loads
+from tests.proof.corruption import EVERY_KIND
+from tests.proof.recovery import Result, Subject
+
+FRAMES = 600
+
+_SCHEMA = """
+qlinkgen: 1
+protocol: {{name: sample, revision: "1", source: Made up}}
+frame:
+  parts:
+{parts}
+{coding}
+bus: {{kind: host}}
+commands: {{}}
+messages:
+  told: {{id: 3, direction: request, fields: {{number: u16, data: bytes}}}}
+"""
+_CODE, _DATA = "code: {role: message, type: u8}", "data: {role: payload, size: 2..40}"
+_SIZE = "size: {type: u8, counts: [code, data]}"
+_CRC = "crc: {type: u16, algorithm: crc-16/ibm-sdlc, over: [code, data]}"
+_LRC = "lrc: {type: u8, algorithm: sum8-zero, over: [code, data]}"
+#: Parts and coding.
+_FRAMINGS: Mapping[str, tuple[Sequence[str], str]] = {
+    "preamble, length, CRC": (("start: A5", _SIZE, _CODE, _DATA, _CRC), ""),
+    "flags as of HDLC, CRC": (
+        ("open: 7E", _CODE, _DATA, _CRC, "close: {role: terminator, value: 7E, shared: true}"),
+        "coding: {escape: 7D, xor: 20, of: [7E, 7D]}",
+    ),
+    "SLIP, CRC": (
+        ("open: C0", _CODE, _DATA, _CRC, "close: {role: terminator, value: C0}"),
+        "coding: {replace: {C0: DB DC, DB: DB DD}}",
+    ),
+    "COBS, CRC": ((_CODE, _DATA, _CRC, "end: {role: terminator, value: 00}"), "coding: {cobs: 00}"),
+    "DLE STX, DLE ETX, CRC": (
+        ("open: 10 02", _CODE, _DATA, _CRC, "close: {role: terminator, value: 10 03}"),
+        "coding: {insert: 10, after: 10}",
+    ),
+    "digits as of Modbus ASCII, LRC": (
+        ('start: {text: ":"}', _CODE, _DATA, _LRC, "end: {role: terminator, value: 0D 0A}"),
+        "coding: {digits: hex}",
+    ),
+    "SLIP without a check value": (
+        ("open: C0", _CODE, _DATA, "close: {role: terminator, value: C0}"),
+        "coding: {replace: {C0: DB DC, DB: DB DD}}",
+    ),
+    "COBS without a check value": (
+        (_CODE, _DATA, "end: {role: terminator, value: 00}"),
+        "coding: {cobs: 00}",
+    ),
+}
+#: Those whose receivers deliver every intact frame.
+CHECKED = [name for name in _FRAMINGS if "without" not in name]
+
+
+@functools.cache
+def subject(name: str) -> Subject:
+    """Distinct frames of a framing, and the decoder generated for it."""
+    parts, coding = _FRAMINGS[name]
+    indented = "\n".join(f"    {part}" for part in parts)
+    protocol, faults = loads(_SCHEMA.format(parts=indented, coding=f"  {coding}"), "sample.yaml")
+    assert protocol is not None, faults
+    module, chance = python.load(protocol), random.Random(name)
+    told = module.MESSAGES["told"]
+    frames = [
+        told(number=number, data=chance.randbytes(chance.randint(0, 20))).to_frame()
+        for number in range(FRAMES)
+    ]
+
+    def decoded(chunks: Iterable[bytes]) -> Sequence[bytes]:
+        decoder = module.StreamDecoder("request")
+        events = [event for chunk in chunks for event in decoder.feed(chunk)] + decoder.finish()
+        return [event.to_frame() for event in events if not isinstance(event, module.Fault)]
+
+    return Subject(frames, lambda each: frames[0][: each.randint(1, 4)], decoded)
+
+
+def total(name: str) -> Result:
+    """The sum of the results for every kind of corruption."""
+    results = [subject(name).result(kind) for kind in EVERY_KIND]
+    return Result(
+        *(sum(getattr(each, key) for each in results) for key in ("intact", "recovered", "strange"))
+    )
+
+
+def row(name: str) -> str:
+    """A row of the table."""
+    found = total(name)
+    share = 100 * found.recovered / found.intact
+    return f"| {name} | {found.recovered}/{found.intact} = {share:.4g} % | {found.strange} |"
+
+
+def table() -> str:
+    """Recovered and intact frames of every framing, as Markdown."""
+    return "\n".join(["| framing | delivered | not sent |", "|---|---|---|", *map(row, _FRAMINGS)])
+
+
+if __name__ == "__main__":
+    print(table())
