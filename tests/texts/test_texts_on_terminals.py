@@ -64,7 +64,7 @@ def evil(name: str) -> Protocol:
 def test_show_and_explain(name: str, said: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     protocol = evil(name)
     for module in ("show", "explain", "encode"):
-        monkeypatch.setattr(f"qlinkgen.cli.{module}.load_protocol", lambda *_: protocol)
+        monkeypatch.setattr(f"qlinkgen.cli.{module}.load_protocol", lambda *_, **__: protocol)
     texts = [said("show", name), *(said("show", name, message.name) for message in protocol.messages)]
     texts.append(said("explain", name, FRAMES[name]))
     assert sum("MARK" in text for text in texts) > 1
@@ -73,7 +73,7 @@ def test_show_and_explain(name: str, said: Run, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_unit_in_the_error_of_an_encoder(said: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("qlinkgen.cli.encode.load_protocol", lambda *_: evil("delimited"))
+    monkeypatch.setattr("qlinkgen.cli.encode.load_protocol", lambda *_, **__: evil("delimited"))
     text = said("encode", "delimited", "measure", "--node", "1", "speed=1001")
     assert "0..1000 MARK" in text
     assert not CONTROL.search(text)
@@ -118,7 +118,7 @@ def test_colours_do_not_change_a_text(text: str, said: Run, monkeypatch: pytest.
     monkeypatch.delenv("NO_COLOR")
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "2000")
-    monkeypatch.setattr("qlinkgen.cli.show.load_protocol", lambda *_: protocol_of("delimited", text))
+    monkeypatch.setattr("qlinkgen.cli.show.load_protocol", lambda *_, **__: protocol_of("delimited", text))
     shown = re.sub(r"\x1b\[[0-9;]*m", "", said("show", "delimited"))
     words = re.sub(r"\s", "", text)
     assert re.sub(r"\s", "", shown).count(words) >= 10
