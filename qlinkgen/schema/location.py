@@ -10,9 +10,6 @@ from pydantic import BaseModel
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 
-#: Attributes of keys that are words of Python.
-_ATTRIBUTES = {"as": "as_", "if": "when"}
-
 
 @dataclass(frozen=True, slots=True)
 class Location:
@@ -37,8 +34,9 @@ class Location:
 
     def reject(self, spec: BaseModel, keys: Iterable[str], what: str, hint: str = "remove it") -> None:
         """Report the given keys that do not apply to ``what``."""
+        attributes = {field.alias or name: name for name, field in type(spec).model_fields.items()}
         for key in keys:
-            if getattr(spec, _ATTRIBUTES.get(key, key)) not in (None, False, ""):
+            if getattr(spec, attributes[key]) not in (None, False, ""):
                 self.key_fault("not-applicable", key, f"'{key}' has no effect on {what}", hint)
 
     def inner(self, *keys: str, written: Iterable[str] = ()) -> Location:

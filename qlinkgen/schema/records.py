@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from qlinkgen.model.fields import Field, Layout, Record, Records
 from qlinkgen.schema.compounds import build_length
-from qlinkgen.schema.file_model import Fact, Fields, FieldSpec, RecordSpec, SchemaFile
+from qlinkgen.schema.file_model import Fact, Fields, FieldSpec, Lifetime, RecordSpec, SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
 from qlinkgen.schema.report import Reporter
@@ -15,7 +15,7 @@ from qlinkgen.schema.source import Path
 #: Maximum number of records inside each other.
 _MAX_DEPTH = 2
 #: Keys of a field that apply to a record.
-_KEYS = frozenset({"type", "echo", "when", "optional", *Fact.model_fields})
+_KEYS = frozenset({"type", "echo", "if", "optional", *Fact.model_fields, *Lifetime.model_fields})
 
 
 class RecordBuilder:

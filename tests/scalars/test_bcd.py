@@ -117,3 +117,10 @@ def test_wrong_keys(field: str, text: str) -> None:
 def test_a_count_is_binary() -> None:
     (fault,) = faults_of("{n: {type: u8, as: bcd, counts: a}, a: bytes}")
     assert (fault.rule, fault.message) == ("not-applicable", "'as' has no effect on a count")
+
+
+def test_keys_with_another_name_in_python() -> None:
+    """In a field that holds a record, which may be absent but not in decimal digits."""
+    types = "types: {pair: {fields: {x: u8}}}"
+    faults = faults_of("{k: u8, a: {type: pair, as: bcd, if: {k: 1}}}", types=types)
+    assert [fault.message for fault in faults] == ["'as' has no effect on a record"]

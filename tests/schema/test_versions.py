@@ -133,3 +133,11 @@ def test_lint_checks_every_version(tmp_path: Path) -> None:
     assert {fault.rule for fault in faults if fault.severity == "error"} == {"bad-count"}
     assert faults[-1].message.endswith("in version 0 of the protocol")
     assert [fault.severity for fault in lint(file, version="2")] == ["warning"]
+
+
+def test_records_come_and_go() -> None:
+    text = SCHEMA.format(more="").replace("pair: pair", "pair: {type: pair, since: 2}")
+    for chosen, there in (("1", False), ("2", True)):
+        protocol, faults = loads(text, "probe.yaml", version=chosen)
+        assert protocol, faults
+        assert ("pair" in [field.name for field in protocol.message("put").fields]) is there

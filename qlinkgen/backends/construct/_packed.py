@@ -77,7 +77,8 @@ class PackedField(ArrayField):
     def _parse(self, stream: BinaryIO, context: Container, path: str) -> Row:
         data = stream_read_entire(stream, path)
         whole = int.from_bytes(data, "big" if self.most else "little")
-        number = self.maximum if context.number is None else context.number
+        known = context.get("number")
+        number = self.maximum if known is None else known
         return [
             self.item._parsereport(
                 stream, Container(bits=whole >> self._shift(index, len(data))), path
