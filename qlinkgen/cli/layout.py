@@ -54,6 +54,10 @@ def show_message(plan: Plan, planned: MessagePlan) -> None:
         payloads.append(record.payload)
     for meaning in dict.fromkeys(each for payload in payloads for each in _meanings(payload)):
         show_enum(meaning) if isinstance(meaning, Enum) else show_flags(meaning)
+    examples = [each.wire for each in plan.protocol.examples if each.message == message.name]
+    if examples:
+        heading("Frames of the document")
+        paragraph(wire.hex(" ").upper() for wire in examples)
 
 
 def _bits(payload: PayloadPlan, docs: Mapping[str, str]) -> None:

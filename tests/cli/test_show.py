@@ -174,3 +174,9 @@ def test_the_command_line_does_not_ask_for_the_kind_of_a_field() -> None:
             node.id for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Name)
         }
         assert not names & kinds, path
+
+
+def test_frames_of_the_document(qlinkgen: Run) -> None:
+    out = qlinkgen("show", "modbus_rtu", "read_holding_registers.request").out
+    assert "Frames of the document\n11 03 00 6B 00 03 76 87\n" in out
+    assert "Frames of the document" not in qlinkgen("show", "qlink", "motion").out
