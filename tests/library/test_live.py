@@ -13,6 +13,9 @@ from qlinkgen.transport import PtyPort, open_pty
 from qlinkgen.transport.serving import serve
 from tests.library.protocols import described, peer
 
+#: Seconds, on a busy machine.
+PATIENCE = 10
+
 Handle = Callable[[Any], Any]
 
 
@@ -65,6 +68,7 @@ def test_dynamixel_sdk_reads_and_writes_a_servo() -> None:
     with serving("dynamixel_2", 3, servo) as pty:
         port, packets = PortHandler(pty.path), Protocol2PacketHandler()
         assert port.openPort()
+        port.setPacketTimeout = lambda length: port.setPacketTimeoutMillis(1000 * PATIENCE)
         try:
             assert packets.ping(port, 3) == (0x0406, COMM_SUCCESS, 0)
             assert packets.read4ByteTxRx(port, 3, 132) == (0x87868584, COMM_SUCCESS, 0)
@@ -94,6 +98,7 @@ def test_pyptzcontroller_asks_for_the_position() -> None:
     with serving("pelco_d", 5, camera) as pty, contextlib.redirect_stdout(io.StringIO()):
         controller = PtzControl(pty.path, 5, 9600)
         assert controller.connect()
+        controller.serial_port.timeout = PATIENCE
         try:
             controller.move("left", 20)
             controller.go_to_preset(7)
@@ -122,6 +127,7 @@ def test_yamspy_reads_a_flight_controller() -> None:
     with serving("msp", 0, board) as pty:
         master = MSPy(pty.path, loglevel="CRITICAL", logfilename=None)
         master.INAV = False
+        master.conn.timeout = PATIENCE
         master.conn.open()
         try:
             assert master.send_RAW_msg(MSPy.MSPCodes["MSP_ATTITUDE"]) > 0

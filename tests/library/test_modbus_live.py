@@ -86,7 +86,7 @@ def test_an_exception_ends_a_call_at_once_with_its_code(master: BlockingMaster) 
     begun = time.monotonic()
     with pytest.raises(Refused) as caught:
         master.transact(codec.ReadHoldingRegistersRequest(node=NODE, start=99, quantity=2))
-    assert time.monotonic() - begun < 0.5, "the response may take a second, and an attempt more"
+    assert time.monotonic() - begun < 0.9, "the response may take a second, and an attempt more"
     reply: Any = caught.value.reply
     assert reply.code == codec.ExceptionCode.ILLEGAL_DATA_ADDRESS
     assert master.engine.total.requests == 1
@@ -134,7 +134,7 @@ def slave(pty: PtyPort) -> Iterator[Registers]:
 def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers) -> None:
     from pymodbus.client import ModbusSerialClient
 
-    client = ModbusSerialClient(pty.path, baudrate=115200, timeout=2, retries=0)
+    client = ModbusSerialClient(pty.path, baudrate=115200, timeout=10, retries=0)
     assert client.connect()
     try:
         found = client.read_holding_registers(10, count=90, device_id=NODE)
