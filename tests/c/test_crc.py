@@ -8,7 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from qlinkgen.model.checksum import Algorithm, catalogue, find
+from qlinkgen.backends import c
+from qlinkgen.backends.base import Options
+from qlinkgen.backends.c.names import storage
+from qlinkgen.model.checksum import SUMS, Algorithm, catalogue, find, stated
+from qlinkgen.schema import loads
 from tests.c.test_compile import header, run
 
 PROGRAM = """
@@ -79,3 +83,48 @@ def test_an_algorithm_of_ones_own(tmp_path: Path, require_tool: Callable[..., st
     done = compiled(tmp_path, compiler, "(0x8005u, 0xFFFFu, 1, 0x0000u)", "NIBBLE")
     assert done.returncode == 0, done.stderr
     assert run(tmp_path / "check") == "4b37"
+
+
+SUM = """\
+qlinkgen: 1
+protocol: {name: tank, title: Tank, revision: "1", source: Example, doc: A tank}
+frame:
+  parts:
+    start: AA
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    data: {role: payload, size: 0..8}
+    check: {type: u@width@, algorithm: @algorithm@, over: [data]}
+bus: {kind: master_slave}
+messages:
+  log: {id: 1, fields: {note: "bytes[0..8]"}}
+"""
+OTHERS = {
+    **{each.name: each for each in SUMS},
+    "{width: 16, poly: 0x8005, init: 0x1234, refin: true, refout: false, xorout: 0x55AA}": stated(
+        16, 0x8005, 0x1234, refin=True, refout=False, xorout=0x55AA
+    ),
+    "{width: 24, poly: 0x5D6DCB, refout: true}": stated(24, 0x5D6DCB, 0, refin=False, refout=True, xorout=0),
+    "{width: 8, poly: 0x2F, init: 0x11}": stated(8, 0x2F, 0x11, refin=False, refout=False, xorout=0),
+}
+
+
+@pytest.mark.parametrize("text", OTHERS)
+def test_sums_and_crcs_by_their_parameters(
+    text: str, tmp_path: Path, require_tool: Callable[..., str]
+) -> None:
+    compiler = require_tool("gcc", package="gcc")
+    algorithm = OTHERS[text]
+    schema = SUM.replace("@width@", str(algorithm.width)).replace("@algorithm@", text)
+    protocol, faults = loads(schema, "tank.yaml")
+    assert protocol, faults
+    (tmp_path / "tank.h").write_text(c.generate(protocol, Options())["c/tank.h"])
+    program = PROGRAM.replace("qlink", "tank").replace(
+        "uint16_t", f"uint{max(8, storage(algorithm.width))}_t"
+    )
+    program = program.replace('"%04x", (unsigned)', '"%08lx", (unsigned long)')
+    (tmp_path / "check.c").write_text(program)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
+    command = [compiler, *flags, str(tmp_path / "check.c"), "-o", str(tmp_path / "check")]
+    subprocess.run(command, check=True, timeout=120)
+    assert run(tmp_path / "check") == f"{algorithm.check:08x}"

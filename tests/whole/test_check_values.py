@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from qlinkgen.backends import python
-from qlinkgen.model.checksum import find
+from qlinkgen.model.checksum import Algorithm, find
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
@@ -89,6 +89,13 @@ SHAPES = {
     crc: {type: u16, algorithm: crc-16/mcrf4xx, over: [length, code, data, attribute.extra, attribute.salt]}
 """,
     "one after each block of the payload, and one over the header": _DNP3,
+    "one over the header alone, which can be replaced": """\
+    start: AA
+    length: {type: u8, counts: [data]}
+    code: {role: message, type: u8}
+    head: {type: u16, algorithm: crc-16/modbus, over: [length, code]}
+    data: {role: payload, size: 0..40}
+""",
     "two of one algorithm in a stuffed frame": """\
     start: A5 A5
     length: {type: u8, counts: [data]}
@@ -192,3 +199,24 @@ def test_another_algorithm_replaces_the_one_over_the_payload() -> None:
     assert protocol, faults
     names = [part.check.algorithm.name for part in plan_of(protocol).frame.envelope.checks]
     assert names == ["xor8", "crc-16/modbus"]
+
+
+@pytest.mark.parametrize("parts", SHAPES.values(), ids=SHAPES)
+def test_another_algorithm_at_run_time(parts: str) -> None:
+    """Codec(crc) of a module codes like the module of a schema with that algorithm."""
+    codec = python.load(plan(parts).protocol)
+    main = plan(parts).frame.check
+    assert main is not None
+    if not isinstance(main.algorithm, Algorithm) or main.algorithm.width != 16:
+        assert not hasattr(codec, "Codec")
+        return
+    other, faults = loads(_HEAD + parts, "tank.yaml", crc="crc-16/genibus")
+    assert other, faults
+    there, here = python.load(other), codec.Codec("crc-16/genibus")
+    messages = [codec.Log(note=bytes(range(size))) for size in (0, 1, 16, 17, 40)]
+    frames = [there.Log(note=message.note).to_frame() for message in messages]
+    assert [here.encode(message) for message in messages] == frames
+    assert [here.decode_request(frame) for frame in frames] == messages
+    assert here.StreamDecoder("request").feed(b"\xaa" + b"".join(frames))[-len(frames) :] == messages
+    with pytest.raises(codec.DecodeError, match="check"):
+        codec.decode_request(frames[-1])
