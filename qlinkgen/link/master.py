@@ -44,6 +44,7 @@ from qlinkgen.link.events import (
 from qlinkgen.link.health import HealthBook, HealthPolicy
 from qlinkgen.link.many import Answers
 from qlinkgen.link.master_states import MASTER_MOVES, MasterEvent, MasterState
+from qlinkgen.link.numbering import numbering_of
 from qlinkgen.link.pending import Pending
 from qlinkgen.link.quiet import QuietLine
 from qlinkgen.link.state import Moves
@@ -98,6 +99,7 @@ class MasterEngine:
         }
         self._decoder = codec.StreamDecoder("response")
         self._address = address_getter(codec)
+        self._numbering = numbering_of(codec)
         self._byte_time = timing.byte_time
         self._paced = timing.paced
         self._echo = EchoCanceller(echo)
@@ -158,6 +160,8 @@ class MasterEngine:
         if type(request) is Packet or (command := self._commands.get(type(request))) is None:
             raise TypeError(f"{type(request).__name__} is not a request of this protocol")
         tries = command.tries if attempts is None else self._tries_of(command, attempts)
+        if self._numbering is not None:
+            self._numbering.number(request)
         frame = self.codec.encode(request)
         if self._attempts.number:
             self._earlier = self._pending
@@ -271,6 +275,9 @@ class MasterEngine:
         for event in self._decoder.finish():  # bytes inside a damaged frame may be a message
             self._take_in(event, now)
         pending, attempts = self._pending, self._attempts
+        if attempts.number and self._numbering is not None and self._numbering.per_frame:
+            self._numbering.number(pending.request)
+            pending.frame = self.codec.encode(pending.request)
         frame, count, command = pending.frame, pending.count, pending.command
         attempts.number = number = attempts.number + 1
         attempts.sent_at = now

@@ -7,6 +7,7 @@ from typing import Any, Literal, Protocol
 
 from qlinkgen.link.codec import Codec, Framed, Message, address_of, is_message, wrong_size
 from qlinkgen.link.echo import EchoCanceller
+from qlinkgen.link.numbering import numbering_of
 
 
 class Node(Protocol):
@@ -103,6 +104,7 @@ class SlaveEngine:
         self.node = node
         self.counters = SlaveCounters()
         self._encode = codec.encode
+        self._numbering = numbering_of(codec)
         self._broadcast = codec.BUS.broadcast
         self._answering = {
             command.request: command.addressing == "answered_broadcast" for command in codec.COMMANDS.values()
@@ -161,8 +163,13 @@ class SlaveEngine:
         several: Sequence[Message] = response if isinstance(response, list | tuple) else (response,)
         for each in several:
             self._check(request, each)
-        self._further = [self._encode(each) for each in several]
+        self._further = [self._encoded(request, each) for each in several]
         self._answer = self._further.pop(0) if several else b""
+
+    def _encoded(self, request: Framed, response: Message) -> bytes:
+        if self._numbering is not None:
+            self._numbering.answer(request, response)
+        return self._encode(response)
 
     def _check(self, request: Framed, response: Message) -> None:
         """Refuse a response of another size than the request asks for, which a master would not accept."""

@@ -60,6 +60,14 @@ class Checksum:
         return pack_chunks(value, self.chunks)
 
 
+@dataclass(frozen=True, slots=True)
+class Counting:
+    """What a counter counts: new requests, or frames; and whether answers repeat it."""
+
+    per_frame: bool = False
+    echo: bool = False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartBits:
     """Consecutive bits of a part.
@@ -79,6 +87,8 @@ class PartBits:
     directions: Mapping[str, int] = field(default_factory=dict)
     #: The number of a value of every frame.
     type: Scalar | None = None
+    #: It is a counter, which the runtime fills.
+    counting: Counting | None = None
     doc: Text = ""
 
     @property
@@ -239,6 +249,12 @@ class DelimitedFrame:
         """The address, None if there is none."""
         found = (bits for part in self.parts for bits in part.bits)
         return next((each for each in found if each.role == "address"), None)
+
+    @property
+    def counter(self) -> PartBits | None:
+        """The counter among the values, None if there is none."""
+        found = (bits for part in self.parts for bits in part.bits)
+        return next((each for each in found if each.counting is not None), None)
 
     @cached_property
     def values(self) -> tuple[Value, ...]:

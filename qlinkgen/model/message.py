@@ -50,6 +50,8 @@ class Message:
     checksum: bool = True
     addresses: tuple[tuple[int, int], ...] = ()
     default_address: int = 0
+    #: Values of the frame that an answer repeats.
+    echoed: tuple[str, ...] = ()
     #: Bytes of attributes that check values cover, by their names in ``over``.
     seeds: tuple[tuple[str, bytes], ...] = ()
 
@@ -81,7 +83,7 @@ class Message:
     @property
     def echoes(self) -> tuple[str, ...]:
         """Values that repeat the value of the same name in the request."""
-        return tuple(value.name for value in self.values if value.field.echo)
+        return (*self.echoed, *(value.name for value in self.values if value.field.echo))
 
     @property
     def docs(self) -> dict[str, str]:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import assert_never
 
 from qlinkgen.model.fields import Value
-from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, MarkedFrame, PacketFrame, PartBits
 from qlinkgen.model.message import Direction, Example, Message
 from qlinkgen.model.texts import Text, without_texts
 from qlinkgen.model.transaction import Bus, Command, Reply
@@ -90,6 +90,17 @@ class Protocol:
     def frame_values(self) -> tuple[Value, ...]:
         """Values of every frame, beside those of its message."""
         return self.frame.values if isinstance(self.frame, DelimitedFrame) else ()
+
+    @property
+    def counter(self) -> PartBits | None:
+        """The counter among the values of frames, None if there is none."""
+        return self.frame.counter if isinstance(self.frame, DelimitedFrame) else None
+
+    @property
+    def repeated(self) -> tuple[str, ...]:
+        """Values of frames that answers repeat."""
+        counter = self.counter
+        return (counter.name,) if counter and counter.counting and counter.counting.echo else ()
 
     @property
     def part_sections(self) -> dict[str, str]:

@@ -280,7 +280,7 @@ class FrameReader:
         part, end = self._envelope.payload, self._plan.end
         match end:
             case ByLength() if self._envelope.blocks:
-                sent = self._blocks(cursor, self._envelope.blocks, taken, length - end.part.bias)
+                sent = self._blocks(cursor, self._envelope.blocks, taken, end.part.payload(length))
             case ByLength():
                 sent = self._take(cursor, part, end.part.payload(length))
             case ByMessage():

@@ -192,7 +192,16 @@ class _OneOrMore:
 
 
 PartRole = Literal[
-    "constant", "length", "message", "address", "direction", "payload", "checksum", "terminator", "idle"
+    "constant",
+    "length",
+    "message",
+    "address",
+    "direction",
+    "counter",
+    "payload",
+    "checksum",
+    "terminator",
+    "idle",
 ]
 #: What a part turns out to be: its role, an integer with bits of several roles, a derived one, or a value.
 PartKind = PartRole | Literal["bits", "derived", "value"]
@@ -263,9 +272,11 @@ AnyAlgorithm = Annotated[
 class PartBitSpec(BitSpec):
     """Consecutive bits of a part of a frame: with a role, constant, or a value of every frame."""
 
-    role: Literal["message", "address", "direction"] | None = Field(
+    role: Literal["message", "address", "direction", "counter"] | None = Field(
         default=None, description="What they hold, unless they are constant or a value"
     )
+    per: Literal["request", "frame"] = Field(default="request", description="What a counter counts")
+    echo: StrictBool = Field(default=False, description="Answers repeat the counter of their request")
     const: Consts | None = Field(default=None, description="Legal values, the first of which is sent")
     values: Directions | None = Field(default=None, description="The value for each direction")
 
@@ -284,6 +295,8 @@ class PartSpec(Fact):
         default=None, description="Legal values of a constant integer, the first of which is sent"
     )
     values: Directions | None = Field(default=None, description="The value for each direction")
+    per: Literal["request", "frame"] = Field(default="request", description="What a counter counts")
+    echo: StrictBool = Field(default=False, description="Answers repeat the counter of their request")
     equals: str | None = Field(
         default=None, description="Earlier part with the same value; ~PART, PART + N: derived from it"
     )

@@ -80,6 +80,7 @@ class MessageBuilder:
             section=section,
             confirmed=spec.confirmed,
             empty_is_default=direction == "request" and spec.empty_request == "defaults",
+            echoed=self._echoed(direction),
             checksum=self._has_checksum(name),
             addresses=ranges,
             default_address=default,
@@ -87,6 +88,12 @@ class MessageBuilder:
         )
         self._add(message, layout)
         return message
+
+    def _echoed(self, direction: Direction) -> tuple[str, ...]:
+        """Values of the frame that an answer repeats."""
+        counter = self._frame.counter if isinstance(self._frame, DelimitedFrame) else None
+        repeats = direction == "response" and counter and counter.counting and counter.counting.echo
+        return (counter.name,) if counter and repeats else ()
 
     def reply(self, command: str, spec: ReplySpec, layout: Written, *, addressing: Addressing) -> Message:
         """An answer other than the response; ``command`` is "" if it is that of all."""
@@ -102,6 +109,7 @@ class MessageBuilder:
             doc=spec.doc,
             section=spec.section,
             confirmed=spec.confirmed,
+            echoed=self._echoed("response"),
             checksum=self._has_checksum(command or name),
             addresses=ranges,
             default_address=default,

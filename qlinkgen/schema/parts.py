@@ -19,7 +19,7 @@ from qlinkgen.schema.synonyms import type_hint
 from qlinkgen.schema.types import TypeBuilder
 
 _INTEGERS = {f"u{8 * size}": size for size in range(1, 9)}
-_SINGLE_ROLES = ("length", "address", "direction", "payload", "terminator", "idle")
+_SINGLE_ROLES = ("length", "address", "direction", "counter", "payload", "terminator", "idle")
 _VALUE_KEYS = ("scale", "offset", "unit", "range", "raw_range", "default")
 _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "constant": ("value", "text", "type", "byteorder", "const"),
@@ -27,6 +27,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "derived": ("type", "byteorder", "equals"),
     "direction": ("type", "byteorder", "values"),
     "value": ("type", "byteorder", *_VALUE_KEYS),
+    "counter": ("type", "byteorder", "per", "echo"),
     "length": ("type", "byteorder", "counts", "scale", "offset"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
@@ -42,6 +43,8 @@ _KEYS = (
     "text",
     "const",
     "values",
+    "per",
+    "echo",
     "equals",
     "bits",
     "shared",
@@ -83,9 +86,7 @@ class PartBuilder:
         for name in (name for name, spec in specs.items() if spec.told is None):
             if not any(self._report.touched((*path, name, key)) for key in ("role", *_KEYS)):
                 what = f"{name} has no role"
-                hint = (
-                    "add role: message, address or payload; counts, value, text or algorithm tell the others"
-                )
+                hint = "add role: message, address or payload; counts, value, text or algorithm tell others"
                 self._report.error("bad-frame", (*path, name), what, hint, of_key=True, absent=True)
             fit = False
         first: dict[str, str] = {}
@@ -116,7 +117,7 @@ class PartBuilder:
             value = self.constant(spec, path)
         elif role == "payload":
             size = self.payload_size(spec, path)
-        elif role == "value":
+        elif role in ("value", "counter"):
             return self._value(name, spec, path)
         elif role == "checksum":
             checksum = self.checksum(spec, names, path)
@@ -125,7 +126,7 @@ class PartBuilder:
             if role == "length" and not spec.counts:
                 self._lacks("counts", "add counts: [PART, ...]", path)
             self.known(spec.counts or (), names, (*path, "counts"))
-        kind: Role = "bits" if role == "direction" else role
+        kind: Role = "bits" if role in ("direction", "counter", "value") else role  # type: ignore[assignment]
         whole = self._pieces.whole(name, spec, scalar, path) if scalar else None
         bits = self._pieces.inside(spec.bits or {}, scalar, path) if scalar and role == "bits" else ()
         if role == "constant" and scalar and whole and len(whole.constants) == 1:

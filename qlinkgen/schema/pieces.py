@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from qlinkgen.model.frame import DelimitedFrame, Frame, Part, PartBits
+from qlinkgen.model.frame import Counting, DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
 from qlinkgen.model.types import Bits, Float, Scalar, byte_chunks
 from qlinkgen.schema.file_model import FieldSpec, PartBitSpec, PartSpec
@@ -50,8 +50,8 @@ class PieceBuilder:
                 bits = tuple(self._number(*each, path) for each in found)
                 return kind.container, bits
             case Scalar() if kind.settable and kind.meaning != "bool" and not isinstance(kind.meaning, Float):
-                container = _container(kind)
-                return container, (self._number(name, 0, kind, spec.doc, path),)
+                number = self._number(name, 0, kind, spec.doc, path)
+                return _container(kind), (self._counted(number, spec, path),)
             case _:
                 if kind is not None:
                     what = f"{shown(spec.type)} is not the type of a value of every frame"
@@ -66,6 +66,19 @@ class PieceBuilder:
             what, hint = f"{name} has no default, and 0 is not legal", "add a default"
             self._report.error("default-out-of-range", path, what, hint, of_key=True)
         return PartBits(name=name, role="value", shift=shift, bits=number.bits, type=number, doc=doc)
+
+    def _counted(self, bits: PartBits, spec: PartSpec | PartBitSpec, path: Path) -> PartBits:
+        """The bits of a value, which may be a counter."""
+        if spec.role != "counter":
+            for key in spec.model_fields_set & {"per", "echo"} if isinstance(spec, PartBitSpec) else ():
+                what = f"'{key}' has no effect on a value that is not a counter"
+                self._fault("not-applicable", (*path, key), what, "remove it, or add role: counter")
+            return bits
+        number = bits.type
+        if number is None or number.signed or number.meaning is not None or number.scaling is not None:
+            what = f"{bits.name} cannot count"
+            self._fault("bad-frame", path, what, "use a plain unsigned integer")
+        return replace(bits, counting=Counting(spec.per == "frame", spec.echo))
 
     def inside(self, specs: Mapping[str, PartBitSpec], container: Scalar, path: Path) -> tuple[PartBits, ...]:
         """The bits of an integer with several roles."""
@@ -90,7 +103,8 @@ class PieceBuilder:
         width, role = last + 1 - first, spec.role or ("constant" if spec.const else None)
         if role is None:
             number = self._types.bits(spec, path)
-            return self._number(name, first, number, spec.doc, path) if number else None
+            bits = self._number(name, first, number, spec.doc, path) if number else None
+            return self._counted(bits, spec, path) if bits else None
         if spec.role and spec.const:
             hint = "omit one of them"
             self._fault("bad-frame", path, f"{name} has a role and a constant", hint)
@@ -99,6 +113,9 @@ class PieceBuilder:
             self._fault("not-applicable", (*path, key), what, "remove it")
         if spec.values is not None and role != "direction":
             self._fault("not-applicable", (*path, "values"), "'values' has no effect here", "remove it")
+        if role == "counter":
+            number = Scalar(bits=width, chunks=(), minimum=0, maximum=(1 << width) - 1)
+            return self._counted(self._number(name, first, number, spec.doc, path), spec, path)
         return PartBits(
             name=name,
             role=role,

@@ -232,6 +232,16 @@ def test_each_of_several_constants_is_accepted(wire: str, kind: str) -> None:
         ("more: {type: u16, equals: code}", "more cannot equal code"),
         ("more: {type: u8, equals: 3 + 4}", "'3 + 4' does not name a part"),
         ("more: {role: message, type: u8}", "the id consists of code and more"),
+        ("more: {type: u8, echo: true}", "'echo' has no effect on a value here"),
+        ("more: {role: counter, type: i8}", "more cannot count"),
+        (
+            "more: {type: u8, bits: {low: {at: 0..3, per: frame}}}",
+            "'per' has no effect on a value that is not a counter",
+        ),
+        (
+            "more: {type: u8, bits: {low: {at: 0..3, role: counter}, high: {at: 4..7, role: counter}}}",
+            "high and low are both the counter",
+        ),
         ("more: {type: u8, const: 1, value: 01}", "'value' has no effect on a constant with a type here"),
         ("start: {type: u8, value: 01}", "'type' has no effect on a constant without const here"),
     ],

@@ -34,6 +34,7 @@ from qlinkgen.backends.c.views import (
     parts_views,
 )
 from qlinkgen.model.message import Direction
+from qlinkgen.model.naming import member
 from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
@@ -61,6 +62,7 @@ class DispatchView:
     is_broadcast: str
     slave_arguments: str
     values_right: str
+    repeated: list[str]
     listener: str
     listener_address: str
     listener_argument: str
@@ -161,6 +163,7 @@ class FrameSection:
         return DispatchView(
             is_broadcast=f"frame->{name} == {protocol.name.upper()}_BROADCAST" if broadcast else "false",
             slave_arguments=(f"slave->{name}, " if name else summed) + ("&slave->parts, " if values else ""),
+            repeated=[member(name) for name in self.plan.protocol.repeated],
             values_right=f"!({condition(refused)})" if refused else "",
             listener="listener" if protocol.directions == ("message",) else "master",
             listener_address=f", {self.view.address_type} {name}" if name else "",

@@ -268,6 +268,7 @@ class PartsView:
     verified: bool
     head_checks: Sequence[HeadCheck]
     values: Sequence[str]
+    counter: str
     tail_tests: Sequence[str]
 
     template = "delimited"
@@ -585,6 +586,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         verified=receiver.verified,
         head_checks=list(_head_checks(plan, envelope, bare=receiver.bare)),
         values=[attribute(member.name) for _, member in envelope.values],
+        counter=_counter(plan),
         tail_tests=[test for part in envelope.back for test in _tail_tests(envelope, part)],
     )
 
@@ -593,6 +595,15 @@ def _blank_trailer(envelope: Envelope, address: AddressView | None) -> str:
     """A trailer for decoding a payload."""
     holds = any(isinstance(part, CellPart) and part.values for part in envelope.back)
     return _blank(envelope, envelope.back, address) if holds or _trails(envelope) else "bytes(_TRAILER)"
+
+
+def _counter(plan: Plan) -> str:
+    """The counter of frames as a tuple, "" if there is none."""
+    counter = plan.protocol.counter
+    if counter is None or counter.counting is None:
+        return ""
+    facts = (attribute(counter.name), 1 << counter.bits, counter.counting.per_frame, counter.counting.echo)
+    return f'("{facts[0]}", {facts[1]}, {facts[2]}, {facts[3]})'
 
 
 def _trails(envelope: Envelope) -> bool:

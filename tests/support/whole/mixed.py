@@ -46,6 +46,7 @@ class Mixture:
         if has_length:
             self.length = "size"
             parts["size"] = {"counts": ["data"], "type": rng.choice(("u8", "u8", "u16"))}
+        self._count(parts)
         for name in ("component", "status"):
             if rng.random() < 0.3:
                 parts[name] = self._value()
@@ -72,6 +73,17 @@ class Mixture:
             (parts if way == "whole" else bits)["way"] = {"role": "direction"}
             self.directed = True
         return parts
+
+    def _count(self, parts: dict[str, Doc]) -> None:
+        """Perhaps a counter, in a part of its own or in the last bit of another."""
+        rng = self.rng
+        if rng.random() < 0.75:
+            return
+        counter: Doc = {"role": "counter"} | rng.choice(({}, {"echo": True}, {"per": "frame"}))
+        if "head" not in parts or rng.random() < 0.5:
+            parts["sequence"] = {**counter, "type": rng.choice(("u8", "u16"))}
+        elif (last := int(parts["head"]["type"][1:]) - 1) not in _used(parts["head"]):
+            parts["head"]["bits"]["toggle"] = {**counter, "at": last}
 
     def _value(self) -> Doc:
         """A value of every frame."""
@@ -164,6 +176,15 @@ class Mixture:
                     self.pieces.append((each, size))
                 elif inner.get("role") == "address":
                     self.address_bits = size
+
+
+def _used(spec: Doc) -> set[int]:
+    """The bits of an integer that have a role."""
+    used = set[int]()
+    for each in spec["bits"].values():
+        first, _, last = str(each["at"]).partition("..")
+        used |= set(range(int(first), int(last or first) + 1))
+    return used
 
 
 def _constant(spec: Doc) -> bool:

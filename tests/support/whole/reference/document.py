@@ -408,12 +408,14 @@ class Fields:
         """A part of a frame with values: its integer, and the name, lowest bit and number of each."""
         spec = part_doc(given)
         if "bits" in spec:
-            inner = {
-                key: each for key, each in spec["bits"].items() if not set(_doc(each)) & {"role", "const"}
-            }
-            members = tuple(self._member(*each) for each in inner.items())
+            members = tuple(
+                self._member(key, spec["bits"][key]) for key, role, *_ in bits_of(spec) if role == "value"
+            )
             return Slot(name, self._number(spec["type"], spec)), members
-        slot = self._slot(name, self._resolved({key: each for key, each in spec.items() if key != "role"}))
+        slot = self._slot(
+            name,
+            self._resolved({key: each for key, each in spec.items() if key not in ("role", "per", "echo")}),
+        )
         if isinstance(slot.kind, Packed):
             return slot, slot.kind.members
         assert isinstance(slot.kind, Number)
@@ -515,7 +517,7 @@ class Fields:
         first, last = whole_span(written["at"])
         bits, signed = last + 1 - first, written.get("signed", False)
         base = written.get("type", "")
-        numeric = signed or "scale" in written or "offset" in written
+        numeric = signed or "scale" in written or "offset" in written or "role" in written
         truth = base == "bool" or (not base and bits == 1 and not numeric)
         flags = self._document.get("flags", {}).get(base, {})
         forbidden = (1 << bits) - 1 & ~_named_bits(flags) if flags.get("reserved") == "zero" else 0
@@ -595,7 +597,7 @@ def bits_of(spec: Doc) -> Iterator[tuple[str, str, int, int, Doc]]:
     for name, given in spec.get("bits", {}).items():
         inner = _doc(given)
         first, last = whole_span(inner["at"])
-        role = inner.get("role", "constant" if "const" in inner else "value")
+        role = inner.get("role", "constant" if "const" in inner else "value").replace("counter", "value")
         yield name, role, first, last + 1 - first, inner
 
 

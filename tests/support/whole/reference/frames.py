@@ -105,7 +105,7 @@ class Stuffing:
 def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
     """A part from its mapping."""
     spec = part_doc(spec)
-    if spec["role"] == "value":
+    if spec["role"] in ("value", "counter"):
         slot, values = fields.beside(name, spec)
         assert isinstance(slot.kind, Number | Packed)
         return Part(name, "bits", len(slot.kind.pieces), spec, pieces=slot.kind.pieces, values=values)

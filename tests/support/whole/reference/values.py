@@ -169,7 +169,7 @@ def _encoded_run(kind: Run, given: Raw) -> bytes:
 def decode(message: Message, payload: bytes) -> dict[str, Raw]:
     """The values of a payload. Raises Wrong, for wrong lengths before values out of range."""
     if not payload and message.empty_is_default:
-        return {name: default(kind) for name, kind in message.values()}
+        return {name: default(kind) for name, kind in message.values() if (name, kind) not in message.beside}
     if message.walked:
         return _walked(message, payload)
     values: dict[str, Raw] = {}
