@@ -205,6 +205,11 @@ class BusModule:
             names[0] = f"list[{' | '.join(names)}]"
         return " | ".join(names if surely else [*names, "None"])
 
+    def _ask(self, call: Transaction, wait: str) -> str:
+        """The statement that returns the answer."""
+        kind = "_many" if call.command.many is not None else "_any" if call.done else ""
+        return f"return {wait}self.ask{kind}(_request, {self._asked(call)})"
+
     def _asked(self, transaction: Transaction) -> str:
         """The classes of the answers that a call returns, as arguments."""
         assert transaction.response is not None
@@ -254,16 +259,18 @@ class BusModule:
         )
         if call.response is None:
             return [*request, f"{wait}self.tell(_request)"]
-        several = "_many" if call.command.many is not None else ""
-        ask = f"return {wait}self.ask{several}(_request, {self._asked(call)})"
+        ask = [self._ask(call, wait)]
+        if call.done:  # of any class, which `ask` cannot express
+            answer = self._answer(call, call.done, surely=True)
+            ask = [f"_answer: {answer} = {ask[0].removeprefix('return ')}", "return _answer"]
         if call.command.addressing != "either" or node:
-            return [*request, ask]
+            return [*request, *ask]
         return [
             *request,
             f"if {address} == {self._protocol.bus.broadcast}:",
             f"    {wait}self.tell(_request)",
             "    return None",
-            ask,
+            *ask,
         ]
 
     def _arguments(self, call: Transaction, first: str) -> list[str]:
