@@ -122,10 +122,7 @@ class ConditionBuilder:
                 )
         if not _is_run(field) or counts:
             return
-        if field.when:
-            what = f"{field.name} takes the rest of the payload, so its absence is not seen"
-            self._error(field.name, "if", what, "give it a count or a fixed size")
-        elif not field.optional and (later := next((each for each in after if each.conditional), None)):
+        if not field.optional and (later := next((each for each in after if each.conditional), None)):
             what = f"{field.name} takes the rest of the payload, but {later.name} after it may be absent"
             self._error(
                 later.name, "optional" if later.optional else "if", what, f"give {field.name} a count"

@@ -41,6 +41,10 @@ commands:
       gap: {type: u8, reserved: true, if: {level: not 2..3}}
       end: u8
     response: {a: u8, b: {type: u16, optional: true}, c: {type: u8, optional: true}}
+  log:
+    id: 2
+    request: {}
+    response: {kind: u8, words: {type: "u16[0..9]", if: {kind: 1..3}}, end: u8}
 """
 ABSENT: dict[str, Raw] = {"mode": 0, "more": 0, "level": 2, "seconds": None, "points": None, "end": 9}
 PRESENT: dict[str, Raw] = {"mode": 2, "more": 1, "level": 0, "seconds": 3, "points": [7, 8], "end": 9}
@@ -115,6 +119,18 @@ def test_optional_fields_are_present_if_bytes_are_left() -> None:
         assert made.to_bytes() == bytes.fromhex(payload)
     with pytest.raises(module().EncodeError, match="c: 3 cannot be sent"):
         module().HeatResponse(c=3).to_bytes()
+
+
+@pytest.mark.parametrize(("payload", "words"), [("00 07", None), ("01 07", []), ("03 0200 0300 07", [2, 3])])
+def test_a_rest_may_be_absent(payload: str, words: list[int] | None) -> None:
+    data, plan = bytes.fromhex(payload), plan_of(protocol()).message("log.response").payload
+    values = {"kind": data[0], "words": words, "end": 7}
+    assert unpack(plan, data) == values
+    assert pack(plan, values) == data
+    assert module().LogResponse.from_bytes(data) == module().LogResponse(**values)
+    assert construct.live(protocol()).payload("log.response", values) == data
+    with pytest.raises(BadContent):
+        unpack(plan, b"\0" + data)
 
 
 def test_the_size_follows_from_what_has_been_received() -> None:

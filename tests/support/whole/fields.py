@@ -199,7 +199,7 @@ class FieldMaker:
         if any("packed" in spec and ".." in spec["type"] for spec in specs.values()):
             return
         order = [name for name, _ in made]
-        for at in range(opened):
+        for at in range(min(opened + 1, len(order))):
             name = order[at]
             spec = specs[name]
             if name in kept or "counts" in spec or rng.random() < 0.5:
