@@ -186,7 +186,7 @@ def _frame(version: Literal[1, 2]) -> Value:
     }
     parts: dict[str, Value] = {
         **head,
-        "sequence": {"type": "u8", "default": 0},
+        "sequence": {"role": "counter", "type": "u8", "per": "frame"},
         "system": {"role": "address", "type": "u8"},
         "component": {"type": "u8", "default": 1},
         "number": {"role": "message", "type": "u24" if version == 2 else "u8"},
