@@ -62,7 +62,7 @@ def server(pty: PtyPort) -> Iterator[None]:
 @pytest.fixture
 def master(pty: PtyPort, server: None) -> BlockingMaster:
     codec = described("modbus_rtu").module
-    return BlockingMaster(MasterEngine(codec, timing_of(codec, pty)), pty)
+    return BlockingMaster(MasterEngine(codec, timing_of(codec, pty, slack=5.0)), pty)
 
 
 def test_our_master_reads_and_writes(master: BlockingMaster) -> None:
@@ -86,7 +86,7 @@ def test_an_exception_ends_a_call_at_once_with_its_code(master: BlockingMaster) 
     begun = time.monotonic()
     with pytest.raises(Refused) as caught:
         master.transact(codec.ReadHoldingRegistersRequest(node=NODE, start=99, quantity=2))
-    assert time.monotonic() - begun < 0.9, "the response may take a second, and an attempt more"
+    assert time.monotonic() - begun < 3, "without the exception it takes six seconds, and as long again"
     reply: Any = caught.value.reply
     assert reply.code == codec.ExceptionCode.ILLEGAL_DATA_ADDRESS
     assert master.engine.total.requests == 1
