@@ -55,6 +55,6 @@ def _part_of(record: Record, read: Record) -> Record:
 def test_every_output_agrees(name: str, seed: int, require_tool: Callable[..., str]) -> None:
     for compiler in ("gcc", "clang"):
         require_tool(compiler, package=compiler)
-    outcome = run_text(text_of(name), seed, effort=Effort(messages=4, streams=24))
+    outcome = run_text(text_of(name), seed, effort=Effort(messages=4, streams=12))
     assert not outcome.refused
     assert not outcome.differences, outcome.report()
