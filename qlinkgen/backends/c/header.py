@@ -19,7 +19,7 @@ from qlinkgen.backends.c.frames import FrameSection, frame_section
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.messages import Beside, MessageWriter, Rounding, nearest_helpers
 from qlinkgen.backends.c.names import Names
-from qlinkgen.backends.c.parts import in_hex
+from qlinkgen.backends.c.places import in_hex
 from qlinkgen.backends.c.sizes import SizeView, size_view
 from qlinkgen.backends.c.tidy import tidy
 from qlinkgen.backends.c.types import Kind, Types

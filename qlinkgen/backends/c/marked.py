@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from qlinkgen.backends.c.check_values import differs, put_check
 from qlinkgen.backends.c.names import Names, unsigned_type
-from qlinkgen.backends.c.parts import any_of, differs, in_hex, put_check, sender_of
+from qlinkgen.backends.c.places import any_of, in_hex, sender_of
 from qlinkgen.backends.c.views import PlaceView
 from qlinkgen.model.integer import Chunk
 from qlinkgen.plan.framing import ByMark, MarkPart

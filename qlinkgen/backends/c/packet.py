@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from qlinkgen.backends.c.check_values import differs, put_check
 from qlinkgen.backends.c.crc import finished
 from qlinkgen.backends.c.framing import Function, struct_parameter
 from qlinkgen.backends.c.names import Names, unsigned, unsigned_type
-from qlinkgen.backends.c.parts import differs, put_check, refusal
+from qlinkgen.backends.c.places import refusal
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.checksum import Sum
 from qlinkgen.plan.check import Check

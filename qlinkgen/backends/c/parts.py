@@ -2,165 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import assert_never
 
+from qlinkgen.backends.c.check_values import CheckWriter
 from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_before_sending
-from qlinkgen.backends.c.crc import CheckView, render
-from qlinkgen.backends.c.layout import Layouts
-from qlinkgen.backends.c.names import grouped, unsigned, unsigned_type
-from qlinkgen.model.checksum import Checksum
-from qlinkgen.model.frame import ATTRIBUTE
-from qlinkgen.model.naming import address_member, member
-from qlinkgen.plan.check import Check
+from qlinkgen.backends.c.names import unsigned, unsigned_type
+from qlinkgen.backends.c.places import any_of, in_hex, refusal, shifted
+from qlinkgen.model.naming import member
 from qlinkgen.plan.framing import (
     AddressPart,
     AddressSlot,
-    Bits,
     BlocksPart,
-    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
     ConstantSlot,
-    Envelope,
     EqualPart,
-    FramePlan,
     IdPart,
     IdSlot,
     LengthPart,
     MarkPart,
-    Numeric,
     Part,
     PayloadPart,
-    Seed,
     Slot,
 )
 from qlinkgen.plan.payload import Member
-from qlinkgen.plan.transparency import FrameStuffing
-
-
-@dataclass(frozen=True, slots=True)
-class Sender:
-    """Message number, address and values of a frame: their C names and types; "" without them."""
-
-    id: str
-    id_type: str
-    address: str
-    address_type: str
-    values_type: str
-
-    @property
-    def identity(self) -> str:
-        """Message number and address as parameters."""
-        address = f", {self.address_type} {self.address}" if self.address else ""
-        return f"{self.id_type} {self.id}{address}"
-
-    @property
-    def parameters(self) -> str:
-        """All as parameters."""
-        return f"{self.identity}, const {self.values_type} *parts" if self.values_type else self.identity
-
-    @property
-    def arguments(self) -> str:
-        """All as arguments."""
-        parts = ("parts",) if self.values_type else ()
-        return ", ".join((self.id, *((self.address,) if self.address else ()), *parts))
-
-
-def sender_of(frame: FramePlan, prefix: str) -> Sender:
-    """The sender of a frame; names are "id" and that of the address, changed if taken."""
-    envelope = frame.envelope
-    address = address_member(frame.address)
-    address_type = unsigned_type(envelope.address[0].bits if envelope.address else 8)
-    return Sender(
-        address_member(frame.id_name) if address == "id" else "id",
-        unsigned_type(sum(bits.bits for bits in envelope.id) or 8),
-        address,
-        address_type if address else "",
-        f"{prefix}_parts_t" if envelope.values else "",
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class ValueView:
-    """A function that computes a check value: its name, the name of the part, and statements.
-
-    Attributes:
-        seeded: it needs the bytes of the attributes of the message.
-    """
-
-    function: str
-    part: str
-    algorithm: CheckView
-    updates: list[str]
-    seeded: bool
-
-
-@dataclass(frozen=True, slots=True)
-class BlocksView:
-    """Check values of blocks of a payload; ``put`` and ``differs`` are about the bytes after a block."""
-
-    every: int
-    size: int
-    algorithm: CheckView
-    put: list[str]
-    differs: str
 
 
 @dataclass(frozen=True)
-class PartWriter:
-    """Prints the envelope of a frame.
-
-    A frame without its ``lead``, the constant at its front that is never stuffed, is called a body.
-    """
-
-    prefix: str
-    frame: FramePlan
-    sender: Sender
-    layouts: Layouts
-    #: Names and bytes of the attributes of any message that check values cover.
-    seeds: tuple[tuple[str, bytes], ...] = ()
-    #: A receiver knows the direction.
-    directed: bool = False
-
-    @property
-    def envelope(self) -> Envelope:
-        """Its parts."""
-        return self.frame.envelope
-
-    @property
-    def stuffing(self) -> FrameStuffing | None:
-        """The stuffing of whole frames."""
-        found = self.frame.transparency
-        return found if isinstance(found, FrameStuffing) else None
-
-    @property
-    def lead(self) -> bytes:
-        """The unstuffed constant before the body; b"" if the body is the whole frame."""
-        preamble, stuffing = self.envelope.preamble, self.stuffing
-        return preamble if stuffing and len(preamble) <= stuffing.front else b""
-
-    @property
-    def head(self) -> int:
-        """Size of the header of a body."""
-        return self.envelope.header_size - len(self.lead)
-
-    def parts(self) -> tuple[Part, ...]:
-        """The parts of a body."""
-        return self.envelope.parts[1:] if self.lead else self.envelope.parts
-
-    @property
-    def alone(self) -> CheckPart | None:
-        """The only check value, if it follows the payload: wrapping and scanning compute it in passing."""
-        checks = self.envelope.checks
-        if len(checks) != 1 or checks[0] not in self.envelope.back or self.envelope.seeded:
-            return None
-        if checks[0].check.otherwise is not None:
-            return None
-        return checks[0]
+class PartWriter(CheckWriter):
+    """Prints the parts of a frame."""
 
     # To the wire
 
@@ -209,7 +82,7 @@ class PartWriter:
     def _cell(self, part: CellPart) -> str:
         """The integer of a part whose bits have several roles."""
         kind = unsigned_type(part.integer.bits)
-        terms = [_shifted(self._slot(slot, kind), slot.shift, kind) for slot in part.slots]
+        terms = [shifted(self._slot(slot, kind), slot.shift, kind) for slot in part.slots]
         return terms[0] if len(terms) == 1 else f"({kind})({' | '.join(terms)})"
 
     def _slot(self, slot: Slot, kind: str) -> str:
@@ -246,29 +119,7 @@ class PartWriter:
             lines.append(f"frame->parts.{member(each.name)} = {value};")
         return lines
 
-    def put_check(self, place: str, value: str) -> list[str]:
-        """Statements that write the check value; the payload ends at ``place``."""
-        part = self.alone
-        return put_check(part.check, place, self._at(part), value) if part else []
-
     # From the wire
-
-    def number(self, pieces: tuple[Bits, ...]) -> str:
-        """The message id or address in these pieces of a received frame, 0 if there are none."""
-        kind = unsigned_type(sum(each.bits for each in pieces) or 8)
-        if len(pieces) == 1 and pieces[0].whole:
-            return self.get(pieces[0].part)
-        terms = [_shifted(self._piece(each, kind), each.at, kind) for each in pieces]
-        return (f"({kind})({' | '.join(terms)})" if len(terms) > 1 else terms[0]) if terms else "0U"
-
-    def _piece(self, bits: Bits, kind: str) -> str:
-        return f"({kind}){self._taken(self.get(bits.part), bits, whole=bits.whole)}"
-
-    def get(self, part: Numeric, place: str = "") -> str:
-        """The expression for the integer of a part, in a body or after the payload."""
-        place = place or ("end" if part in self.envelope.back else "body")
-        found, mask = self.layouts.get(part.integer, place, str(self._at(part))), part.integer.chunks[0].mask
-        return found if part.size > 1 or mask == 0xFF else f"({found} & {in_hex(mask)})"
 
     def payload_size(self, length: LengthPart) -> str:
         """The payload size given by a length."""
@@ -403,173 +254,6 @@ class PartWriter:
             case _:
                 pass
 
-    @staticmethod
-    def _taken(found: str, bits: Bits | Slot, *, whole: bool) -> str:
-        """The bits of an integer."""
-        if whole:
-            return found
-        shifted = f"({found} >> {bits.shift})" if bits.shift else found
-        return f"({shifted} & {unsigned((1 << bits.bits) - 1, bits.bits, hexadecimal=True)})"
-
-    def check_differs(self, place: str, value: str) -> str:
-        """The condition for a received check value other than ``value``."""
-        part = self.alone
-        return differs(part.check, place, self._at(part), value) if part else ""
-
-    # The check value
-
-    @property
-    def lead_updates(self) -> list[str]:
-        """Statements that update the only check value with the lead, none if it is not covered."""
-        return self._lead_updates(self.alone, "check") if self.alone else []
-
-    def _lead_updates(self, check: CheckPart, key: str) -> list[str]:
-        covered = self.lead and self.envelope.parts[0].name in check.check.over
-        return [f"value = {self.prefix}_{key}_update(value, {in_hex(b)});" for b in self.lead if covered]
-
-    @property
-    def covers_body(self) -> bool:
-        """Whether the only check value covers the whole body before it and can be computed byte by byte."""
-        check, parts = self.alone, self.parts()
-        covered = tuple(part for part in parts if self.envelope.covered(part))
-        return check is not None and covered == parts[: parts.index(check)]
-
-    def covered_loops(self, array: str, start: str, payload_end: str) -> list[str]:
-        """Loops that update the only check value with the covered bytes of an array."""
-        return self._loops(self.alone, "check", array, start, payload_end) if self.alone else []
-
-    def _loops(self, check: CheckPart, key: str, array: str, start: str, payload_end: str) -> list[str]:
-        lines: list[str] = []
-        for run in self.envelope.coverage(check):
-            if isinstance(run, Seed):
-                lines += self._seed_updates(run, key)
-                continue
-            parts = [part for part in run if part in self.parts()]
-            if parts:
-                first = self._place(parts[0], start, payload_end)
-                end = self._place(parts[-1], start, payload_end, after=True)
-                lines += [
-                    f"for (size_t covered = {first}; covered < ({end}); ++covered) {{",
-                    f"    value = {self.prefix}_{key}_update(value, {array}[covered]);",
-                    "}",
-                ]
-        return lines
-
-    def _place(self, part: Part, start: str, payload_end: str, *, after: bool = False) -> str:
-        if after and part is self.envelope.payload:
-            return payload_end
-        base = payload_end if part in self.envelope.back else start
-        return _sum(base, self._at(part) + (part.size if after else 0))
-
-    def _seed_updates(self, seed: Seed, key: str) -> list[str]:
-        """Statements that update a check value with a seed; ``seeds`` are the bytes of all of a message."""
-        if not self.seeds:  # no messages
-            return ["(void)seeds;"]
-        names = [name.removeprefix(ATTRIBUTE) for name, _ in self.seeds]
-        at = sum(len(data) for _, data in self.seeds[: names.index(seed.attribute)])
-        size = len(self.seeds[names.index(seed.attribute)][1])
-        return [f"value = {self.prefix}_{key}_update(value, seeds[{at + each}]);" for each in range(size)]
-
-    # Several check values, or one before the payload
-
-    @cached_property
-    def algorithms(self) -> Mapping[Checksum, CheckView]:
-        """Each algorithm of the frame, the main one first."""
-        parts = sorted(self.envelope.checks, key=lambda part: part is not self.envelope.check)
-        found = dict.fromkeys(part.check.algorithm for part in parts)
-        if self.envelope.blocks:
-            found[self.envelope.blocks.check.algorithm] = None
-        return {each: render(each, number) for number, each in enumerate(found, 1)}
-
-    @property
-    def values(self) -> list[ValueView]:
-        """The functions that compute check values; none if the only one is computed in passing."""
-        return [self._value(part) for part in self.envelope.filling] if self.alone is None else []
-
-    def _value(self, part: CheckPart) -> ValueView:
-        algorithm = self.algorithms[part.check.algorithm]
-        loops = self._loops(part, algorithm.key, "body", "0", "payload_end")
-        updates = self._empty(part) + self._lead_updates(part, algorithm.key) + loops
-        if not any("payload_end" in line for line in updates):
-            updates.insert(0, "(void)payload_end;")
-        seeded = part in self.envelope.seeded
-        return ValueView(self._function(part), part.name, algorithm, updates, seeded=seeded)
-
-    def _empty(self, part: CheckPart) -> list[str]:
-        """The statement that returns the value where the payload, which alone is covered, is empty."""
-        if part.check.otherwise is None:
-            return []
-        return refusal(
-            f"payload_end == {self.head}U", unsigned(part.check.otherwise, part.check.algorithm.width)
-        )
-
-    @property
-    def blocks(self) -> BlocksView | None:
-        """The check values of the blocks of the payload, None if there are none."""
-        part = self.envelope.blocks
-        if part is None:
-            return None
-        return BlocksView(
-            part.every,
-            part.check.size,
-            self.algorithms[part.check.algorithm],
-            put_check(part.check, "block", 0, "value"),
-            differs(part.check, "block", 0, "value"),
-        )
-
-    def _function(self, part: CheckPart) -> str:
-        return f"{self.prefix}_value_{self.envelope.checks.index(part) + 1}_"
-
-    def fills(self, body: str, end: str, payload_end: str) -> list[str]:
-        """Statements that compute and write the check values of a body; ``end`` is the end of its payload."""
-        lines: list[str] = []
-        for part in self.envelope.filling if self.alone is None else ():
-            place = end if part in self.envelope.back else body
-            lines += self._computed(part, body, payload_end, f"{self.prefix}_seeds_({self.sender.id})")
-            lines += [f"    {line}" for line in put_check(part.check, place, self._at(part), "value")]
-            lines.append("}")
-        return lines
-
-    def judges(self, body: str, end: str, payload_end: str) -> list[str]:
-        """Statements that verify the check values that are not verified before the payload."""
-        if self.alone is not None:
-            return []
-        early = () if isinstance(self.frame.end, ByTerminator) else self.envelope.header_checks
-        seeded = self.envelope.seeded
-        late = [part for part in self.envelope.checks if part not in (*early, *seeded)]
-        lines = [line for part in late for line in self.judge(part, body, end, payload_end)]
-        if seeded:
-            directed = "direction, " if self.directed else ""
-            known = f"{self.prefix}_known_seeds_({directed}{self.number(self.envelope.id)})"
-            lines += ["{", f"    const uint8_t *const seeds = {known};"]
-            lines += indented(refusal("seeds == NULL", f"{self.prefix.upper()}_ERROR_UNKNOWN"))
-            for part in seeded:
-                lines += indented(self.judge(part, body, end, payload_end))
-            lines.append("}")
-        return lines
-
-    def judge(self, part: CheckPart, body: str, end: str, payload_end: str) -> list[str]:
-        """Statements that verify a check value."""
-        place = end if part in self.envelope.back else body
-        test = differs(part.check, place, self._at(part), "value")
-        wrong = refusal(test, f"{self.prefix.upper()}_ERROR_CRC")
-        return [*self._computed(part, body, payload_end), *(f"    {line}" for line in wrong), "}"]
-
-    def _computed(self, part: CheckPart, body: str, payload_end: str, seeds: str = "seeds") -> list[str]:
-        kind = self.algorithms[part.check.algorithm].type
-        more = f", {seeds}" if part in self.envelope.seeded else ""
-        return ["{", f"    const {kind} value = {self._function(part)}({body}, {payload_end}{more});"]
-
-    # Places
-
-    def _front(self) -> tuple[Part, ...]:
-        return self.envelope.front[1:] if self.lead else self.envelope.front
-
-    def _at(self, part: Part) -> int:
-        """Offset of a part in the body, or after the payload."""
-        trailing = part in self.envelope.back
-        return self.envelope.offset(part) - (self.envelope.header_size if trailing else len(self.lead))
-
 
 def derived(part: EqualPart, other: str) -> str:
     """The value of a derived number."""
@@ -587,59 +271,9 @@ def _signed(number: int) -> str:
     return f"{'-' if number < 0 else '+'} {abs(number)}U"
 
 
-def _shifted(value: str, shift: int, kind: str) -> str:
-    return f"({kind})({value} << {shift})" if shift else value
-
-
 def length_bounds(length: LengthPart, value: str) -> str:
     """The condition for a length out of range."""
     bits = length.integer.bits
     terms = [f"{value} < {unsigned(length.least, bits)}"] if length.least else []
     terms += [f"{value} > {unsigned(length.most, bits)}"] if length.most < length.integer.maximum else []
     return any_of(terms)
-
-
-def any_of(terms: Iterator[str] | list[str]) -> str:
-    """The disjunction of conditions, "" without conditions."""
-    found = list(terms)
-    return " || ".join(f"({term})" for term in found) if len(found) > 1 else "".join(found)
-
-
-def refusal(test: str, status: str) -> list[str]:
-    """A statement that returns a status if a condition holds."""
-    return [f"if ({test}) {{", f"    return {status};", "}"]
-
-
-def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
-    """Statements that write a check value."""
-    return [
-        f"{place}[{at + index}] = (uint8_t)({_piece(value, chunk.shift, chunk.mask)});"
-        for index, chunk in enumerate(check.value.chunks)
-    ]
-
-
-def differs(check: Check, place: str, at: int, value: str) -> str:
-    """The condition for received check bytes that differ from ``value``."""
-    return any_of(
-        f"{place}[{at + index}] != (uint8_t)({_piece(value, chunk.shift, chunk.mask)})"
-        for index, chunk in enumerate(check.value.chunks)
-    )
-
-
-def indented(lines: list[str]) -> list[str]:
-    """Lines one level deeper."""
-    return [f"    {line}" for line in lines]
-
-
-def in_hex(byte: int) -> str:
-    """A byte as a constant."""
-    return unsigned(byte, 8, hexadecimal=True)
-
-
-def _piece(value: str, shift: int, mask: int) -> str:
-    shifted = f"{value} >> {shift}" if shift else value
-    return shifted if mask == 0xFF else f"{grouped(shifted)} & {in_hex(mask)}"
-
-
-def _sum(base: str, offset: int) -> str:
-    return f"{offset}U" if base == "0" else f"{base} + {offset}U" if offset else base

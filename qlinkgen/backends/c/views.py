@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
+from qlinkgen.backends.c.check_values import BlocksView, ValueView
 from qlinkgen.backends.c.coding import EndedView, stage_views
 from qlinkgen.backends.c.crc import CheckView
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned_type
-from qlinkgen.backends.c.parts import BlocksView, PartWriter, ValueView, in_hex, length_bounds, sender_of
+from qlinkgen.backends.c.parts import PartWriter, length_bounds
+from qlinkgen.backends.c.places import in_hex, sender_of
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.framing import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit

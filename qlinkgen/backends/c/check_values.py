@@ -1,0 +1,225 @@
+"""Prints the check values of a frame: how they are computed, written and verified."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from qlinkgen.backends.c.crc import CheckView, render
+from qlinkgen.backends.c.names import grouped, unsigned
+from qlinkgen.backends.c.places import Places, any_of, in_hex, indented, refusal
+from qlinkgen.model.checksum import Checksum
+from qlinkgen.model.frame import ATTRIBUTE
+from qlinkgen.plan.check import Check
+from qlinkgen.plan.framing import ByTerminator, CheckPart, Seed
+
+
+@dataclass(frozen=True, slots=True)
+class ValueView:
+    """A function that computes a check value: its name, the name of the part, and statements.
+
+    Attributes:
+        seeded: it needs the bytes of the attributes of the message.
+    """
+
+    function: str
+    part: str
+    algorithm: CheckView
+    updates: list[str]
+    seeded: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BlocksView:
+    """Check values of blocks of a payload; ``put`` and ``differs`` are about the bytes after a block."""
+
+    every: int
+    size: int
+    algorithm: CheckView
+    put: list[str]
+    differs: str
+
+
+@dataclass(frozen=True)
+class CheckWriter(Places):
+    """Prints the check values of a frame."""
+
+    @property
+    def alone(self) -> CheckPart | None:
+        """The only check value, if it follows the payload: wrapping and scanning compute it in passing."""
+        checks = self.envelope.checks
+        if len(checks) != 1 or checks[0] not in self.envelope.back or self.envelope.seeded:
+            return None
+        if checks[0].check.otherwise is not None:
+            return None
+        return checks[0]
+
+    def put_check(self, place: str, value: str) -> list[str]:
+        """Statements that write the check value; the payload ends at ``place``."""
+        part = self.alone
+        return put_check(part.check, place, self._at(part), value) if part else []
+
+    def check_differs(self, place: str, value: str) -> str:
+        """The condition for a received check value other than ``value``."""
+        part = self.alone
+        return differs(part.check, place, self._at(part), value) if part else ""
+
+    # The check value
+
+    @property
+    def lead_updates(self) -> list[str]:
+        """Statements that update the only check value with the lead, none if it is not covered."""
+        return self._lead_updates(self.alone, "check") if self.alone else []
+
+    def _lead_updates(self, check: CheckPart, key: str) -> list[str]:
+        covered = self.lead and self.envelope.parts[0].name in check.check.over
+        return [f"value = {self.prefix}_{key}_update(value, {in_hex(b)});" for b in self.lead if covered]
+
+    @property
+    def covers_body(self) -> bool:
+        """Whether the only check value covers the whole body before it and can be computed byte by byte."""
+        check, parts = self.alone, self.parts()
+        covered = tuple(part for part in parts if self.envelope.covered(part))
+        return check is not None and covered == parts[: parts.index(check)]
+
+    def covered_loops(self, array: str, start: str, payload_end: str) -> list[str]:
+        """Loops that update the only check value with the covered bytes of an array."""
+        return self._loops(self.alone, "check", array, start, payload_end) if self.alone else []
+
+    def _loops(self, check: CheckPart, key: str, array: str, start: str, payload_end: str) -> list[str]:
+        lines: list[str] = []
+        for run in self.envelope.coverage(check):
+            if isinstance(run, Seed):
+                lines += self._seed_updates(run, key)
+                continue
+            parts = [part for part in run if part in self.parts()]
+            if parts:
+                first = self._place(parts[0], start, payload_end)
+                end = self._place(parts[-1], start, payload_end, after=True)
+                lines += [
+                    f"for (size_t covered = {first}; covered < ({end}); ++covered) {{",
+                    f"    value = {self.prefix}_{key}_update(value, {array}[covered]);",
+                    "}",
+                ]
+        return lines
+
+    def _seed_updates(self, seed: Seed, key: str) -> list[str]:
+        """Statements that update a check value with a seed; ``seeds`` are the bytes of all of a message."""
+        if not self.seeds:  # no messages
+            return ["(void)seeds;"]
+        names = [name.removeprefix(ATTRIBUTE) for name, _ in self.seeds]
+        at = sum(len(data) for _, data in self.seeds[: names.index(seed.attribute)])
+        size = len(self.seeds[names.index(seed.attribute)][1])
+        return [f"value = {self.prefix}_{key}_update(value, seeds[{at + each}]);" for each in range(size)]
+
+    # Several check values, or one before the payload
+
+    @cached_property
+    def algorithms(self) -> Mapping[Checksum, CheckView]:
+        """Each algorithm of the frame, the main one first."""
+        parts = sorted(self.envelope.checks, key=lambda part: part is not self.envelope.check)
+        found = dict.fromkeys(part.check.algorithm for part in parts)
+        if self.envelope.blocks:
+            found[self.envelope.blocks.check.algorithm] = None
+        return {each: render(each, number) for number, each in enumerate(found, 1)}
+
+    @property
+    def values(self) -> list[ValueView]:
+        """The functions that compute check values; none if the only one is computed in passing."""
+        return [self._value(part) for part in self.envelope.filling] if self.alone is None else []
+
+    def _value(self, part: CheckPart) -> ValueView:
+        algorithm = self.algorithms[part.check.algorithm]
+        loops = self._loops(part, algorithm.key, "body", "0", "payload_end")
+        updates = self._empty(part) + self._lead_updates(part, algorithm.key) + loops
+        if not any("payload_end" in line for line in updates):
+            updates.insert(0, "(void)payload_end;")
+        seeded = part in self.envelope.seeded
+        return ValueView(self._function(part), part.name, algorithm, updates, seeded=seeded)
+
+    def _empty(self, part: CheckPart) -> list[str]:
+        """The statement that returns the value where the payload, which alone is covered, is empty."""
+        if part.check.otherwise is None:
+            return []
+        return refusal(
+            f"payload_end == {self.head}U", unsigned(part.check.otherwise, part.check.algorithm.width)
+        )
+
+    @property
+    def blocks(self) -> BlocksView | None:
+        """The check values of the blocks of the payload, None if there are none."""
+        part = self.envelope.blocks
+        if part is None:
+            return None
+        return BlocksView(
+            part.every,
+            part.check.size,
+            self.algorithms[part.check.algorithm],
+            put_check(part.check, "block", 0, "value"),
+            differs(part.check, "block", 0, "value"),
+        )
+
+    def _function(self, part: CheckPart) -> str:
+        return f"{self.prefix}_value_{self.envelope.checks.index(part) + 1}_"
+
+    def fills(self, body: str, end: str, payload_end: str) -> list[str]:
+        """Statements that compute and write the check values of a body; ``end`` is the end of its payload."""
+        lines: list[str] = []
+        for part in self.envelope.filling if self.alone is None else ():
+            place = end if part in self.envelope.back else body
+            lines += self._computed(part, body, payload_end, f"{self.prefix}_seeds_({self.sender.id})")
+            lines += [f"    {line}" for line in put_check(part.check, place, self._at(part), "value")]
+            lines.append("}")
+        return lines
+
+    def judges(self, body: str, end: str, payload_end: str) -> list[str]:
+        """Statements that verify the check values that are not verified before the payload."""
+        if self.alone is not None:
+            return []
+        early = () if isinstance(self.frame.end, ByTerminator) else self.envelope.header_checks
+        seeded = self.envelope.seeded
+        late = [part for part in self.envelope.checks if part not in (*early, *seeded)]
+        lines = [line for part in late for line in self.judge(part, body, end, payload_end)]
+        if seeded:
+            directed = "direction, " if self.directed else ""
+            known = f"{self.prefix}_known_seeds_({directed}{self.number(self.envelope.id)})"
+            lines += ["{", f"    const uint8_t *const seeds = {known};"]
+            lines += indented(refusal("seeds == NULL", f"{self.prefix.upper()}_ERROR_UNKNOWN"))
+            for part in seeded:
+                lines += indented(self.judge(part, body, end, payload_end))
+            lines.append("}")
+        return lines
+
+    def judge(self, part: CheckPart, body: str, end: str, payload_end: str) -> list[str]:
+        """Statements that verify a check value."""
+        place = end if part in self.envelope.back else body
+        test = differs(part.check, place, self._at(part), "value")
+        wrong = refusal(test, f"{self.prefix.upper()}_ERROR_CRC")
+        return [*self._computed(part, body, payload_end), *(f"    {line}" for line in wrong), "}"]
+
+    def _computed(self, part: CheckPart, body: str, payload_end: str, seeds: str = "seeds") -> list[str]:
+        kind = self.algorithms[part.check.algorithm].type
+        more = f", {seeds}" if part in self.envelope.seeded else ""
+        return ["{", f"    const {kind} value = {self._function(part)}({body}, {payload_end}{more});"]
+
+
+def put_check(check: Check, place: str, at: int, value: str) -> list[str]:
+    """Statements that write a check value."""
+    return [
+        f"{place}[{at + index}] = (uint8_t)({_piece(value, chunk.shift, chunk.mask)});"
+        for index, chunk in enumerate(check.value.chunks)
+    ]
+
+
+def differs(check: Check, place: str, at: int, value: str) -> str:
+    """The condition for received check bytes that differ from ``value``."""
+    return any_of(
+        f"{place}[{at + index}] != (uint8_t)({_piece(value, chunk.shift, chunk.mask)})"
+        for index, chunk in enumerate(check.value.chunks)
+    )
+
+
+def _piece(value: str, shift: int, mask: int) -> str:
+    shifted = f"{value} >> {shift}" if shift else value
+    return shifted if mask == 0xFF else f"{grouped(shifted)} & {in_hex(mask)}"

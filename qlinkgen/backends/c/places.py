@@ -1,0 +1,171 @@
+"""The places of the parts of a frame in a buffer, and the numbers in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from qlinkgen.backends.c.layout import Layouts
+from qlinkgen.backends.c.names import unsigned, unsigned_type
+from qlinkgen.model.naming import address_member
+from qlinkgen.plan.framing import Bits, Envelope, FramePlan, Numeric, Part, Slot
+from qlinkgen.plan.transparency import FrameStuffing
+
+
+@dataclass(frozen=True, slots=True)
+class Sender:
+    """Message number, address and values of a frame: their C names and types; "" without them."""
+
+    id: str
+    id_type: str
+    address: str
+    address_type: str
+    values_type: str
+
+    @property
+    def identity(self) -> str:
+        """Message number and address as parameters."""
+        address = f", {self.address_type} {self.address}" if self.address else ""
+        return f"{self.id_type} {self.id}{address}"
+
+    @property
+    def parameters(self) -> str:
+        """All as parameters."""
+        return f"{self.identity}, const {self.values_type} *parts" if self.values_type else self.identity
+
+    @property
+    def arguments(self) -> str:
+        """All as arguments."""
+        parts = ("parts",) if self.values_type else ()
+        return ", ".join((self.id, *((self.address,) if self.address else ()), *parts))
+
+
+def sender_of(frame: FramePlan, prefix: str) -> Sender:
+    """The sender of a frame; names are "id" and that of the address, changed if taken."""
+    envelope = frame.envelope
+    address = address_member(frame.address)
+    address_type = unsigned_type(envelope.address[0].bits if envelope.address else 8)
+    return Sender(
+        address_member(frame.id_name) if address == "id" else "id",
+        unsigned_type(sum(bits.bits for bits in envelope.id) or 8),
+        address,
+        address_type if address else "",
+        f"{prefix}_parts_t" if envelope.values else "",
+    )
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the parts of a frame are in C, and expressions for what they hold.
+
+    A frame without its ``lead``, the constant at its front that is never stuffed, is called a body.
+    """
+
+    prefix: str
+    frame: FramePlan
+    sender: Sender
+    layouts: Layouts
+    #: Names and bytes of the attributes of any message that check values cover.
+    seeds: tuple[tuple[str, bytes], ...] = ()
+    #: A receiver knows the direction.
+    directed: bool = False
+
+    @property
+    def envelope(self) -> Envelope:
+        """Its parts."""
+        return self.frame.envelope
+
+    @property
+    def stuffing(self) -> FrameStuffing | None:
+        """The stuffing of whole frames."""
+        found = self.frame.transparency
+        return found if isinstance(found, FrameStuffing) else None
+
+    @property
+    def lead(self) -> bytes:
+        """The unstuffed constant before the body; b"" if the body is the whole frame."""
+        preamble, stuffing = self.envelope.preamble, self.stuffing
+        return preamble if stuffing and len(preamble) <= stuffing.front else b""
+
+    @property
+    def head(self) -> int:
+        """Size of the header of a body."""
+        return self.envelope.header_size - len(self.lead)
+
+    def parts(self) -> tuple[Part, ...]:
+        """The parts of a body."""
+        return self.envelope.parts[1:] if self.lead else self.envelope.parts
+
+    # Numbers
+
+    def number(self, pieces: tuple[Bits, ...]) -> str:
+        """The message id or address in these pieces of a received frame, 0 if there are none."""
+        kind = unsigned_type(sum(each.bits for each in pieces) or 8)
+        if len(pieces) == 1 and pieces[0].whole:
+            return self.get(pieces[0].part)
+        terms = [shifted(self._piece(each, kind), each.at, kind) for each in pieces]
+        return (f"({kind})({' | '.join(terms)})" if len(terms) > 1 else terms[0]) if terms else "0U"
+
+    def _piece(self, bits: Bits, kind: str) -> str:
+        return f"({kind}){self._taken(self.get(bits.part), bits, whole=bits.whole)}"
+
+    def get(self, part: Numeric, place: str = "") -> str:
+        """The expression for the integer of a part, in a body or after the payload."""
+        place = place or ("end" if part in self.envelope.back else "body")
+        found, mask = self.layouts.get(part.integer, place, str(self._at(part))), part.integer.chunks[0].mask
+        return found if part.size > 1 or mask == 0xFF else f"({found} & {in_hex(mask)})"
+
+    @staticmethod
+    def _taken(found: str, bits: Bits | Slot, *, whole: bool) -> str:
+        """The bits of an integer."""
+        if whole:
+            return found
+        shifted = f"({found} >> {bits.shift})" if bits.shift else found
+        return f"({shifted} & {unsigned((1 << bits.bits) - 1, bits.bits, hexadecimal=True)})"
+
+    # Offsets
+
+    def _front(self) -> tuple[Part, ...]:
+        return self.envelope.front[1:] if self.lead else self.envelope.front
+
+    def _at(self, part: Part) -> int:
+        """Offset of a part in the body, or after the payload."""
+        trailing = part in self.envelope.back
+        return self.envelope.offset(part) - (self.envelope.header_size if trailing else len(self.lead))
+
+    def _place(self, part: Part, start: str, payload_end: str, *, after: bool = False) -> str:
+        if after and part is self.envelope.payload:
+            return payload_end
+        base = payload_end if part in self.envelope.back else start
+        return added(base, self._at(part) + (part.size if after else 0))
+
+
+def shifted(value: str, shift: int, kind: str) -> str:
+    """A value of a type, shifted up."""
+    return f"({kind})({value} << {shift})" if shift else value
+
+
+def any_of(terms: Iterable[str]) -> str:
+    """The disjunction of conditions, "" without conditions."""
+    found = list(terms)
+    return " || ".join(f"({term})" for term in found) if len(found) > 1 else "".join(found)
+
+
+def refusal(test: str, status: str) -> list[str]:
+    """A statement that returns a status if a condition holds."""
+    return [f"if ({test}) {{", f"    return {status};", "}"]
+
+
+def indented(lines: list[str]) -> list[str]:
+    """Lines one level deeper."""
+    return [f"    {line}" for line in lines]
+
+
+def in_hex(byte: int) -> str:
+    """A byte as a constant."""
+    return unsigned(byte, 8, hexadecimal=True)
+
+
+def added(base: str, offset: int) -> str:
+    """An offset after a base, which is "0" or an expression."""
+    return f"{offset}U" if base == "0" else f"{base} + {offset}U" if offset else base
