@@ -251,7 +251,7 @@ class MasterEngine:
             Collision: the echo of the request was changed.
         """
         outcome, self._outcome = self._outcome, None
-        return settled(outcome)
+        return outcome if type(outcome) is Reply else settled(outcome)
 
     def abort(self, now: float) -> None:
         """Give up the pending transaction; an answer that still arrives is a stray."""

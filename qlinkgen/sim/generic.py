@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from qlinkgen.link.codec import Codec, Framed, Message
+from qlinkgen.link.codec import Codec, Command, Framed, Many, Message
 
 #: Name of a rule class of a generated module to its smallest legal value.
 _SMALLEST: Mapping[str, Callable[[Any], object]] = {  # Any: a rule of the module's own, of the class named
@@ -47,19 +47,45 @@ class GenericNode:
             if command.response is not None
         }
 
-    def handle(self, request: Framed, now: float) -> Message | None:  # noqa: ARG002  # the interface of nodes
-        """Return the response to a request; None if the command has none or is unknown."""
+    def handle(
+        self,
+        request: Framed,
+        now: float,  # noqa: ARG002  # the interface of nodes
+    ) -> Message | list[Message] | None:
+        """Return the response or responses to a request; None if the command has none or is unknown."""
         self.requests += 1
         command = self._commands.get(type(request))
         if command is None or command.response is None:
             return None
-        values = dict(self._required[command.response])
-        values.update({name: getattr(request, name) for name in command.echoes})
+        sizes: dict[str, object] = {}
         for name, asked in command.sizes:
-            values |= _items(command.response, name, getattr(request, asked))
-        if address := command.response.ADDRESS:
+            sizes |= _items(command.response, name, getattr(request, asked))
+        if command.many is None:
+            return self._answer(command.response, request, command.echoes, sizes)
+        return self._several(command, command.many, request, sizes)
+
+    def _several(
+        self, command: Command, many: Many, request: Framed, values: dict[str, object]
+    ) -> list[Message]:
+        """Return as few answers as there may be."""
+        assert command.response is not None
+        if many.until is not None:
+            field, first, _ = many.until
+            values = {**values, field: first}
+        count = int(getattr(request, many.counted_by)) if many.counted_by else many.count
+        one = self._answer(command.response, request, command.echoes, values)
+        if many.reply is None:
+            return [one] * (count or 1)
+        return [one, self._answer(many.reply, request, command.replies[many.reply].echoes, {})]
+
+    def _answer(
+        self, kind: type[Message], request: Framed, echoes: Iterable[str], given: Mapping[str, object]
+    ) -> Message:
+        values = dict(self._required.get(kind) or required_values(kind))
+        values |= {name: getattr(request, name) for name in echoes} | dict(given)
+        if address := kind.ADDRESS:
             values[address] = self.number
-        make: Callable[..., Message] = command.response
+        make: Callable[..., Message] = kind
         return make(**values)
 
 

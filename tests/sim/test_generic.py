@@ -7,10 +7,14 @@ from pathlib import Path
 import pytest
 
 from qlinkgen.backends.python import load
+from qlinkgen.link import MasterEngine, Timing
 from qlinkgen.link.codec import address_of, answers
 from qlinkgen.link.slave import SlaveEngine
 from qlinkgen.schema import load as load_schema
+from qlinkgen.schema import loads
+from qlinkgen.sim import VirtualPort, Wire
 from qlinkgen.sim.generic import GenericNode, required_values
+from qlinkgen.transport.blocking import BlockingMaster
 from tests.cli.wire import REPOSITORY
 
 SCHEMAS = [
@@ -31,12 +35,52 @@ def test_every_command(path: Path) -> None:
         response = node.handle(request, 0.0)
         if command.response is None:
             assert response is None
-        else:
+        elif command.many is None:
             assert response is not None
+            assert not isinstance(response, list)
             assert codec.encode(response)
             assert answers(command, request, response)
             assert address_of(response) == number
     assert node.requests == len(codec.COMMANDS)
+
+
+MANY = """\
+qlinkgen: 1
+protocol: {name: log, title: Log, revision: "1", source: Manual}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    length: {type: u8, counts: [data]}
+    data: {role: payload, size: 0..8}
+    crc: {type: u16, algorithm: crc-16/modbus, over: [code, length, data]}
+bus: {kind: master_slave, baud: 9600, response_within: 10 ms}
+defaults: {repeat: safe}
+replies: {end: {id: 0x70, fields: {}, means: done}}
+commands:
+  pair: {id: 1, request: {}, response: {value: u8}, many: {count: 2}}
+  some:
+    id: 2
+    request: {number: {type: u8, range: 1..4}}
+    response: {value: u8}
+    many: {count: request.number}
+  list: {id: 3, request: {}, response: {more: {type: u8, default: 1}, value: u8}, many: {until: {more: 0}}}
+  dump: {id: 4, request: {}, response: {value: u8}, many: {until: end}}
+  scan: {id: 5, request: {}, response: {value: u8}, many: {within: 50 ms}}
+"""
+
+
+def test_a_master_gets_several_answers() -> None:
+    protocol, faults = loads(MANY, "log.yaml")
+    assert protocol is not None, faults
+    codec = load(protocol)
+    wire = Wire(baud=9600)
+    wire.attach(SlaveEngine(codec, GenericNode(codec), baud=9600), "node")
+    master = BlockingMaster(MasterEngine(codec, Timing.of(codec, host_slack=0.002)), VirtualPort(wire))
+    counts = {}
+    for name, command in codec.COMMANDS.items():
+        given = {"number": 3} if name == "some" else {}
+        counts[name] = len(master.transact(command.request(**given)).response)
+    assert counts == {"pair": 2, "some": 3, "list": 1, "dump": 1, "scan": 1}
 
 
 def test_what_it_repeats() -> None:
