@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from qlinkgen.model.frame import Frame, PacketFrame
+from qlinkgen.model.frame import DelimitedFrame, Frame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
 from qlinkgen.model.types import Enum, Float, Scalar
@@ -174,8 +174,9 @@ class ReplyBuilder:
                 yield Case(first, last, means, name)
 
     def _switch(self, name: str, message: Message, path: Path) -> Scalar | None:
-        known = {value.name: value.type for value in message.values if not value.field.conditional}
-        place, needs = (*path, "switch"), ((*path, "switch"), (*path[:-1], "fields"))
+        every = self._frame.values if isinstance(self._frame, DelimitedFrame) else ()
+        known = {value.name: value.type for value in (*every, *message.values) if not value.field.conditional}
+        place, needs = (*path, "switch"), ((*path, "switch"), (*path[:-1], "fields"), ("frame",))
         kind = known.get(name)
         if kind is None:
             hint = did_you_mean(name, known, f"its fields are {listed(known)}")

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from qlinkgen.backends.python import load as load_codec
+from qlinkgen.cli.decode import message_record
 from qlinkgen.errors import BadReply, NoReply, Refused
 from qlinkgen.link import HealthPolicy, MasterEngine, Monitor, Refusal, SlaveEngine, Timing
 from qlinkgen.link.events import Failed, OtherAnswer, Stray
@@ -349,3 +350,45 @@ messages:
         assert run(engine, request, (at + 0.012, ack.to_frame()), now=float(at)).response == ack
     wrong = run(engine, codec.ReadRequest(node=3), (5.012, ack.to_frame()), now=5.0, attempts=1)
     assert isinstance(wrong.error, NoReply)
+
+
+STATUS = """\
+qlinkgen: 1
+protocol: {name: servo, title: Servo, revision: "1", source: Manual}
+enums: {error: {type: u8, values: {none: 0, range: 1, busy: 2}}}
+frame:
+  parts:
+    start: FF FD
+    node: {role: address, type: u8}
+    length: {type: u8, counts: [data]}
+    code: {role: message, type: u8}
+    status: {type: u8, bits: {alert: 7, error: {at: 0..6, type: error}}}
+    data: {role: payload, size: 0..8}
+    crc: {type: u16, algorithm: crc-16/modbus, over: [node, length, code, status, data]}
+bus: {kind: master_slave, nodes: 1..9, baud: 9600, response_within: 10 ms}
+defaults:
+  addressing: node
+  repeat: safe
+  response: {means: {switch: error, cases: {none: done, busy: again}, default: refused}}
+commands:
+  read: {id: 1, request: {}, response: {value: u16}}
+"""
+
+
+def test_a_value_of_the_frame_refuses() -> None:
+    protocol, faults = loads(STATUS, "servo.yaml")
+    assert protocol is not None, faults
+    codec = load_codec(protocol)
+    engine = MasterEngine(codec, Timing.of(codec, host_slack=SLACK))
+
+    def told(error: int) -> bytes:
+        frame: bytes = codec.ReadResponse(node=3, error=error, value=7, alert=True).to_frame()
+        return frame
+
+    request = codec.ReadRequest(node=3)
+    assert run(engine, request, (0.02, told(0))).response.value == 7
+    refused = run(engine, request, (1.02, told(2)), (1.04, told(1)), now=1.0)
+    assert isinstance(refused.error, Refused)
+    assert (refused.error.reason, refused.error.attempts) == ("range", 2)
+    record = message_record(protocol, refused.error.reply)  # type: ignore[arg-type]
+    assert record["refused"] is True
