@@ -212,8 +212,8 @@ def _plain_rules(step: Step, place: Place, scales: Mapping[str, str]) -> list[Ca
             return [Call(place.use("PaddedRule"), [rule.flat, literal(step.pad)]) if step.pad else rule]
         case ItemsStep():
             length, item = step.length, step.number
-            inner = _number_rule(step.name, item, place, scales)
-            if inner.name != "IntRule":
+            if not _is_whole(item):
+                inner = _number_rule(step.name, item, place, scales)
                 return [Call(place.use("ListRule"), [str(length.minimum), str(length.maximum), inner.flat])]
             bounds = (length.minimum, length.maximum, item.minimum, item.maximum)
             return [_rule(place, "ArrayRule", name, *bounds, unit=item.unit)]
@@ -230,6 +230,19 @@ def _record_rule(step: RecordStep | RecordsStep, place: Place) -> Call:
     if isinstance(step, RecordStep):
         return _rule(place, "RecordRule", name, kind)
     return _rule(place, "RecordsRule", name, kind, step.length.minimum, step.length.maximum)
+
+
+def _is_whole(number: Scalar) -> bool:
+    """Whether the value is any whole number in a range."""
+    match number.meaning:
+        case Float():
+            return False
+        case Flags() as flags:
+            return not flags.reserved_zero
+        case Enum() | "bool" | None:
+            return number.scaling is None
+        case _:
+            assert_never(number.meaning)
 
 
 def _member_rules(member: Member, place: Place, scales: Mapping[str, str]) -> list[Call]:
