@@ -42,6 +42,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "msp": ("yamspy", "yamspy"),
     "pelco_d": ("ptz_control_lib", "pyptzcontroller"),
     "ppp": ("yahdlc", "python4yahdlc"),
+    "shdlc": ("sensirion_shdlc_driver", "sensirion-shdlc-driver"),
     "slip": ("sliplib", "sliplib"),
     "ubx": ("pyubx2", "pyubx2"),
     "visca": ("pyvisca", "pyvisca"),
