@@ -671,6 +671,13 @@ class FramePlan:
         return end if end == self.envelope.preamble else b""
 
     @property
+    def lines(self) -> bool:
+        """Whether a frame begins only after a terminator: nothing else tells a part of a frame from one."""
+        end, way = self.end, self.receiver
+        alone = isinstance(end, ByTerminator) and not end.after and end.paired is None
+        return alone and isinstance(way, Rescan) and way.bare and not way.verified
+
+    @property
     def kept(self) -> int:
         """Number of bytes at the end of a frame that may begin the next one.
 

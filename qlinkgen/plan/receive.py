@@ -14,7 +14,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec, Decoded, take_packet
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.ended import frame_reader
-from qlinkgen.plan.framing import ByMark, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.framing import ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, take_marked
 from qlinkgen.plan.tree import Plan
 
@@ -180,6 +180,11 @@ class RescanningReceiver(Receiver):
         self._reader = frame_reader(plan.frame, self.known, direction)
         self._first, self._longest = plan.frame.envelopes[direction].preamble[:1], plan.frame.longest
         self._buffer, self._skipped, self._due = b"", b"", b""
+        end = plan.frame.end
+        #: The terminator if only it may precede a frame.
+        self._line_end = end.part.data if isinstance(end, ByTerminator) and plan.frame.lines else b""
+        #: No frame begins before the next one.
+        self._lost = False
         #: Why the frame that may begin the buffer is not complete.
         self._incomplete = Incomplete()
 
@@ -202,7 +207,7 @@ class RescanningReceiver(Receiver):
                 self._buffer = self._buffer[at:] if at > 0 else b""
                 continue
             try:
-                taken = self._reader.read(self._buffer)
+                taken = self._read()
             except Incomplete as incomplete:
                 if not self.ended:
                     self._incomplete = incomplete.with_traceback(None)
@@ -212,13 +217,21 @@ class RescanningReceiver(Receiver):
                 if no_frame.empty and self._strategy.bare:
                     # The terminator of the bytes skipped so far.
                     yield from self._report(self._start)
-                    self._buffer = self._buffer[no_frame.empty :]
+                    self._buffer, self._lost = self._buffer[no_frame.empty :], False
                 else:
                     yield from self._drop("", b"")
             except BadFrame as bad:
                 yield from self._drop(bad.kind, self._buffer[: bad.end])
             else:
                 yield from self._whole(taken)
+
+    def _read(self) -> Taken:
+        """The frame at the beginning of the buffer."""
+        if self._lost and not self._buffer.startswith(self._line_end):
+            if self._line_end.startswith(self._buffer):
+                raise Incomplete(len(self._buffer) + 1)
+            raise NoFrame("frame", 0)
+        return self._reader.read(self._buffer)
 
     @property
     def _start(self) -> int:
@@ -244,7 +257,7 @@ class RescanningReceiver(Receiver):
             self._skipped += self._buffer[:1]
             if len(self._skipped) == self._longest:
                 yield from self._report(self._start + 1)
-        self._buffer = self._buffer[1:]
+        self._buffer, self._lost = self._buffer[1:], bool(self._line_end)
 
     def _report(self, end: int) -> Iterator[Event]:
         """Report consecutive skipped bytes as one fault."""
@@ -259,7 +272,7 @@ class RescanningReceiver(Receiver):
             self._buffer = self._buffer[1:]
         yield from self._scan()
         yield from self._report(self.taken)
-        self._buffer, self._due, self._incomplete = b"", b"", Incomplete()
+        self._buffer, self._due, self._incomplete, self._lost = b"", b"", Incomplete(), False
 
 
 class MarkReceiver(Receiver):

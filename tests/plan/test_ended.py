@@ -153,3 +153,31 @@ def test_intact_frames_after_corruption_are_delivered(text: str) -> None:
         events = receiver(codec.plan, "request").run(stream)
         found = {event.offset for event in events if event.kind == "message"}
         assert found >= set(intact), stream.hex(" ")
+
+
+LINE = _SCHEMA.format(
+    parts=_BARE + "    end: {role: terminator, value: 0D 0A}", coding="  coding: {digits: hex}"
+)
+
+
+@pytest.mark.parametrize(
+    ("stream", "found"),
+    [
+        (b"0103000100020103\r\n", [("frame", 0)]),
+        (b"FF0103006B0003\r\n0103006B0003\r\n", [("frame", 0), ("message", 16)]),
+        (b"\r0103006B0003\r\n0103006B0003\r\n", [("frame", 0), ("message", 15)]),
+        (b"\r\n0103006B0003\r\n", [("message", 2)]),
+        (b"0" * 60 + b"0103006B0003\r\n", [("frame", 0), ("frame", 46)]),
+    ],
+)
+def test_without_check_and_beginning_a_frame_begins_after_a_terminator(
+    stream: bytes, found: list[tuple[str, int]]
+) -> None:
+    made = plan(LINE)
+    assert made.frame.lines
+    events = receiver(made, "request").run(stream)
+    assert [(event.kind, event.offset) for event in events] == found
+
+
+def test_only_such_frames_wait_for_a_terminator() -> None:
+    assert not any(plan(text).frame.lines for text in FRAMES.values())

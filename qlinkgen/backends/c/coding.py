@@ -42,6 +42,8 @@ class EndedView:
         limit: maximum size of a frame up to its terminator.
         matches: condition for the terminator at offset ``stop``; at ``first`` of a receiver.
         last: its last byte.
+        lines: a frame begins only after a terminator.
+        partial: condition for bytes of a receiver that may begin it.
         step: number of bytes to the next place where it may be.
         kept: number of its bytes that may begin the next frame.
         flag: its size if it also begins frames, otherwise 0.
@@ -57,6 +59,8 @@ class EndedView:
     matches: str
     matches_first: str
     last: str
+    lines: bool
+    partial: str
     step: str
     kept: int
     flag: int

@@ -435,6 +435,11 @@ def _ended(writer: PartWriter, end: ByTerminator, directed: str) -> EndedView:
         matches=_matches("wire[stop{}]", data),
         matches_first=_matches("(receiver->wire[receiver->first{}]", data, ")"),
         last=in_hex(data[-1]),
+        lines=writer.frame.lines,
+        partial=" || ".join(
+            f"((waiting == {size}U) && {_matches('(receiver->wire[receiver->first{}]', data[:size], ')')})"
+            for size in range(1, len(data))
+        ),
         step=f"(wire[stop] == {in_hex(data[0])}) ? 2U : 1U" if end.paired is not None else "",
         kept=writer.frame.kept,
         flag=len(writer.frame.flag),

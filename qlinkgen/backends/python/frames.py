@@ -178,6 +178,7 @@ class EndedView:
         back: number of uncoded bytes at the end.
         splits: uncoded bytes are not only the first constant and the terminator.
         least: minimum size of a payload.
+        lines: a frame begins only after a terminator.
         flag: the terminator is also the beginning of a frame.
         checks: conditions for wrong bytes, and the kind of fault.
         coding: None if bytes are sent as they are.
@@ -195,6 +196,7 @@ class EndedView:
     back: int
     splits: bool
     least: int
+    lines: bool
     flag: bool
     checks: Sequence[tuple[str, str]]
     coding: CodingView | None
@@ -652,6 +654,7 @@ def _ended(plan: Plan, end: ByTerminator, *, bare: bool) -> EndedView:
         back=coded.back,
         splits=(coded.front, coded.back) != (lead, closing),
         least=envelope.payload.least,
+        lines=plan.frame.lines,
         flag=bool(plan.frame.flag),
         checks=list(_ended_checks(envelope, bare=bare)),
         coding=coding_view(coded.stages) if coded.stages else None,

@@ -204,7 +204,7 @@ class Frame:
         while stop + len(end) <= limit and wire[stop : stop + len(end)] != end:
             if stop + len(end) > len(wire):
                 raise NeedMore
-            stop += 2 if self._begins_pair(wire[stop]) else 1
+            stop += 2 if self.begins_pair(wire[stop]) else 1
         if stop + len(end) > limit:
             raise Refused("length", limit)
         if stop == len(lead):
@@ -215,7 +215,7 @@ class Frame:
         kept = len(end) if end == lead and not after else 0
         return Cut(self._opened(wire[:size]), size, pending=False, kept=kept)
 
-    def _begins_pair(self, byte: int) -> bool:
+    def begins_pair(self, byte: int) -> bool:
         """Whether a byte begins a pair of coded bytes, and the terminator."""
         assert self.terminator
         if not self.codings or len(self.terminator.constant) < 2 or self.terminator.constant[0] != byte:

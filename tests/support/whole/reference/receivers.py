@@ -162,6 +162,7 @@ class Searcher(Receiver):
         self.frame, self.splitter = frame, Splitter(frame, known)
         self.buffer, self.start, self.skipped = b"", 0, b""
         self.swallow, self.ended = False, False
+        self.lost = False
         self.needed = 0
 
     def whole(self, wire: bytes) -> Event:
@@ -213,12 +214,21 @@ class Searcher(Receiver):
                 if refused.kind == "empty" and self.frame.bare:
                     yield from self._report()
                     self._advance(refused.size)
+                    self.lost = False
                 else:
                     yield from self._drop(refused)
             else:
                 yield from self._report()
                 yield event
                 self._advance(size)
+
+    def _line_end(self) -> bytes:
+        """The terminator, if a frame can begin only after it."""
+        end, frame = self.frame.terminator, self.frame
+        if end is None or not frame.bare or frame.checks or frame.parts[-1] is not end:
+            return b""
+        paired = len(end.constant) > 1 and frame.begins_pair(end.constant[0])
+        return b"" if paired else end.constant
 
     def _flag(self) -> bytes:
         """The bytes that end a frame, if they also begin one."""
@@ -234,6 +244,7 @@ class Searcher(Receiver):
         elif refused.told:
             yield Event(refused.kind, self.at, self.start, self.buffer[: refused.size])
         self._advance(1)
+        self.lost = bool(self._line_end())
         if len(self.skipped) == self.frame.longest:
             yield from self._report()
 
@@ -244,6 +255,10 @@ class Searcher(Receiver):
         self.skipped = b""
 
     def _attempt(self) -> tuple[Event, int, bool]:
+        if self.lost and not self.buffer.startswith(self._line_end()):
+            if self._line_end().startswith(self.buffer):
+                raise NeedMore
+            raise Refused("unknown")
         cut = self.splitter.split(self.buffer)
         event = self._event(cut, self._plain(cut))
         unproven = not (self.frame.checks or self.frame.blocks) or (
