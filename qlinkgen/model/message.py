@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from qlinkgen.model.fields import Field, Value, docs_of, values_of
+from qlinkgen.model.fields import Field, Value, docs_of, greatest_size, values_of
 from qlinkgen.model.texts import Text
 
 __all__ = ["Direction", "Field", "Message", "Value"]
@@ -63,7 +63,7 @@ class Message:
     @cached_property
     def max_size(self) -> int:
         """Maximum size of the payload."""
-        return sum(field.max_size for field in self.fields)
+        return greatest_size(self.fields)
 
     @property
     def fixed(self) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import assert_never
 
 from qlinkgen.model.condition import Test
-from qlinkgen.model.fields import Field, FieldType, Layout, Record, Records
+from qlinkgen.model.fields import Field, FieldType, Layout, Record, Records, greatest_size
 from qlinkgen.model.integer import BitOrder, Integer
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import (
@@ -576,7 +576,7 @@ class _Planner:
             sizing=(),
             size=Size(),
             least=sum(field.min_size for field in self._all),
-            most=sum(field.max_size for field in self._all),
+            most=greatest_size(self._all),
             empty_is_default=False,
             segments=segments,
         )
@@ -605,7 +605,9 @@ class _Planner:
         kind = field.type
         if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
             return Segment((step,), presence, field.max_size)
-        return Segment((step,), presence, None, None if kind.length.counted_by else _size_of(after))
+        # A field after the rest that may be absent is absent where the rest is present.
+        always = tuple(each for each in after if not each.conditional)
+        return Segment((step,), presence, None, None if kind.length.counted_by else _size_of(always))
 
     def _step(self, field: Field, place: Place) -> Step:
         kind = field.type

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from qlinkgen.model.condition import Condition, Test
+from qlinkgen.model.condition import Condition, Test, exclusive
 from qlinkgen.model.fields import Field, Records, Value, values_of
 from qlinkgen.model.types import Array, Blob, Count, Enum, Float, Scalar
 from qlinkgen.schema.file_model import Fields
@@ -122,7 +122,8 @@ class ConditionBuilder:
                 )
         if not _is_run(field) or counts:
             return
-        if not field.optional and (later := next((each for each in after if each.conditional), None)):
+        crossing = (each for each in after if each.conditional and not exclusive(field.when, each.when))
+        if not field.optional and (later := next(crossing, None)):
             what = f"{field.name} takes the rest of the payload, but {later.name} after it may be absent"
             self._error(
                 later.name, "optional" if later.optional else "if", what, f"give {field.name} a count"

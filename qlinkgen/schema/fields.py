@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from qlinkgen.model.fields import Field, FieldType, Records
+from qlinkgen.model.condition import exclusive
+from qlinkgen.model.fields import Field, FieldType, Records, greatest_size
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.counted import with_counts
@@ -115,12 +116,17 @@ class FieldBuilder:
 
     def _check_open_ends(self, fields: Sequence[Field], path: Path) -> None:
         self._check_packed(fields, path)
-        open_ends = [field.name for field in fields if is_open(field)]
+        open_fields = [field for field in fields if is_open(field)]
+        open_ends = [field.name for field in open_fields]
         # An integer with an error may be the count of one of them.
         counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
-        for name in open_ends[1:]:
-            what = f"{name} and {open_ends[0]} both take the rest of the payload"
-            needs = ((*path, name), (*path, open_ends[0]))
+        for index, field in enumerate(open_fields):
+            earlier = (each for each in open_fields[:index] if not exclusive(each.when, field.when))
+            other, name = next(earlier, None), field.name
+            if other is None:
+                continue
+            what = f"{name} and {other.name} both take the rest of the payload"
+            needs = ((*path, name), (*path, other.name))
             hint = "give one of them a count, or a fixed size"
             self._report.error(
                 "two-open-ends", (*path, name), what, hint, of_key=True, needs=(*needs, *counts)
@@ -160,12 +166,19 @@ class FieldBuilder:
     def _bounded(self, fields: Sequence[Field], path: Path) -> list[Field]:
         """The fields; those without a bound are limited to the rest of the payload."""
         unbounded = {field.name for field in fields if (*path, field.name) in self._types.unbounded}
-        room = self._payload_max - sum(field.max_size for field in fields if field.name not in unbounded)
+        bounded = [field for field in fields if field.name not in unbounded]
         counters = {field.name: field.type for field in fields if isinstance(field.type, Scalar)}
         return [
-            self._filled(field, room, counters, path) if field.name in unbounded else field
+            self._filled(field, self._room(field, bounded), counters, path)
+            if field.name in unbounded
+            else field
             for field in fields
         ]
+
+    def _room(self, field: Field, bounded: Sequence[Field]) -> int:
+        """What the fields that may be present along with a field leave of the payload."""
+        beside = [each for each in bounded if not exclusive(each.when, field.when)]
+        return self._payload_max - greatest_size(beside)
 
     def _filled(self, field: Field, room: int, counters: Mapping[str, Scalar], path: Path) -> Field:
         kind, place = field.type, (*path, field.name)

@@ -138,7 +138,7 @@ _ALL = (
         "A field that may be absent depends on earlier values, or is at the end of the payload.",
         "Receivers decide field by field whether it is present: an earlier field that is always present has "
         "a value for it, or the payload ends before it. Fields after one that takes the rest are always "
-        "present, and a count has the condition of the field that it counts.",
+        "present, or absent wherever it is present. A count has the condition of the field that it counts.",
     ),
     Rule(
         "bad-record",

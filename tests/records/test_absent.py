@@ -45,6 +45,15 @@ commands:
     id: 2
     request: {}
     response: {kind: u8, words: {type: "u16[0..9]", if: {kind: 1..3}}, end: u8}
+  tell:
+    id: 3
+    request: {}
+    response:
+      kind: u8
+      words: {type: "u16[0..100]", if: {kind: 1..3}}
+      note: {type: text, if: {kind: 4}}
+      more: {type: u16, if: {kind: [5, 7..9]}}
+      tail: u8
 """
 ABSENT: dict[str, Raw] = {"mode": 0, "more": 0, "level": 2, "seconds": None, "points": None, "end": 9}
 PRESENT: dict[str, Raw] = {"mode": 2, "more": 1, "level": 0, "seconds": 3, "points": [7, 8], "end": 9}
@@ -131,6 +140,32 @@ def test_a_rest_may_be_absent(payload: str, words: list[int] | None) -> None:
     assert construct.live(protocol()).payload("log.response", values) == data
     with pytest.raises(BadContent):
         unpack(plan, b"\0" + data)
+
+
+@pytest.mark.parametrize(
+    ("payload", "values"),
+    [
+        ("00 09", {"words": None, "note": None, "more": None}),
+        ("01 0200 09", {"words": [2], "note": None, "more": None}),
+        ("04 41 42 09", {"words": None, "note": "AB", "more": None}),
+        ("05 0300 09", {"words": None, "note": None, "more": 3}),
+    ],
+)
+def test_kinds_of_a_payload_may_have_a_rest_each(payload: str, values: dict[str, Any]) -> None:
+    data, plan = bytes.fromhex(payload), plan_of(protocol()).message("tell.response").payload
+    values = {"kind": data[0], **values, "tail": 9}
+    assert module().TellResponse.from_bytes(data) == module().TellResponse(**values)
+    assert module().TellResponse(**values).to_bytes() == data
+    raw = {**values, "note": values["note"] and values["note"].encode()}
+    assert unpack(plan, data) == raw
+    assert pack(plan, raw) == data
+    assert construct.live(protocol()).payload("tell.response", values) == data
+
+
+def test_fields_that_exclude_each_other_share_the_room() -> None:
+    message = plan_of(protocol()).message("tell.response")
+    assert message.payload.most == 256
+    assert [run.length.maximum for run in message.payload.runs] == [100, 254]
 
 
 def test_the_size_follows_from_what_has_been_received() -> None:

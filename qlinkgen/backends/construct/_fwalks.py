@@ -164,9 +164,11 @@ class Walked(Message):
         run = self.runs.get(field.name)
         if run is None or field.name in counts:
             return
+        # A field after the rest that may be absent is absent where the rest is present.
         after = self.fields[self.fields.index(field) + 1 :]
+        always = (each for each in after if each.name not in self.presence)
         number, odd = divmod(
-            left - sum(self._size(each, counts) for each in after), run.size
+            left - sum(self._size(each, counts) for each in always), run.size
         )
         if odd:
             raise RangeError(

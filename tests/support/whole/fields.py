@@ -170,7 +170,7 @@ class FieldMaker:
         if self.shape.word > 1:
             self._fill_words(made, taken)
         if not fixed and not room.least and self.rng.random() < self.conditional:
-            self._add_conditions(made, set(begun or {}))
+            self._add_conditions(made, set(begun or {}), taken)
         self._name_sizes(made)
         return dict(made)
 
@@ -189,7 +189,7 @@ class FieldMaker:
             specs[name] = {**spec, "type": f"{base}[{counts[0]}]"}
         made[:] = list(specs.items())
 
-    def _add_conditions(self, made: list[tuple[str, Any]], kept: set[str]) -> None:
+    def _add_conditions(self, made: list[tuple[str, Any]], kept: set[str], taken: set[str]) -> None:
         """Conditions on some fields, and optional fields at the end; `kept` fields stay as they are."""
         rng = self.rng
         opened = next((at for at, (_, each) in enumerate(made) if self._is_open(each, made)), len(made))
@@ -219,6 +219,23 @@ class FieldMaker:
                 break
             specs[name]["optional"] = True
         made[:] = [(name, specs[name] if len(specs[name]) > 1 else spec) for name, spec in made]
+        if opened < len(made):
+            self._add_other_rest(made, opened, taken)
+
+    def _add_other_rest(self, made: list[tuple[str, Any]], opened: int, taken: set[str]) -> None:
+        """Another field that takes the rest, where the first one is absent."""
+        rest = made[opened][1]
+        when = rest.get("if") if isinstance(rest, dict) else None
+        if not isinstance(when, dict) or self.shape.groups or self.shape.word > 1 or self.rng.random() < 0.3:
+            return
+        ref, wanted = next(iter(when.items()))
+        if isinstance(wanted, list):
+            return
+        reverse = not wanted if isinstance(wanted, bool) else f"not {wanted}"
+        reverse = reverse.removeprefix("not not ") if isinstance(reverse, str) else reverse
+        most = rest["type"].partition("..")[2].rstrip("]") or "1"
+        name = self.words.name(taken)
+        made.insert(opened + 1, (name, {"type": f"bytes[0..{most}]", "if": {ref: reverse}}))
 
     def _tests(self, name: str, specs: dict[str, Doc]) -> list[Any]:
         """A condition on a field, or on some of its bits."""

@@ -173,6 +173,10 @@ Kind = Number | Run | Packed | Record | Records
 Value = Number | Run | Record | Records
 
 
+#: A test of an earlier value: its name, ranges, whether they are excluded.
+Test = tuple[str, tuple[tuple[int, int], ...], bool]
+
+
 @dataclass(frozen=True, slots=True)
 class Slot:
     """A field."""
@@ -183,7 +187,7 @@ class Slot:
     counts: str = ""
     counts_in: str = "items"
     #: Tests of earlier values: name, ranges, whether they are excluded.
-    when: tuple[tuple[str, tuple[tuple[int, int], ...], bool], ...] = ()
+    when: tuple[Test, ...] = ()
     optional: bool = False
     #: A new message has it.
     given: bool = True
@@ -213,6 +217,33 @@ class Slot:
         """Maximum size on the wire; 0 for a run without a bound."""
         kind = self.kind
         return kind.bytes_of(kind.high or 0) if isinstance(kind, Run | Records) else size_of(kind)
+
+
+def most_bytes(slots: Iterable[Slot], along: Slot | None = None) -> int:
+    """Maximum size of slots, of those that may be present `along` with another one."""
+    kept = [slot for slot in slots if along is None or not _apart(slot, along)]
+    size = sum(slot.most_bytes for slot in kept if not slot.when)
+    for name in {slot.when[0][0] for slot in kept if slot.when}:
+        group = [slot for slot in kept if slot.when and slot.when[0][0] == name]
+        ends = [
+            end for slot in group for low, high in slot.when[0][1] for end in (low - 1, low, high, high + 1)
+        ]
+        size += max(sum(slot.most_bytes for slot in group if _met(slot.when[0], end)) for end in ends)
+    return size
+
+
+def _met(test: Test, number: int) -> bool:
+    return any(low <= number <= high for low, high in test[1]) != test[2]
+
+
+def _apart(one: Slot, other: Slot) -> bool:
+    """Whether two slots are never present together."""
+    for first in one.when:
+        for second in other.when:
+            ends = [end for low, high in (*first[1], *second[1]) for end in (low - 1, low, high, high + 1)]
+            if first[0] == second[0] and not any(_met(first, end) and _met(second, end) for end in ends):
+                return True
+    return False
 
 
 def size_of(kind: Number | Packed | Record) -> int:
@@ -257,7 +288,7 @@ class Message:
     def sizes(self) -> tuple[int, int]:
         """Minimum and maximum size of the payload."""
         always = [slot for slot in self.slots if not slot.conditional]
-        return sum(slot.least_bytes for slot in always), sum(slot.most_bytes for slot in self.slots)
+        return sum(slot.least_bytes for slot in always), most_bytes(self.slots)
 
     def allows(self, address: int) -> bool:
         """Whether the address is legal for the message."""
@@ -364,9 +395,14 @@ class Fields:
     def build(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
         """The fields of one message."""
         slots = self._slots(fields)
-        room = self._most - sum(slot.most_bytes for slot in slots)
         counts = {slot.counts: slot for slot in slots[::-1] if slot.counts}
-        return tuple(_bounded(slot, room, counts.get(slot.name)) for slot in slots)
+        bounded = [
+            slot for slot in slots if not isinstance(slot.kind, Run | Records) or slot.kind.high is not None
+        ]
+        return tuple(
+            _bounded(slot, self._most - most_bytes(bounded, along=slot), counts.get(slot.name))
+            for slot in slots
+        )
 
     def _slots(self, fields: Mapping[str, Any]) -> tuple[Slot, ...]:
         slots: list[Slot] = []

@@ -205,7 +205,7 @@ def _walked(message: Message, payload: bytes) -> dict[str, Raw]:
         sizes = [_size(slot, counted) for slot in segment]
         if sizes == [None]:
             behind = message.slots[message.slots.index(first) + 1 :]
-            sizes = [left - _behind(behind, counted)]
+            sizes = [left - _behind([slot for slot in behind if not slot.conditional], counted)]
             _demand(first.kind, sizes[0] or 0)
         if sum(size or 0 for size in sizes) > left:
             raise Wrong("length", first.name)
