@@ -253,7 +253,8 @@ class FieldMaker:
             number = self.enums[kind]["values"][members[-1]]
             return [self.rng.choice(({name: members[0]}, {name: f"not {members[0]}"}, {name: members[:2]},
                                      {name: number}))]  # fmt: skip
-        return [self._test(name, *_limits(kind))] if kind[:1] in "ui" and kind[1:].isdigit() else []
+        plain = kind[:1] in "ui" and kind[1:].isdigit() and int(kind[1:]) <= 64
+        return [self._test(name, *_limits(kind))] if plain else []
 
     @staticmethod
     def _bit_limits(spec: int | str) -> tuple[int, int]:
