@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import assert_never
 
@@ -38,6 +38,8 @@ class Right:
     payload: bytes
     wire: bytes
     request: bytes = b""
+    #: Values of the frame, raw, by name.
+    beside: Mapping[str, int] = field(default_factory=dict)
     #: It is decoded but never sent.
     decode_only: bool = False
     #: Source of a vector worked out by hand.
@@ -99,15 +101,17 @@ def _right(plan: Plan, header: Header, entry: JsonObject) -> Right:
     planned = plan.by_name[entry["message"]]
     message = planned.message
     kinds = tuple(kind for kind in entry.get("kinds", ()) if kind != "example")
+    beside = _beside(plan, entry)
     return Right(
         message=message,
         kinds=kinds,
         address=entry.get(record_key(plan.frame.address), message.default_address),
-        values=_beside(plan, header, entry)
+        values=_numbers(plan, header, beside)
         + _values(header, message.values, planned.payload, entry["fields"], entry.get("raw", {})),
         payload=bytes.fromhex(entry["payload"]),
         wire=bytes.fromhex(entry["wire"]),
         request=bytes.fromhex(entry.get("request", "")),
+        beside=beside,
         decode_only=entry.get("decode_only", False),
         source="" if kinds else _source(entry) or "an example of the document",
     )
@@ -147,15 +151,21 @@ def presences(held: Sequence[Holder]) -> dict[str, Presence]:
     return found
 
 
-def _beside(plan: Plan, header: Header, entry: JsonObject) -> bytes:
-    """The values of the frame."""
-    found = b""
+def _beside(plan: Plan, entry: JsonObject) -> dict[str, int]:
+    """The values of the frame by name, raw."""
+    found: dict[str, int] = {}
     members = {member.name: member for _, member in plan.frame.envelope.values}
     for value in plan.protocol.frame_values:
-        number, key = members[value.name].number, record_key(value.name)
+        key = record_key(value.name)
         native = from_json(value, entry[key]) if key in entry else default_of(value)
-        found += number_bytes(raw_number(value.name, number, native), header.width(number))
+        found[value.name] = raw_number(value.name, members[value.name].number, native)
     return found
+
+
+def _numbers(plan: Plan, header: Header, beside: Mapping[str, int]) -> bytes:
+    """The values of the frame as a vector has them."""
+    members = {member.name: member for _, member in plan.frame.envelope.values}
+    return b"".join(number_bytes(raw, header.width(members[name].number)) for name, raw in beside.items())
 
 
 def most_values(header: Header, holders: Sequence[Holder]) -> int:

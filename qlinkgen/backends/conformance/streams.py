@@ -103,6 +103,6 @@ def _heard(
 def _same(intact: Sequence[Decoded], due: Sequence[Right]) -> bool:
     return len(intact) == len(due) and all(
         (heard.message.name, heard.address or 0) == (row.message.name, row.address)
-        and (row.decode_only or heard.payload == row.payload)
+        and (row.decode_only or (heard.payload == row.payload and heard.beside.items() >= row.beside.items()))
         for heard, row in zip(intact, due, strict=True)
     )
