@@ -8,6 +8,8 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import pytest
+
 from qlinkgen.link import SlaveEngine
 from qlinkgen.transport import PtyPort, open_pty
 from qlinkgen.transport.serving import serve
@@ -138,3 +140,25 @@ def test_yamspy_reads_a_flight_controller() -> None:
         finally:
             master.conn.close()
     assert outputs == [*range(1000, 1800, 100)]
+
+
+def test_sensirion_driver_reads_a_sensor() -> None:
+    peer("shdlc")
+    from sensirion_shdlc_driver import ShdlcConnection, ShdlcDevice, ShdlcSerialPort
+    from sensirion_shdlc_driver.errors import ShdlcDeviceError
+
+    codec: Any = described("shdlc").module
+
+    def sensor(request: Any) -> Any:
+        match request:
+            case codec.InformationRequest(kind=3):
+                return codec.InformationResponse(node=0, error=0, device=False, text="0123456789ABCDEF\0")
+            case codec.ResetRequest():
+                return codec.ResetResponse(node=0, error=67, device=False)
+        return None
+
+    with serving("shdlc", 0, sensor) as pty, ShdlcSerialPort(pty.path, 115200, PATIENCE) as port:
+        device = ShdlcDevice(ShdlcConnection(port), 0)
+        assert device.get_serial_number() == "0123456789ABCDEF"
+        with pytest.raises(ShdlcDeviceError):
+            device.device_reset()
