@@ -76,6 +76,7 @@ class CommandBuilder:
             self._singles[name] = self._build.single(name, message)
         for name, spec in self._file.commands.items():
             self._command(name, spec, ("commands", name))
+        self._replies.check_meant()
         self.messages += self._singles.values()
         if not self._file.commands and not self._file.messages:
             what = "the protocol has no commands and no messages"

@@ -703,6 +703,15 @@ class MessageSpec(Fact, Lifetime):
     direction: Literal["request", "response"] | None = Field(
         default=None, description="Direction of the message; default: any node sends it"
     )
+    means: Annotated[MeansSpec, ShortForm("default", "string")] | None = Field(
+        default=None, description="What it means as a response, if one of its fields may refuse the request"
+    )
+    within: Time | None = Field(
+        default=None, description="Time from a pending answer to the last one; default: that of the response"
+    )
+    after: Time | None = Field(
+        default=None, description="Pause before the request is sent again; default: none"
+    )
     examples: list[ExampleSpec] = Field(default_factory=list, description="Frames of the source document")
     attributes: dict[str, Label] = Field(default_factory=dict, description="Values of declared attributes")
 

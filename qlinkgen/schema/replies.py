@@ -9,7 +9,7 @@ from qlinkgen.model.frame import DelimitedFrame, Frame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
 from qlinkgen.model.types import Enum, Float, Scalar
-from qlinkgen.schema.file_model import AnswerSpec, Means, MeansSpec, ReplySpec, SchemaFile
+from qlinkgen.schema.file_model import AnswerSpec, Means, MeansSpec, MessageSpec, ReplySpec, SchemaFile
 from qlinkgen.schema.messages import MessageBuilder, Written
 from qlinkgen.schema.notation import AnswerId, Duration, shown, whole_range
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
@@ -84,6 +84,8 @@ class ReplyBuilder:
         self._messages = messages
         self._frame = frame
         self._shared: dict[str, Message] = {}
+        #: Places whose meaning a command uses.
+        self._meant: set[Path] = set()
 
     def check_names(self) -> None:
         """Report replies called like one of the other messages of a command."""
@@ -130,13 +132,31 @@ class ReplyBuilder:
 
     def outcome(self, command: str, response: Message | None) -> Reply | None:
         """What the response of a command means, None if it always answers the request."""
+        if response is None:
+            return None
         own, common = self._file.commands[command].response, self._file.defaults.response
-        for spec, path in ((own, ("commands", command, "response")), (common, ("defaults", "response"))):
-            if isinstance(spec, AnswerSpec) and spec.means is not None and response is not None:
+        stated: list[tuple[object, Path]] = [
+            (own, ("commands", command, "response")),
+            (self._file.messages.get(response.name), ("messages", response.name)),
+            (common, ("defaults", "response")),
+        ]
+        for spec, path in stated:
+            if isinstance(spec, AnswerSpec | MessageSpec) and spec.means is not None:
+                self._meant.add(path)
                 means = _Meaning(spec.means, "done", spec.within, spec.after)
                 found = self._reply("response", response, means, path)
                 return found if found.meanings != ("done",) else None
         return None
+
+    def check_meant(self) -> None:
+        """Report meanings of messages that are not responses."""
+        for name, spec in self._file.messages.items():
+            path = ("messages", name)
+            if spec.means is not None and path not in self._meant:
+                what = f"means has no effect: {name} is not the response of a command"
+                needs = ((*path, "means"), ("commands",), ("defaults",))
+                hint = "remove it, or let a command name it as its response"
+                self._report.error(_RULE, (*path, "means"), what, hint, of_key=True, needs=needs)
 
     def _reply(self, name: str, message: Message, meaning: _Meaning, path: Path) -> Reply:
         """The reply that a message is."""

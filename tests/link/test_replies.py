@@ -337,7 +337,7 @@ def test_commands_that_share_a_response() -> None:
   set: {id: 2, request: {value: u16}, response: ack}
   reset: {id: 3, request: {}, response: ack, addressing: node}
 messages:
-  ack: {id: 6, direction: response, fields: {state: u8}}
+  ack: {id: 6, direction: response, fields: {state: u8}, means: {switch: state, cases: {1: refused}}}
 """
     text = SIZED[: SIZED.index("  read:")] + commands
     protocol, faults = loads(text, "log.yaml")
@@ -348,6 +348,10 @@ messages:
     ack = codec.Ack(node=3, state=9)
     for at, request in enumerate((codec.SetRequest(node=3, value=1), codec.ResetRequest(node=3))):
         assert run(engine, request, (at + 0.012, ack.to_frame()), now=float(at)).response == ack
+    refusal = codec.Ack(node=3, state=1).to_frame()
+    refused = run(engine, codec.ResetRequest(node=3), (3.012, refusal), now=3.0)
+    assert isinstance(refused.error, Refused)
+    assert refused.error.reason == "1"
     wrong = run(engine, codec.ReadRequest(node=3), (5.012, ack.to_frame()), now=5.0, attempts=1)
     assert isinstance(wrong.error, NoReply)
 
