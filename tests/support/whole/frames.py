@@ -304,10 +304,7 @@ class _Parts:
         spec |= _order(rng) | self._start(width)
         if covered == [names["payload"]] and self._chance(0.5):
             spec["otherwise"] = rng.randrange(1 << width)
-        if width == 16 and not whole and self._chance(0.15):
-            spec["sent"] = rng.choice(
-                (["0..6", "8..14"], ["8..15"], ["0..3", "4..7", "8..11", "12..15"], ["7..14", "0..6"])
-            )
+        spec |= self._sent(width) if not whole else {}
         if not whole and "otherwise" not in spec:
             self._seeded(spec)
         names["checksum"] = self._add("crc", spec)
@@ -323,6 +320,13 @@ class _Parts:
             )
             spec["over"] = over
         return spec
+
+    def _sent(self, width: int) -> Doc:
+        """The bits of a check value that are sent, if not all."""
+        if width != 16 or not self._chance(0.15):
+            return {}
+        every = (["0..6", "8..14"], ["8..15"], ["0..3", "4..7", "8..11", "12..15"], ["7..14", "0..6"])
+        return {"sent": self.rng.choice(every)}
 
     def _start(self, width: int) -> Doc:
         return {"init": self.rng.randrange(1 << width)} if self._chance(0.15) else {}
@@ -342,7 +346,9 @@ class _Parts:
             "algorithm": algorithm,
             "over": [names["payload"]],
         }
-        return self._add("blocks", {**spec, "every": every, **_order(rng), **self._start(width)})
+        return self._add(
+            "blocks", {**spec, "every": every, **_order(rng), **self._start(width), **self._sent(width)}
+        )
 
     def _also_checked(self, names: Doc) -> None:
         """One more check value at any place, often in the header and over it alone."""
@@ -352,7 +358,7 @@ class _Parts:
         covered = front if front and self._chance(0.5) else self._coverable(names)
         covered = [name for name in covered if rng.random() < 0.7] or covered[:1]
         spec: Doc = {"role": "checksum", "type": _WIDTHS[width], "algorithm": algorithm, "over": covered}
-        name = self._add("head", self._seeded(spec) | _order(rng) | self._start(width))
+        name = self._add("head", self._seeded(spec) | _order(rng) | self._start(width) | self._sent(width))
         least = 1 if "lead" in names else 0
         place = rng.randint(least, len(front) if self._chance(0.7) else len(others))
         if "blocks" in names and others[place : place + 1] == [names["blocks"]]:
