@@ -124,7 +124,7 @@ class FlagsSpec(Fact):
     )
 
 
-class BitSpec(_Mapping):
+class BitSpec(Lifetime):
     """Consecutive bits of an integer."""
 
     at: WholeRange = Field(description="Bit, or first..last bit; 0 is the least significant")

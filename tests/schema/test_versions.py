@@ -141,3 +141,12 @@ def test_records_come_and_go() -> None:
         protocol, faults = loads(text, "probe.yaml", version=chosen)
         assert protocol, faults
         assert ("pair" in [field.name for field in protocol.message("put").fields]) is there
+
+
+def test_bits_come_and_go() -> None:
+    head = "{type: u8, bits: {a: {at: 0, until: 1}, b: {at: 1, since: 2}, c: 2}}"
+    text = SCHEMA.format(more="").replace("pair: pair", f"pair: pair\n      head: {head}")
+    for chosen, names in (("1", "ac"), ("1.5", "c"), ("2", "bc")):
+        protocol, faults = loads(text, "probe.yaml", version=chosen)
+        assert protocol, faults
+        assert "".join(value.name for value in protocol.message("put").values if value.bits) == names

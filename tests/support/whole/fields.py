@@ -172,7 +172,20 @@ class FieldMaker:
         if not fixed and not room.least and self.rng.random() < self.conditional:
             self._add_conditions(made, set(begun or {}), taken)
         self._name_sizes(made)
-        return dict(made)
+        return dict(self._dated(made, taken))
+
+    def _dated(self, made: list[tuple[str, Any]], taken: set[str]) -> list[tuple[str, Any]]:
+        """Some fields begin with a version of the protocol, and others have ended before the newest one."""
+        rng = self.rng
+        dated = [
+            (name, {**spec, "since": "1.10"})
+            if isinstance(spec, dict) and rng.random() < 0.05
+            else (name, spec)
+            for name, spec in made
+        ]
+        if rng.random() < 0.1:
+            dated.insert(rng.randint(0, len(dated)), (self.words.name(taken), {"type": "u8", "until": "1.9"}))
+        return dated
 
     def _name_sizes(self, made: list[tuple[str, Any]]) -> None:
         """Name the count in the brackets of some fields that have one, of items."""

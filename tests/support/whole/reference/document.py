@@ -295,9 +295,18 @@ class Message:
         return not self.addresses or any(low <= address <= high for low, high in self.addresses)
 
 
+def _newest(node: Any) -> Any:
+    """What the newest version of the protocol has."""
+    if not isinstance(node, dict):
+        return node
+    return {
+        name: _newest(each) for name, each in node.items() if not (isinstance(each, dict) and "until" in each)
+    }
+
+
 def load(text: str) -> Doc:
     """The plain data of a schema file."""
-    document: Doc = yaml.load(text, _Loader)
+    document: Doc = _newest(yaml.load(text, _Loader))
     parts = document["frame"].get("parts", {})
     # Silence has no bytes, and frames end without it.
     for name in [
