@@ -30,11 +30,14 @@ INPUTS: dict[str, tuple[Callable[..., Any], str]] = {
         for name in (
             "arrays",
             "bit_flags",
+            "can_frame",
             "conditions",
+            "expressions",
             "gnss",
             "nested_types",
             "sensor_packet",
             "serial_frame",
+            "tlv_stream",
         )
     },
 }
