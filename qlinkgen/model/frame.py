@@ -89,6 +89,8 @@ class PartBits:
     type: Scalar | None = None
     #: It is a counter, which the runtime fills.
     counting: Counting | None = None
+    #: They are characters, and so are ids in files.
+    text: bool = False
     doc: Text = ""
 
     @property

@@ -41,6 +41,7 @@ from qlinkgen.schema.kinds import (
     ScalarValue,
     ShortForm,
     Text,
+    TextId,
     Time,
     Values,
     Version,
@@ -614,11 +615,15 @@ Replies = dict[str, ReplySpec]
 
 
 def _id_form(value: object) -> str:
-    return f"{BRANCH}parts" if isinstance(value, dict) else f"{BRANCH}number"
+    if isinstance(value, dict):
+        return f"{BRANCH}parts"
+    return f"{BRANCH}text" if isinstance(value, str) else f"{BRANCH}number"
 
 
 MessageId = Annotated[
-    Annotated[dict[str, Id], Tag(f"{BRANCH}parts")] | Annotated[Id, Tag(f"{BRANCH}number")],
+    Annotated[dict[str, TextId | Id], Tag(f"{BRANCH}parts")]
+    | Annotated[TextId, Tag(f"{BRANCH}text")]
+    | Annotated[Id, Tag(f"{BRANCH}number")],
     Discriminator(_id_form),
 ]
 

@@ -14,6 +14,7 @@ from pydantic import (
     GetJsonSchemaHandler,
     PlainValidator,
     StrictInt,
+    StrictStr,
     WithJsonSchema,
 )
 from pydantic.json_schema import JsonSchemaValue
@@ -166,6 +167,8 @@ Label = Annotated[int | bool | str, PlainValidator(_label), _json("A label", "st
 Name = Annotated[str, WithJsonSchema({"type": "string", "pattern": NAME_PATTERN})]
 Count = Annotated[StrictInt, Field(ge=1)]
 Id = Annotated[StrictInt, Field(ge=0)]
+#: An id of a part with a type such as text[3].
+TextId = Annotated[StrictStr, Field(min_length=1)]
 AnswerNumber = Annotated[
     notation.AnswerId,
     PlainValidator(notation.answer_id),

@@ -19,6 +19,7 @@ _HEX = re.compile(r"\s*(?:[0-9a-fA-F]{2}\s*)+\Z", re.ASCII)
 _ANSWER_ID = re.compile(
     r"\s*request\.id\s*(?:(?P<sign>[+-])\s*(?P<number>0x[0-9A-Fa-f]+|0|[1-9][0-9]*)\s*)?\Z", re.ASCII
 )
+_TEXT_ID = re.compile(r"[!-~]{1,8}\Z", re.ASCII)
 _DURATION = re.compile(
     r"\s*(?P<number>[0-9]{1,12}(?:\.[0-9]{1,12})?)\s*(?P<unit>bytes?|us|ms|s)\s*\Z", re.ASCII
 )
@@ -181,7 +182,7 @@ def duration(value: object) -> Duration:
 
 
 #: The number of a message as written: one, or one for each part that it consists of.
-Given = int | Mapping[str, int] | None
+Given = int | str | Mapping[str, int | str] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +197,7 @@ class StatedId:
 class AnswerId:
     """The number of an answer, or what is added to that of the request."""
 
-    number: int | Mapping[str, int]
+    number: int | str | Mapping[str, int | str]
     relative: bool = False
 
     def of(self, request: Given) -> StatedId:
@@ -216,12 +217,15 @@ def answer_id(value: object) -> AnswerId:
     if (
         isinstance(value, dict)
         and value
-        and all(type(each) in (int, DecimalNumber) for each in value.values())
+        and all(type(each) in (int, DecimalNumber, str) for each in value.values())
     ):
-        return AnswerId({str(name): int(each) for name, each in value.items()})
+        each = {str(name): text if isinstance(text, str) else int(text) for name, text in value.items()}
+        return AnswerId(each)
     if isinstance(value, str) and (match := _ANSWER_ID.match(value)):
         number = int(match["number"] or "0", 0)
         return AnswerId(-number if match["sign"] == "-" else number, relative=True)
+    if isinstance(value, str) and _TEXT_ID.match(value):
+        return AnswerId(value)
     raise ValueError(f"{shown(value)} is not the number of an answer; write 0x85 or request.id + 0x80")
 
 

@@ -12,7 +12,7 @@ from qlinkgen.model.types import Chunk, Scalar, byte_chunks
 from qlinkgen.schema.file_model import CrcSpec, PartKind, PartSpec, SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.notation import Duration, shown
-from qlinkgen.schema.pieces import PieceBuilder
+from qlinkgen.schema.pieces import PieceBuilder, text_size
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.synonyms import type_hint
@@ -251,6 +251,11 @@ class PartBuilder:
     def integer(self, spec: PartSpec, path: Path) -> Scalar:
         """The integer of a length, message id, address or checksum."""
         size = _INTEGERS.get(spec.type or "")
+        if spec.told == "message" and (characters := text_size(spec.type)):
+            if spec.byteorder is not None:
+                self.reject(spec, ("byteorder",), "text", path)
+            chunks = byte_chunks(characters, "big")
+            return Scalar(bits=8 * characters, chunks=chunks, minimum=0, maximum=(1 << 8 * characters) - 1)
         if size is None:
             kinds = listed(_INTEGERS, "or")
             if spec.type is None:

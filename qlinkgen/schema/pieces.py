@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -33,7 +34,10 @@ class PieceBuilder:
         match spec.told:
             case "message" | "address" | "direction" as role:
                 directions = self._directions(spec, scalar.bits, path) if role == "direction" else {}
-                return PartBits(name=name, role=role, shift=0, bits=scalar.bits, directions=directions)
+                text = role == "message" and text_size(spec.type) > 0
+                return PartBits(
+                    name=name, role=role, shift=0, bits=scalar.bits, directions=directions, text=text
+                )
             case "constant":
                 constants = self._constants(spec, scalar.bits, path)
                 return PartBits(name=name, role="constant", shift=0, bits=scalar.bits, constants=constants)
@@ -161,6 +165,15 @@ def _container(number: Scalar | None) -> Scalar:
     return Scalar(bits=bits, chunks=chunks, minimum=0, maximum=(1 << bits) - 1)
 
 
+_TEXT = re.compile(r"text\s*\[\s*([1-8])\s*\]\Z", re.ASCII)
+
+
+def text_size(kind: str | None) -> int:
+    """Number of characters of ``text[3]``, 0 for other types."""
+    match = _TEXT.match(kind or "")
+    return int(match[1]) if match else 0
+
+
 def placed(parts: tuple[Part, ...]) -> tuple[Part, ...]:
     """The parts, the pieces of the message id in their places: the direction first, then in wire order."""
     pieces = [bits for part in parts for bits in part.bits if bits.role in ("direction", "message")]
@@ -201,7 +214,9 @@ class IdBuilder:
     def _stated(self, stated: StatedId, path: Path, whose: str) -> int:
         given = stated.given
         if not isinstance(self._frame, DelimitedFrame):
-            return (given if isinstance(given, int) else self._missing(path)) + stated.added
+            if isinstance(given, str):
+                self._not_number(given, path)
+            return (given if isinstance(given, int) else 0 if given else self._missing(path)) + stated.added
         names = [each.name for each in self._pieces]
         if not names:
             if given is not None or stated.added:
@@ -210,7 +225,7 @@ class IdBuilder:
             return 0
         if given is None:
             return self._missing(path)
-        if isinstance(given, int):
+        if isinstance(given, int | str):
             if len(names) > 1:
                 hint = f"write {{{', '.join(f'{name}: NUMBER' for name in names)}}}"
                 self._wrong(path, f"the id consists of {listed(names)}", hint)
@@ -218,11 +233,12 @@ class IdBuilder:
             given = {names[0]: given}
         return self._added(self._composed(given, names, path), stated.added, path, whose)
 
-    def _composed(self, given: Mapping[str, int], names: list[str], path: Path) -> int:
-        if set(given) != set(names):
+    def _composed(self, stated: Mapping[str, int | str], names: list[str], path: Path) -> int:
+        if set(stated) != set(names):
             hint = f"give {listed(names)}, and nothing else"
             self._wrong(path, f"the id consists of {listed(names)}", hint)
             return 0
+        given = {piece.name: self._piece(piece, stated[piece.name], path) for piece in self._pieces}
         for piece in self._pieces if len(names) > 1 else ():
             value = given[piece.name]
             if value >> piece.bits:
@@ -232,6 +248,25 @@ class IdBuilder:
                 )
                 self._wrong(path, what, hint, "id-does-not-fit")
         return sum(given[piece.name] << piece.at for piece in self._pieces)
+
+    def _piece(self, piece: PartBits, stated: int | str, path: Path) -> int:
+        """The number of a piece of an id, which may be written as text."""
+        if isinstance(stated, int) and not piece.text:
+            return stated
+        size = piece.bits // 8
+        if not piece.text:
+            self._not_number(stated, path)
+        elif isinstance(stated, int):
+            self._wrong(path, f"{piece.name} {stated} is not text", f'quote it: "{stated}"')
+        elif len(stated) != size or not stated.isascii() or not stated.isprintable():
+            what = f"{piece.name} {shown(stated)} does not fit the frame"
+            self._wrong(path, what, f"write {size} ASCII characters", "id-does-not-fit")
+        else:
+            return int.from_bytes(stated.encode("ascii"), "big")
+        return 0
+
+    def _not_number(self, given: object, path: Path) -> None:
+        self._wrong(path, f"{shown(given)} has the wrong type", "write a whole number", "wrong-type")
 
     def _added(self, number: int, added: int, path: Path, whose: str) -> int:
         most = (1 << sum(piece.bits for piece in self._pieces)) - 1

@@ -145,6 +145,38 @@ def test_no_message_id() -> None:
     assert wires("start: 7E", id_="") == ["7e", "7e 09"]
 
 
+def test_text_ids() -> None:
+    code = 'code: {role: message, type: "text[3]"}'
+    assert wires("start: 24", code, id_="id: GGA") == ["24 47 47 41", "24 47 47 41 09"]
+    answer = '{id: "V:1", fields: {value: u8}}'
+    assert wires(code, id_="id: GGA", response=answer) == ["47 47 41", "56 3a 31 09"]
+    parts = ('talker: {role: message, type: "text[2]"}', "number: {role: message, type: u8}")
+    assert wires(*parts, id_="id: {talker: GP, number: 7}") == ["47 50 07", "47 50 07 09"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "what"),
+    [
+        ("text[3]", "GG", "code 'GG' does not fit the frame"),
+        ("text[3]", "12", "code 12 is not text"),
+        ("text[3]", '"12é"', "code '12é' does not fit the frame"),
+        ("u8", "A", "'A' has the wrong type"),
+        ("text[9]", "A", "'text[9]' is not a type for a part of a frame"),
+    ],
+)
+def test_wrong_text_ids(kind: str, given: str, what: str) -> None:
+    text = BITS.format(
+        order="big",
+        parts=f'    code: {{role: message, type: "{kind}"}}',
+        after="",
+        bus="{kind: master_slave}",
+        id=f"id: {given}, ",
+        more="",
+        **USUAL_FIELDS,
+    )
+    assert what in [fault.message for fault in loads(text, "sample")[1]]
+
+
 def test_numbers_as_constants() -> None:
     assert wires("version: {type: u16, const: 0x0E}", id_="") == ["0e 00", "0e 00 09"]
     assert wires("sync: {type: u8, const: [0xC8, 0xEA]}", id_="") == ["c8", "c8 09"]

@@ -11,6 +11,7 @@ from tests.support.whole import endings
 from tests.support.whole.endings import Ending
 from tests.support.whole.mixed import Mixture
 from tests.support.whole.reference import checks
+from tests.support.whole.reference.document import bits_of_type
 
 Doc = dict[str, Any]
 _LEADS = ("7E", "A5 A5", "AA AA", "02 02", "02", "FF FF FD 00", "AA 55", "10 02", "68", "3A", "A5 A5 A5")
@@ -50,19 +51,32 @@ class Shape:
     seeds: Doc = field(default_factory=dict)
     #: Name and bits of the pieces of the message id, if there is not just one.
     pieces: list[tuple[str, int]] = field(default_factory=list)
+    #: The message id is text.
+    text_id: bool = False
     #: A part states the direction, so every message needs one.
     directed: bool = False
 
-    def id(self, number: int) -> int | Doc:
+    def fit(self, number: int) -> int:
+        """A number that can be an id."""
+        if not self.text_id:
+            return number
+        data = number.to_bytes(self.id_bits // 8, "big")
+        return int.from_bytes(bytes(48 + each % 43 for each in data), "big")
+
+    def id(self, number: int) -> int | str | Doc:
         """A number as the id of a message; of several pieces the first is the most significant."""
+        if self.text_id:
+            return number.to_bytes(self.id_bits // 8, "big").decode("ascii")
         given = dict[str, int]()
         for name, bits in reversed(self.pieces):
             given[name] = number & (1 << bits) - 1
             number >>= bits
         return given if len(given) > 1 else next(iter(given.values()), number)
 
-    def number(self, given: int | Doc) -> int:
+    def number(self, given: int | str | Doc) -> int:
         """The number of an id."""
+        if isinstance(given, str):
+            return int.from_bytes(given.encode("ascii"), "big")
         if isinstance(given, int):
             return given
         number = 0
@@ -217,6 +231,7 @@ class _Parts:
         shape = self._shape(frame, {**names, "message": names["payload"]}, stuffing, strict=False)
         shape.pieces, shape.directed = mixture.pieces, mixture.directed
         shape.id_bits = sum(bits for _, bits in mixture.pieces)
+        shape.text_id = "text" in str(mixture.front.get("code", mixture.back.get("code")))
         shape.address_bits, shape.address_name = mixture.address_bits, mixture.address
         return shape
 
@@ -461,7 +476,7 @@ def _size(part: Doc) -> int:
         return 0
     if "value" in part:
         return len(bytes.fromhex(part["value"]))
-    return len(part["sent"]) if "sent" in part else int(part["type"][1:]) // 8
+    return len(part["sent"]) if "sent" in part else bits_of_type(part["type"]) // 8
 
 
 def _marked(rng: random.Random) -> Shape:

@@ -6,6 +6,8 @@ import random
 from dataclasses import dataclass, field
 from typing import Any
 
+from tests.support.whole.reference.document import bits_of_type
+
 Doc = dict[str, Any]
 
 
@@ -59,7 +61,11 @@ class Mixture:
         rng, parts = self.rng, dict[str, Doc]()
         style = rng.choice(("whole", "whole", "split", "bits", "bits", "none"))
         if style in ("whole", "split"):
-            parts["code"] = {"role": "message", "type": self._type()}
+            text = style == "whole" and rng.random() < 0.3
+            parts["code"] = {
+                "role": "message",
+                "type": f"text[{rng.randint(1, 5)}]" if text else self._type(),
+            }
         if style == "split":
             parts["sub"] = {"role": "message", "type": "u8"}
         if style == "bits" or (style == "split" and rng.random() < 0.3):
@@ -147,7 +153,7 @@ class Mixture:
         """Perhaps a number that follows from an earlier one."""
         rng = self.rng
         every = {**self.front, **self.back}.items()
-        sources = [name for name, spec in every if not _constant(spec)]
+        sources = [name for name, spec in every if not _constant(spec) and "text" not in spec["type"]]
         if not sources or rng.random() < 0.6:
             return
         name = rng.choice(sources)
@@ -171,7 +177,7 @@ class Mixture:
                 first, _, last = str(inner.get("at", "")).partition("..")
                 if inner.get("role") not in ("message", "address"):
                     continue
-                size = int(last or first) + 1 - int(first) if first else int(inner["type"][1:])
+                size = int(last or first) + 1 - int(first) if first else bits_of_type(inner["type"])
                 if inner.get("role") == "message":
                     self.pieces.append((each, size))
                 elif inner.get("role") == "address":

@@ -262,6 +262,7 @@ class _Maker:
         top = (1 << shape.id_bits) - 1
         for _ in range(20):
             number = self.rng.randint(-top if relative else 0, top)
+            number = number if relative else shape.fit(number)
             numbers = {number + each for each in asked} if relative else {number}
             taken = {("response", each) for each in numbers}
             if not taken & used and all(0 <= each <= top and each != shape.end_id for each in numbers):
@@ -334,7 +335,7 @@ class _Maker:
                 self.rng.randint(0, top),
                 self.rng.randint(0, min(top, 40)),
             )
-            number = self.rng.choice([each for each in likely if each <= top])
+            number = shape.fit(self.rng.choice([each for each in likely if each <= top]))
             if number not in self._ids and number != shape.end_id:
                 self._ids.add(number)
                 return number

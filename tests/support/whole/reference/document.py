@@ -634,11 +634,16 @@ def _bounded(slot: Slot, room: int, counter: Slot | None) -> Slot:
     return replace(slot, kind=replace(kind, high=max(1, most)))
 
 
+def bits_of_type(written: str) -> int:
+    """Number of bits of ``u16`` or ``text[2]``."""
+    return 8 * int(written[5:-1]) if written.startswith("text") else int(written[1:])
+
+
 def bits_of(spec: Doc) -> Iterator[tuple[str, str, int, int, Doc]]:
     """What the bits of a part hold: name ("" for all bits), role, lowest bit, number of bits, mapping."""
     spec = part_doc(spec)
     if spec["role"] in ("message", "address", "direction", "constant") and "type" in spec:
-        yield "", spec["role"], 0, int(spec["type"][1:]), spec
+        yield "", spec["role"], 0, bits_of_type(spec["type"]), spec
     for name, given in spec.get("bits", {}).items():
         inner = _doc(given)
         first, last = whole_span(inner["at"])
@@ -659,6 +664,7 @@ def numbered(document: Doc, given: Any, direction: Direction) -> int:
                 name = inner or part
                 values = spec.get("values", {}).get(direction) if role == "direction" else given
                 value = values[name] if isinstance(values, dict) else values
+                value = int.from_bytes(value.encode("ascii"), "big") if isinstance(value, str) else value
                 number = number << bits | value
     return number
 
@@ -769,6 +775,11 @@ def _number(document: Doc, given: Any, asked: Any) -> int:
     return numbered(document, asked, "response") + int(offset or "0", 0)
 
 
+def _relative(number: Any) -> bool:
+    """Whether the id of an answer depends on that of the request."""
+    return number is None or (isinstance(number, str) and number.startswith("request.id"))
+
+
 def _replies(
     name: str, spec: Doc, document: Doc, fields: Fields, known: set[str], *, addressed: bool
 ) -> Iterator[Message]:
@@ -778,7 +789,7 @@ def _replies(
     if spec["response"] == "none":
         return
     for key, reply in (*common.items(), *own.items()):
-        shared = key in common and isinstance(reply.get("id"), int | dict)
+        shared = key in common and not _relative(reply.get("id"))
         full = key if shared else f"{name}.{key}"
         if full in known:
             continue

@@ -20,6 +20,7 @@ from tests.support.whole.reference.document import (
     Records,
     Run,
     bits_of,
+    bits_of_type,
     byte_pieces,
     octets,
     part_doc,
@@ -114,7 +115,8 @@ def part_of(name: str, spec: object, order: str, fields: Fields) -> Part:
         return Part(name, spec["role"], len(constant), spec, constant)
     if spec["role"] == "payload":
         return Part(name, "payload", 0, spec)
-    pieces = byte_pieces(int(spec["type"][1:]) // 8, spec.get("byteorder", order))
+    order = "big" if spec["type"].startswith("text") else spec.get("byteorder", order)
+    pieces = byte_pieces(bits_of_type(spec["type"]) // 8, order)
     if "sent" in spec:
         pieces = tuple((first, last + 1 - first) for first, last in map(whole_span, spec["sent"]))
     if "every" in spec:
