@@ -34,3 +34,15 @@ def test_present_or_absent(field: str) -> None:
         assert codec.PutRequest.from_bytes(bytes.fromhex(payload)) == made
         parsed = live.messages["put.request"].parse(bytes.fromhex(payload))
         assert {name: parsed[name] for name in values} == values
+
+
+def test_an_optional_field_after_optional_bits() -> None:
+    codec = python.load(
+        protocol_of(
+            "{head: {type: u8, bits: {a: 0..3, b: 4..7}, optional: true}, z: {type: u8, optional: true}}"
+        )
+    )
+    assert codec.PutRequest(a=1, b=2, z=3).to_bytes() == bytes.fromhex("2103")
+    assert codec.PutRequest(a=1, b=2, z=None).to_bytes() == bytes.fromhex("21")
+    with pytest.raises(codec.EncodeError):
+        codec.PutRequest(a=None, b=None, z=3).to_bytes()

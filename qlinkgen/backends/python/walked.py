@@ -67,7 +67,8 @@ class WalkedEncoder(Encoder):
         for segment in self.message.payload.segments:
             lines += self._segment(segment, before)
             if segment.presence is not None and segment.presence.optional:
-                before = segment.presence.field
+                # The bits of an integer have values of their own, which are given or absent together.
+                before = next((each.name for each in holders(segment.steps)), before)
         return [*lines, *self._framed(name)]
 
     def _flushed(self) -> list[str]:
