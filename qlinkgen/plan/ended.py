@@ -46,7 +46,7 @@ def find_end(frame: FramePlan, wire: bytes, start: int = 0) -> int:
     if not lead.startswith(head):
         raise NoFrame("frame", start + next(at for at in range(len(head)) if head[at] != lead[at]))
     if len(head) < len(lead):
-        raise Incomplete(start + len(lead))
+        raise Incomplete(start + len(head) + 1)
     first, limit = start + len(lead), start + frame.max_wire - frame.end.after
     stop = frame.end.find(wire, first, limit)
     if stop == first:

@@ -179,5 +179,11 @@ def test_without_check_and_beginning_a_frame_begins_after_a_terminator(
     assert [(event.kind, event.offset) for event in events] == found
 
 
+def test_a_wrong_byte_of_the_beginning_is_found_at_once() -> None:
+    text = DLE.replace("open: 10 02", "open: 10 02 01")
+    assert receiver(plan(text), "request").run(b"\x10\x65") == []
+    assert [event.kind for event in receiver(plan(text), "request").run(b"\x10\x02")] == ["truncated"]
+
+
 def test_only_such_frames_wait_for_a_terminator() -> None:
     assert not any(plan(text).frame.lines for text in FRAMES.values())
