@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
-from typing import TypeAlias, assert_never
+from typing import SupportsInt, TypeAlias, assert_never
 
 from qlinkgen.model.fields import Layout, Record, Records, Value
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Float, Scalar
@@ -132,6 +132,9 @@ def to_json(value: Value, native: Native) -> Json:
     if isinstance(kind, Array):
         assert isinstance(native, list)
         return [_item_to_json(kind.item, item) for item in native]
+    if isinstance(kind.meaning, Flags):
+        assert isinstance(native, SupportsInt)
+        return int(native)  # construct has a class of its own, which is a mapping too
     assert not isinstance(native, bytes | str | Sequence | Mapping)
     return _item_to_json(kind, native)
 
@@ -141,7 +144,7 @@ def _item_to_json(scalar: Scalar, native: Item) -> str | Item:
         assert isinstance(native, int)
         return scalar.meaning.name_of(native) or int(native)
     if isinstance(scalar.meaning, Flags):
-        return int(native)  # construct has a class of its own
+        return int(native)
     if isinstance(native, float) and not math.isfinite(native):
         return str(native)
     return native

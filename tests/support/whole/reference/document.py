@@ -20,12 +20,20 @@ Role = Literal["value", "constant", "reserved", "count"]
 _REALS = {16: ">e", 32: ">f", 64: ">d"}
 
 
+class Prefixed(int):
+    """A number written as 0x10, not as 16: where bytes are expected, only the second is a pair of digits."""
+
+
 class _Loader(yaml.CSafeLoader):
     """Loads numbers with a decimal point exactly; on, off, yes and no as text."""
 
     def exact(self, node: yaml.ScalarNode) -> Fraction:
         """The exact number."""
         return Fraction(node.value)
+
+    def number(self, node: yaml.ScalarNode) -> int:
+        value = int(self.construct_yaml_int(node))
+        return value if node.value.isdecimal() else Prefixed(value)
 
 
 _Loader.yaml_implicit_resolvers = {
@@ -34,6 +42,7 @@ _Loader.yaml_implicit_resolvers = {
 }
 _Loader.add_implicit_resolver("tag:yaml.org,2002:bool", re.compile(r"true\Z|false\Z"), list("tf"))
 _Loader.add_constructor("tag:yaml.org,2002:float", _Loader.exact)
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.number)
 
 
 @dataclass(frozen=True, slots=True)
@@ -344,7 +353,7 @@ def whole_span(given: object) -> tuple[int, int]:
 
 def octets(given: object) -> bytes:
     """Pairs of hex digits, to YAML a number if they are two decimal ones; or a number."""
-    if isinstance(given, int) and not 10 <= given <= 99:
+    if isinstance(given, Prefixed) or (isinstance(given, int) and not 10 <= given <= 99):
         return bytes([given])
     return bytes.fromhex(str(given))
 
