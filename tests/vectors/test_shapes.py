@@ -185,7 +185,7 @@ def test_a_wrong_part_is_the_only_one() -> None:
         if not isinstance(part, ConstantPart | CheckPart) or row["kind"] in {"truncated", "length"}:
             continue
         envelope, frame = message.envelope, wire(row)
-        at, cells = 0, {}
+        at, cells = 0, dict(message.message.seeds)
         for each in envelope.parts:
             size = len(frame) - envelope.overhead if isinstance(each, PayloadPart) else each.size
             cells[each.name], at = frame[at : at + size], at + size
