@@ -360,15 +360,21 @@ class Encoder:
     def _row_of_bits(self, step: ItemsStep, source: str) -> None:
         """Add items of a few bits: the text of their binary digits is faster than shifts."""
         bits, mask = step.item.bits, step.item.mask
-        rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
-        self._terms += [f"all({integers.holds(rule, 'item')} for item in {source})" for rule in rules]
         item = f"item & 0x{mask:X}" if step.item.signed else "item"
         number = str(step.length.maximum) if step.fixed else f"{step.name}_count"
         size = str(packed_size(step.length.maximum, bits)) if step.fixed else f"{step.name}_bytes"
         if not step.fixed:
             self._lines.append(f"{size} = {integers.term_text(term_of(step))}")
-        ordered = f"reversed({source})" if step.packed == "least" else source
-        digits = f'"".join([f"{{{item}:0{bits}b}}" for item in {ordered}]) or "0"'
+        if step.number.meaning == "bool":
+            # Every second digit of the bytes 00 and 01.
+            self._lines.append(f"{step.name}_raw = bytes({source})")
+            self._terms.append(f'not {step.name}_raw.strip(b"\\x00\\x01")')
+            digits = f'{step.name}_raw{"[::-1]" if step.packed == "least" else ""}.hex()[1::2] or "0"'
+        else:
+            rules = step.conditions or (Within(step.item.minimum, step.item.maximum),)
+            self._terms += [f"all({integers.holds(rule, 'item')} for item in {source})" for rule in rules]
+            ordered = f"reversed({source})" if step.packed == "least" else source
+            digits = f'"".join([f"{{{item}:0{bits}b}}" for item in {ordered}]) or "0"'
         whole = f"int({digits}, 2)"
         if step.packed == "most":
             row = f"{bits} * {number}" if bits > 1 else number
