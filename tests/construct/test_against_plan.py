@@ -92,6 +92,8 @@ def _natives(values: Iterable[Value], raws: Mapping[str, Raw]) -> dict[str, Any]
 
 def _native(value: Value, raw: Raw) -> Any:
     kind = value.type
+    if raw is None:  # left out
+        return None
     match kind:
         case Scalar():
             assert isinstance(raw, int)

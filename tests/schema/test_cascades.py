@@ -28,7 +28,7 @@ def rules(text: str) -> list[str]:
         ("value: 0x7E", "value: 0x7EE", "bad-value"),
         ("crc-8/smbus", "crc-8/smbas", "unknown-algorithm"),
         ("over: [length, kind,", "over: [length, kin,", "unknown-part"),
-        ("counts: [payload]", "counts: payload", "wrong-type"),
+        ("counts: [payload]", "counts: {payload: 1}", "wrong-type"),
         ("\nframe:", "\nframes:", "unknown-key"),
         # Addresses and transactions.
         ("nodes: 1..31", "nodes: 31..1", "bad-value"),
