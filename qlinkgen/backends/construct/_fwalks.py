@@ -207,9 +207,7 @@ class Walked(Message):
     def _cell(self, field: Renamed, values: Container, path: str) -> bytes:
         stream = BytesIO()
         whole = (
-            values
-            if isinstance(field.subcon, BitFields)
-            else values.get(field.name)
+            values if isinstance(field.subcon, BitFields) else values.get(field.name)
         )
         try:
             field._build(whole, stream, values, path)

@@ -60,7 +60,9 @@ class RecordsRule(Rule):
 
     __slots__ = ("fewest", "kind", "most")
 
-    def __init__(self, name: str, kind: type[BaseRecord], fewest: int, most: int) -> None:
+    def __init__(
+        self, name: str, kind: type[BaseRecord], fewest: int, most: int
+    ) -> None:
         self.kind = kind
         self.fewest = fewest
         self.most = most
@@ -69,7 +71,9 @@ class RecordsRule(Rule):
 
     def allows(self, value: Value) -> bool:
         """Whether the number of records is legal, and all have this class."""
-        return self.fewest <= len(value) <= self.most and all(isinstance(each, self.kind) for each in value)
+        return self.fewest <= len(value) <= self.most and all(
+            isinstance(each, self.kind) for each in value
+        )
 
     def complaint(self, value: Value) -> str:
         """The error text for a list, that of its first illegal record; "" if it is legal."""
@@ -95,7 +99,9 @@ def read_record(kind: type[AnyRecord], data: bytes, at: int) -> AnyRecord:
         raise _moved(error, "", 0) from None
 
 
-def read_records(kind: type[AnyRecord], data: bytes, start: int, count: int) -> list[AnyRecord]:
+def read_records(
+    kind: type[AnyRecord], data: bytes, start: int, count: int
+) -> list[AnyRecord]:
     """Consecutive records. Raises DecodeError, in which the field begins with an index."""
     found: list[AnyRecord] = []
     size, read = kind.MAX_SIZE, kind.from_checked
@@ -109,7 +115,9 @@ def read_records(kind: type[AnyRecord], data: bytes, start: int, count: int) -> 
 
 def _moved(error: DecodeError, index: str, offset: int) -> DecodeError:
     field = f"{index}.{error.field}"
-    return DecodeError(f"{index}: {error}", error.kind, field, offset + error.offset, error.data)
+    return DecodeError(
+        f"{index}: {error}", error.kind, field, offset + error.offset, error.data
+    )
 
 
 def inside(
@@ -122,4 +130,6 @@ def inside(
     """The error in the records of a field; a negative offset counts from the end of the payload."""
     start = offset if offset >= 0 else len(payload) + offset
     text = f"{message.NAME}: {name}{error}"
-    return DecodeError(text, error.kind, name + error.field, start + error.offset, payload)
+    return DecodeError(
+        text, error.kind, name + error.field, start + error.offset, payload
+    )

@@ -110,13 +110,13 @@ def _pair(table: str) -> CodingView:
 
 _COBS = [
     'pieces, runs = [], data.split(b"\\0")',
-    "for index, run in enumerate(runs):",
+    "for number, run in enumerate(runs):",
     "    at = 0",
     "    while len(run) - at >= 254:",
     '        pieces.append(b"\\xff" + run[at : at + 254])',
     "        at += 254",
     "    # A full block does not imply a zero.",
-    "    if at == 0 or at < len(run) or index < len(runs) - 1:",
+    "    if at == 0 or at < len(run) or number < len(runs) - 1:",
     "        pieces.append(bytes((len(run) - at + 1,)) + run[at:])",
     'data = b"".join(pieces)',
 ]

@@ -7,6 +7,7 @@ from typing import assert_never
 
 from qlinkgen.backends.python import floats, integers, pieces
 from qlinkgen.backends.python.layout import (
+    bare,
     literal,
     wrapped,
 )
@@ -151,7 +152,7 @@ class Encoder:
             case AddressPart():
                 self._integer(part.integer, self._addressed())
             case CellPart() | EqualPart():
-                self._lines.append(f"{part.name}_part = {self._part_number(part)}")
+                self._lines.append(f"{part.name}_part = {bare(self._part_number(part))}")
                 self._integer(part.integer, f"{part.name}_part")
             case MarkPart() | PayloadPart():
                 raise AssertionError(f"{part.name} is not packed by a message's class")

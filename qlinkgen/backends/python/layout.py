@@ -72,3 +72,13 @@ def literal(data: bytes) -> str:
     if text.startswith('b"') or '"' in text:
         return text
     return f'b"{text[2:-1]}"'
+
+
+def bare(expression: str) -> str:
+    """An expression without parentheses around the whole of it."""
+    depth = 0
+    for at, character in enumerate(expression):
+        depth += (character == "(") - (character == ")")
+        if depth == 0:
+            return expression[1:-1] if character == ")" and at == len(expression) - 1 else expression
+    return expression

@@ -103,18 +103,23 @@ class WalkedEncoder(Encoder):
         values = [attribute(each.name) for each in holders(segment.steps)]
         if presence.optional:
             given = f"if self.{values[0]} is not None:"
-            left_out = [f"if self.{attribute(before)} is None:", *self._misplaced(presence, values[0])]
-            return [given, *indented([*(left_out if before else []), *lines])]
-        missing = [line for each in values for line in self._unless(presence, each, "is None")]
-        surplus = [line for each in values for line in self._unless(presence, each, "is not None")]
+            skipped = (
+                [f"if self.{attribute(before)} is None:", *self._raised(presence, values[0])]
+                if before
+                else []
+            )
+            return [given, *indented([*skipped, *lines])]
+        missing = [line for each in values for line in self._misplaced(presence, each, "is None")]
+        surplus = [line for each in values for line in self._misplaced(presence, each, "is not None")]
         test = condition([_python(each) for each in presence.when], "self.{}")
         found = [f"if {test}:", *indented([*missing, *lines])]
         return [*found, "else:", *indented(surplus)] if surplus else found
 
-    def _unless(self, presence: Presence, value: str, wrong: str) -> list[str]:
-        return [f"if self.{value} {wrong}:", *self._misplaced(presence, value)]
+    def _misplaced(self, presence: Presence, value: str, wrong: str) -> list[str]:
+        """Refuse a value that is ``wrong``, "is None" or "is not None"."""
+        return [f"if self.{value} {wrong}:", *self._raised(presence, value)]
 
-    def _misplaced(self, presence: Presence, value: str) -> list[str]:
+    def _raised(self, presence: Presence, value: str) -> list[str]:
         given = f'self, "{value}", "{condition_text(presence)}"'
         return [f"    raise {self.place.use('misplaced')}({given})"]
 
