@@ -152,6 +152,8 @@ def _text(node: Node, column: int, indent: int) -> str:
             return f"{node.name}(\n{''.join(parts)}{' ' * indent})"
         case Sequence():
             return f"[\n{''.join(_part('', each, inner) for each in node.items)}{' ' * indent}]"
+        case tuple() if node:
+            return f"(\n{''.join(_part('', each, inner) for each in node)}{' ' * indent})"
         case _:
             return flat
 

@@ -153,9 +153,13 @@ def _split(nodes: list[Node], indent: int) -> list[str]:
     start = _expression(nodes)
     end = len(nodes) - _is(nodes[-1], ":")
     head, body, tail = nodes[:start], nodes[start:end], nodes[end:]
+    several = any(_is(each, ",") or _has_content(each) for each in head)
     places = [at for at in range(start, end) if _has_content(nodes[at])]
-    if _splits_itself(body) and indent + len(_flat(nodes[: places[0]])) < WIDTH:
-        return _bracketed(nodes, indent, "", start)
+    if _splits_itself(body):
+        # Parentheses around it are worth a line only if its first line fits there.
+        long = len(_flat(nodes[start : places[0]])) + indent + 4 >= WIDTH and not several
+        if long or indent + len(_flat(nodes[: places[0]])) < WIDTH:
+            return _bracketed(nodes, indent, "", start)
     margin = " " * indent
     if any(_is(each, ",") for each in head):
         rest = [Word(")", blank=False), *nodes[start - 1 :]]
@@ -199,17 +203,34 @@ def _bracketed(
     places = [at for at in range(start, len(nodes) if stop is None else stop) if _has_content(nodes[at])]
     if not places:
         return [f"{' ' * indent}{_flat(nodes)}{end}"]
-    at = next((at for at in reversed(places) if indent + len(_flat(nodes[:at])) + 2 <= WIDTH), places[0])
+    at = next((at for at in reversed(places) if indent + len(_opening(nodes, at)) <= WIDTH), places[0])
     group, margin = nodes[at], " " * indent
     assert isinstance(group, Group)
-    opening, closing = Word(group.opening, group.blank), Word(group.closing, blank=False)
-    tail = [closing, *nodes[at + 1 :]]
-    fits = indent + len(_flat(tail)) + len(end) <= WIDTH
+    tail = [Word(group.closing, blank=False), *nodes[at + 1 :]]
     return [
-        f"{margin}{_flat([*nodes[:at], opening])}",
+        f"{margin}{_opening(nodes, at)}",
         *_inside(group.nodes, indent + 4, joined=not group.display),
-        *([f"{margin}{_flat(tail)}{end}"] if fits else _bracketed(tail, indent, end)),
+        *_tail(tail, indent, end),
     ]
+
+
+def _opening(nodes: Sequence[Node], at: int) -> str:
+    """The line up to the brackets at an index."""
+    group = nodes[at]
+    assert isinstance(group, Group)
+    return _flat([*nodes[:at], Word(group.opening, group.blank)])
+
+
+def _tail(nodes: list[Node], indent: int, end: str) -> list[str]:
+    """What follows brackets, from the closing one on; alternatives of a result get parentheses."""
+    margin, words = " " * indent, [each.flat for each in nodes]
+    if indent + len(_flat(nodes)) + len(end) <= WIDTH:
+        return [f"{margin}{_flat(nodes)}{end}"]
+    if "->" in words and "|" in words:
+        start = words.index("->") + 1
+        inner = _inside(nodes[start:-1], indent + 4)
+        return [f"{margin}{_flat(nodes[:start])} (", *inner, f"{margin}){_flat(nodes[-1:])}{end}"]
+    return _bracketed(nodes, indent, end)
 
 
 def _inside(nodes: list[Node], indent: int, end: str = "", *, joined: bool = True) -> list[str]:
@@ -243,7 +264,8 @@ def _items(nodes: Sequence[Node]) -> list[list[Node]]:
 
 def _operands(nodes: list[Node]) -> list[list[Node]]:
     """Cut before each of the operators that bind least; an operator at the beginning is none of them."""
-    for operators in _PRECEDENCE:
+    # A loop of a comprehension is split inside of its brackets, but its condition begins a line.
+    for operators in ({"if"},) if _is(nodes[0], "for") else _PRECEDENCE:
         cuts = [
             at for at, each in enumerate(nodes) if at and isinstance(each, Word) and each.text in operators
         ]
