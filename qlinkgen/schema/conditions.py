@@ -27,6 +27,9 @@ class ConditionBuilder:
 
     def build(self, fields: Sequence[Field]) -> list[Field]:
         """The fields with their conditions, checked against each other."""
+        # Below, each field is compared with the others, which takes long for thousands of them.
+        if not any(self._specs[field.name].when or self._specs[field.name].optional for field in fields):
+            return list(fields)
         found: list[Field] = []
         for field in fields:
             spec = self._specs[field.name]

@@ -26,7 +26,7 @@ def dialect(entries: int) -> str:
 
 INPUTS: dict[str, tuple[Reader, str]] = {
     "structs": (read_header, "".join(f"struct s{at} {{ uint8_t a; }};\n" for at in range(1000))),
-    "members": (read_header, f"struct s {{ {' '.join(f'uint8_t a{at};' for at in range(1000))} }};"),
+    "members": (read_header, f"struct s {{ {' '.join(f'uint8_t a{at};' for at in range(5000))} }};"),
     "constants": (
         read_header,
         f"enum e {{ {', '.join(f'A{at}' for at in range(15000))} }}; struct s {{ char a; }};",
@@ -34,7 +34,7 @@ INPUTS: dict[str, tuple[Reader, str]] = {
     "comments": (read_header, "struct s { uint8_t a; };\n" + "// x\n" * 150_000),
     "terms": (read_header, f"struct s {{ uint8_t a; }}; int x[{'1+' * 200_000}1];"),
     "brackets": (read_header, "struct s { uint8_t a; };" + "[" * 100_000),
-    "equal names": (read_csv, "name,type\n" + "x,u8\n" * 1_500),
+    "equal names": (read_csv, "name,type\n" + "x,u8\n" * 8_000),
     "messages": (read_csv, "message,name,type\n" + "".join(f"m{at},a,u8\n" for at in range(1500))),
     "errors": (read_csv, "message,name,type\n" + "".join(f"m{at},a,text[70000]\n" for at in range(5000))),
     "rows": (read_csv, "a,b\n" * 90_000),

@@ -134,9 +134,10 @@ def test_first_line_names_the_json_schema() -> None:
 
 
 @pytest.mark.slow
-def test_loading_is_linear() -> None:
-    """A schema of 1,000 messages costs about ten times one of 100."""
-    small, large = (_generated(count) for count in (100, 1000))
+@pytest.mark.parametrize("what", ["messages", "fields"])
+def test_loading_is_linear(what: str) -> None:
+    """A schema of 1,000 messages, or fields of one message, costs about ten times one of 100."""
+    small, large = (_messages(count) if what == "messages" else _fields(count) for count in (100, 1000))
     seconds = []
     for text in (small, large):
         best = 1e9
@@ -149,7 +150,12 @@ def test_loading_is_linear() -> None:
     assert seconds[1] < 20 * seconds[0], seconds
 
 
-def _generated(count: int) -> str:
+def _fields(count: int) -> str:
+    head = _messages(1).replace("size: 0..64", "size: 0..60000")
+    return head + "    response:\n" + "".join(f"      f{n}: u8\n" for n in range(count))
+
+
+def _messages(count: int) -> str:
     head = (
         "qlinkgen: 1\nprotocol: {name: big, revision: '1', source: made up}\n"
         "frame: {parts: {id: {role: message, type: u16}, data: {role: payload, size: 0..64}}}\n"
