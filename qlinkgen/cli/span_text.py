@@ -51,7 +51,9 @@ def value_of(found: Dissection, span: Span) -> tuple[str, str]:
     if isinstance(of, Around):
         return _AROUND[of]
     name = span.inside + of.name
-    if len(span.raw) < span.size:
+    # Other fields lack only zeros that were not sent.
+    short = len(span.raw) < span.size and (isinstance(of, Part) or span.fault in ("length", "truncated"))
+    if short:
         return name, f"{len(span.raw)} of {span.size} bytes received"
     if isinstance(of, Part):
         return name, _of_part(found, of, span)
@@ -82,7 +84,7 @@ def _of_part(found: Dissection, part: Part, span: Span) -> str:
 
 
 def _of_field(field: Step | Member, span: Span) -> str:
-    number = span.number or 0
+    number, raw = span.number or 0, span.raw.ljust(span.size, b"\0")
     match field:
         case ConstantStep() | ReservedStep() | ValueStep() | Member():
             return value_text(field.number, number)
@@ -91,13 +93,13 @@ def _of_field(field: Step | Member, span: Span) -> str:
         case BitsStep():
             return f"0x{number & field.integer.mask:0{2 * field.integer.size}X}"
         case BytesStep():
-            text = repr(field.stripped(span.raw).decode("ascii", "backslashreplace"))
-            return text if field.text else f"{len(span.raw)} bytes"
+            text = repr(field.stripped(raw).decode("ascii", "backslashreplace"))
+            return text if field.text else f"{len(raw)} bytes"
         case ItemsStep():
-            number = number if field.packed else len(span.raw) // field.item_size
-            return ", ".join(map(str, unpack_items(field, span.raw, number)))
+            number = number if field.packed else len(raw) // field.item_size
+            return ", ".join(map(str, unpack_items(field, raw, number)))
         case RecordStep() | RecordsStep():
-            return f"{len(span.raw)} bytes"
+            return f"{len(raw)} bytes"
         case _:
             assert_never(field)
 

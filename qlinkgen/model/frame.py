@@ -141,6 +141,8 @@ class Part:
     #: Payload only: minimum and maximum size.
     min_size: int = 0
     max_size: int = 0
+    #: Payload only: bytes that are sent at least where zeros at the end are not, None if all are sent.
+    trim: int | None = None
 
     @property
     def field(self) -> Field:

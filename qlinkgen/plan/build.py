@@ -50,7 +50,7 @@ def plan_of(protocol: Protocol, options: Options | None = None) -> Plan:
 
 
 def _message(frame: FramePlan, message: Message, options: Options) -> MessagePlan:
-    payload = payload_plan(message)
+    payload = payload_plan(message, frame.envelope.payload.trim)
     envelope = frame.with_check(message.direction, checked=message.checksum)
     size = envelope.overhead + payload.most
     size += envelope.blocks.added(payload.most) if envelope.blocks else 0

@@ -92,7 +92,7 @@ def pack(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
     if plan.walked:
         return _pack_walked(plan, whole)
     counts = {run.name: _count(run, whole[run.name]) for run in plan.runs}
-    return b"".join(_packed(step, whole, counts) for step in plan.steps)
+    return plan.trimmed(b"".join(_packed(step, whole, counts) for step in plan.steps))
 
 
 def _pack_walked(plan: PayloadPlan, values: Mapping[str, Raw]) -> bytes:
@@ -238,6 +238,7 @@ def unpack(plan: PayloadPlan, payload: bytes) -> dict[str, Raw]:
         return defaults(plan)
     if plan.walked:
         return _unpack_walked(plan, payload)
+    payload = plan.filled(payload)
     counts = count_items(plan, payload)
     values: dict[str, Raw] = {}
     for step in plan.steps:
@@ -267,7 +268,7 @@ def _counts_of(step: Step, data: bytes) -> Mapping[str, int]:
 
 
 def places(plan: PayloadPlan, payload: bytes) -> Iterator[tuple[Step, int]]:
-    """The steps of a valid payload and their offsets, without absent ones."""
+    """The steps of a valid payload, zeros at its end included, and their offsets, without absent ones."""
     if plan.walked:
         yield from ((each.step, each.at) for each in walk.visit(plan, payload) if each.data is not None)
         return

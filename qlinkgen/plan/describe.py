@@ -358,7 +358,9 @@ def part_text(part: Part, frame: FramePlan) -> str:  # noqa: C901  # a case a pa
             added = f" {part.added:+d}".replace("+", "+ ").replace("-", "- ") if part.added else ""
             return f"{'complement of ' if part.inverted else ''}{part.of.name}{added}"
         case PayloadPart():
-            return "the message's fields"
+            kept = "" if part.trim is None else ", without zeros at their end"
+            kept += f", at least {part.trim}" if part.trim else ""
+            return f"the message's fields{kept}"
         case CheckPart():
             text = check_text(part.check, frame)
             return text if part.check.complete else f"{text}; bits {_sent_bits_text(part.check)} are sent"

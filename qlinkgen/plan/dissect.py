@@ -542,16 +542,20 @@ class _Walk:
         check = self.envelope.check
         # A marked frame without room for its check value.
         crowded = check is not None and self.wanted.get(check.name) == 0
-        fields = Fields(message.payload, data, sound=whole and not moved and not crowded)
+        full = message.payload.filled(data) if whole else data
+        fields = Fields(message.payload, full, sound=whole and not moved and not crowded)
         if fields.bad or crowded or self.miscounted:
             inside = message.payload.least <= len(data) <= message.payload.most and not crowded
             kind = "frame" if isinstance(self.frame.end, ByMark) and not inside else "length"
             self._fault(kind, Rule.SIZE, at, part, len(data))
+        end = places[-1] + 1 if places else self.cursor.at
         for each in fields.wrong:
-            self.faults.append(Fault("range", Rule.VALUE, places[each.at], each.of, each.seen, each.inside))
+            place = places[each.at] if each.at < len(places) else end  # a zero that was not sent
+            self.faults.append(Fault("range", Rule.VALUE, place, each.of, each.seen, each.inside))
         for span in fields.spans:
-            own, raw = self._sent(places[i] for i in span.places)
-            self.spans.append(replace(span, places=own, raw=raw))
+            own, raw = self._sent(places[at] for at in span.places if at < len(places))
+            if own:
+                self.spans.append(replace(span, places=own, raw=raw))
 
     def _plain(self, cell: Cell, *, whole: bool) -> tuple[bytes, tuple[int, ...]]:
         """The payload and its offsets without the bytes inserted by payload stuffing."""

@@ -130,12 +130,17 @@ class MarkPart:
 
 @dataclass(frozen=True, slots=True)
 class PayloadPart:
-    """The payload: minimum and maximum size before stuffing, and maximum size as a length counts it."""
+    """The payload: minimum and maximum size before stuffing, and maximum size as a length counts it.
+
+    Attributes:
+        trim: bytes that are sent at least where zeros at the end are not, None if all are sent.
+    """
 
     name: str
     least: int
     most: int
     most_sent: int
+    trim: int | None = None
 
     #: Size of an empty payload.
     size = 0
@@ -776,7 +781,8 @@ def _part(frame: DelimitedFrame, part: StatedPart, transparency: Transparency) -
         case "constant" | "terminator":
             return ConstantPart(part.name, part.constant)
         case "payload":
-            return PayloadPart(part.name, part.min_size, part.max_size, transparency.most_sent(part.max_size))
+            most_sent = transparency.most_sent(part.max_size)
+            return PayloadPart(part.name, part.min_size, part.max_size, most_sent, part.trim)
         case "checksum":
             assert part.checksum is not None
             check = Check(part.checksum)

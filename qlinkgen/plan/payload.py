@@ -375,6 +375,8 @@ class PayloadPlan:
         empty_is_default: an empty payload means that every field has its default.
         segments: how a payload is walked in which fields may be absent; () for all others. ``sizing`` and
             ``size`` are then empty.
+        trim: bytes that are sent at least where zeros at the end are not; None if all are sent. ``least``
+            is then the minimum size without them.
     """
 
     steps: tuple[Step, ...]
@@ -384,6 +386,17 @@ class PayloadPlan:
     most: int
     empty_is_default: bool
     segments: tuple[Segment, ...] = ()
+    trim: int | None = None
+
+    def trimmed(self, payload: bytes) -> bytes:
+        """A payload as sent, without zeros at its end."""
+        if self.trim is None:
+            return payload
+        return payload[: max(len(payload.rstrip(b"\0")), self.trim)]
+
+    def filled(self, payload: bytes) -> bytes:
+        """A payload with the zeros at its end that were not sent."""
+        return payload if self.trim is None else payload.ljust(self.most, b"\0")
 
     @property
     def walked(self) -> bool:
@@ -528,9 +541,10 @@ def limits(number: Scalar) -> tuple[Condition, ...]:
 # From the model ---------------------------------------------------------------------------------------------
 
 
-def payload_plan(message: Message) -> PayloadPlan:
-    """Plan the payload of a message."""
-    return _Planner(message.fields).plan(empty_is_default=message.empty_is_default)
+def payload_plan(message: Message, trim: int | None = None) -> PayloadPlan:
+    """Plan the payload of a message; see `PayloadPlan` for ``trim``."""
+    plan = _Planner(message.fields).plan(empty_is_default=message.empty_is_default)
+    return plan if trim is None else replace(plan, trim=trim, least=min(trim, plan.most))
 
 
 def record_plan(layout: Layout) -> RecordPlan:

@@ -282,6 +282,28 @@ class PartBitSpec(BitSpec):
     values: Directions | None = Field(default=None, description="The value for each direction")
 
 
+class TrimSpec(_Mapping):
+    """Bytes at the end of a payload that are not sent."""
+
+    zeros: Literal[True] = Field(description="Zero bytes are not sent; a receiver adds them")
+    keep: Annotated[StrictInt, Field(ge=0, le=0xFFFF)] = Field(
+        default=0, description="Number of bytes that are sent even if they are zero"
+    )
+
+
+class _TrimForms:
+    """Accepts what is trimmed alone."""
+
+    @staticmethod
+    def expanded(value: object) -> object:
+        """The mapping of a short form."""
+        return {value: True} if isinstance(value, str) else value
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [{"const": "zeros"}, handler(core)]}
+
+
 class PartSpec(Fact):
     """A part of a frame."""
 
@@ -319,6 +341,9 @@ class PartSpec(Fact):
     at_least: Time | None = Field(default=None, description="Its minimum at high speed")
     counts: PartNames | None = Field(default=None, description="Part, or parts, whose bytes a length counts")
     size: WholeRange | None = Field(default=None, description="Minimum..maximum payload size")
+    trim: Annotated[TrimSpec, BeforeValidator(_TrimForms.expanded), _TrimForms] | None = Field(
+        default=None, description="Bytes at the end of a payload that are not sent: zeros"
+    )
     algorithm: AnyAlgorithm | None = Field(
         default=None, description="Name of a CRC in the catalogue or of a sum, or the parameters of a CRC"
     )

@@ -111,6 +111,8 @@ class FrameBuilder:
         for part in frame.parts:
             if part.checksum and part.checksum.every:
                 self._check_blocks(frame, part, path)
+        if frame.payload.trim is not None:
+            self._check_trim(frame, frame.payload.trim, path)
         if self._is_circular(frame, path):
             return None
         self._check_length(frame, path)
@@ -172,6 +174,31 @@ class FrameBuilder:
         for is_wrong, what, hint in wrong:
             if is_wrong:
                 self._report.error("check-blocks", (*path, part.name, "every"), what, hint, of_key=True)
+                return
+
+    def _check_trim(self, frame: DelimitedFrame, keep: int, path: Path) -> None:
+        """Check that a length gives the size of a payload without the zeros at its end."""
+        payload, length = frame.payload, frame.part("length")
+        counted = length.name if length else ""
+        copies = [each.name for each in frame.parts if each.derivation and each.derivation.of == counted]
+        blocks = [each.name for each in frame.parts if each.checksum and each.checksum.every]
+        wrong = [
+            (length is None or payload.name not in length.counts, "no length counts the payload", "add one"),
+            (frame.length_scale > 1, "a length in steps cannot state every size", "remove scale or trim"),
+            (bool(copies), f"{listed(copies)} repeats the length", "remove it or trim"),
+            (bool(blocks), f"{listed(blocks)} has values for blocks of the payload", "remove every or trim"),
+            (frame.stuffing is not None, "the frame is stuffed", "remove the stuffing or trim"),
+            (frame.coding != (), "the frame is coded", "remove the coding or trim"),
+            (frame.part("terminator") is not None, "the frame has a terminator", "remove it or trim"),
+            (
+                keep < payload.min_size,
+                f"{keep} kept bytes are fewer than the {payload.min_size} of the shortest payload",
+                f"write keep: {payload.min_size}, or size: 0..{payload.max_size}",
+            ),
+        ]
+        for is_wrong, what, hint in wrong:
+            if is_wrong:
+                self._report.error("bad-trim", (*path, payload.name, "trim"), what, hint, of_key=True)
                 return
 
     def _check_empty(self, frame: DelimitedFrame, path: Path) -> None:
@@ -288,7 +315,7 @@ class FrameBuilder:
             return None
         self._parts.reject(
             spec.checksum,
-            ("value", "text", "counts", "size", "words", "rejected", "every", "otherwise"),
+            ("value", "text", "counts", "size", "trim", "words", "rejected", "every", "otherwise"),
             "checksum",
             place,
         )
@@ -367,7 +394,7 @@ class FrameBuilder:
     def _packet_checksum(self, spec: PartSpec, specs: Mapping[str, PartSpec], place: Path) -> Checksum | None:
         self._parts.reject(
             spec,
-            ("value", "text", "counts", "size", "sent", "only", "over", "init", "every", "otherwise"),
+            ("value", "text", "counts", "size", "trim", "sent", "only", "over", "init", "every", "otherwise"),
             "packet's checksum",
             place,
         )

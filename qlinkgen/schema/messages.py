@@ -183,6 +183,8 @@ class MessageBuilder:
         if message.empty_is_default and any(field.conditional for field in message.fields):
             what = f"{message.name} has fields that may be absent, so an empty one is not all its defaults"
             self._error("bad-condition", (*path[:-1], "empty_request"), what, "remove empty_request")
+        if isinstance(self._frame, DelimitedFrame) and self._frame.payload.trim is not None:
+            self._check_trim(message, path)
         if isinstance(self._frame, MarkedFrame):
             for field in message.fields:
                 self._check_marker(field, self._frame.marker, path)
@@ -215,6 +217,17 @@ class MessageBuilder:
             what = f"{message.name} can have as few as {least} bytes"
             hint = f"the frame requires {low}; lengthen a field by {low - least}, or lower this limit"
             self._error("payload-too-short", path, what, hint)
+
+    def _check_trim(self, message: Message, path: Path) -> None:
+        """Check that a receiver knows the number of zeros at the end that were not sent."""
+        hint = "give it a constant size, or remove trim from the payload"
+        for field in message.fields:
+            if not field.fixed or field.conditional:
+                what = f"the size of {field.name} varies, and zeros at the end of {message.name} are not sent"
+                self._error("bad-trim", (*path, field.name), what, hint)
+        if message.empty_is_default and message.max_size:
+            what = f"an empty {message.name} is one of zeros, which are not sent"
+            self._error("bad-trim", (*path[:-1], "empty_request"), what, "remove empty_request")
 
     def _check_end(self, message: Message, path: Path) -> None:
         """Check that the fields determine the end of a frame without a length or terminator."""

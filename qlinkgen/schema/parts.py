@@ -31,7 +31,7 @@ _ROLE_KEYS: Mapping[PartKind, Sequence[str]] = {
     "length": ("type", "byteorder", "counts", "scale", "offset"),
     "message": ("type", "byteorder"),
     "address": ("type", "byteorder"),
-    "payload": ("size",),
+    "payload": ("size", "trim"),
     "checksum": ("type", "byteorder", "algorithm", "init", "over", "every", "otherwise", "sent"),
     "terminator": ("value", "text", "shared"),
     "idle": ("time", "at_least"),
@@ -52,6 +52,7 @@ _KEYS = (
     "at_least",
     "counts",
     "size",
+    "trim",
     "algorithm",
     "init",
     "over",
@@ -150,6 +151,7 @@ class PartBuilder:
             offset=self._whole(spec, "offset", 0, path) if role == "length" else 0,
             min_size=size[0],
             max_size=size[1],
+            trim=spec.trim.keep if spec.trim and role == "payload" else None,
         )
 
     def _whole(self, spec: PartSpec, key: str, least: int, path: Path) -> int:

@@ -209,6 +209,11 @@ _ALL = (
         "They are sent inside it, after each block: a receiver needs the end of the last one.",
     ),
     Rule(
+        "bad-trim",
+        "Zeros that are not sent can be added again: a length gives the size of the rest.",
+        "A receiver adds them up to the constant size of the message.",
+    ),
+    Rule(
         "part-order",
         "Parts are listed once, in wire order.",
         "A checksum depends on the order of the bytes.",

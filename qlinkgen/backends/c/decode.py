@@ -51,9 +51,20 @@ class Decoder(Learner):
         self._check_size()
         for each in self.payload.sizing:
             self._size(each)
+        filled = len(self.lines)
         for step in self.payload.steps:
             self._read(step)
+        if self.payload.trim is not None and self.reads:
+            self.lines[filled:filled] = self._filling()
         return self.lines
+
+    def _filling(self) -> list[str]:
+        """Statements that add the zeros at the end that were not sent."""
+        return [
+            f"uint8_t whole[{self.payload.most}U] = {{0}};",
+            f"{self.layouts.prefix}_copy_(whole, payload, size);",
+            "payload = whole;",
+        ]
 
     def record(self) -> list[str]:
         """Statements that decode a record, whose bytes are all there."""
@@ -66,7 +77,7 @@ class Decoder(Learner):
     def _check_size(self) -> None:
         plan = self.payload
         if plan.fixed:
-            self.refuse([f"size != {plan.most}U"], "LENGTH")
+            self.refuse([f"size {'!=' if plan.trim is None else '>'} {plan.most}U"], "LENGTH")
             return
         known = 1 if plan.empty_is_default else 0  # an empty payload has been handled before
         terms = [f"size < {plan.least}U"] if plan.least > known else []

@@ -11,6 +11,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.naming import member
 from qlinkgen.plan.expr import OneOf
 from qlinkgen.plan.framing import ByMark, FramePlan
+from qlinkgen.plan.payload import PayloadPlan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -129,6 +130,8 @@ def _payload_lines(names: Names, plan: MessagePlan, has_struct: bool) -> tuple[l
     """Statements that encode the payload if it fits; otherwise wrapping fails."""
     p, call, message = names.prefix, "message, " if has_struct else "", plan.message
     constant = names.constant(message)
+    if is_trimmed(plan.payload):
+        return _trimmed_lines(names, plan, call), "size"
     size, fits = f"{constant}_MAX_SIZE", f"capacity >= {constant}_MAX_FRAME_SIZE"
     lines = []
     if message.variable:
@@ -143,6 +146,24 @@ def _payload_lines(names: Names, plan: MessagePlan, has_struct: bool) -> tuple[l
     encode = f"{names.function(message)}_encode({call}{p}_place_(wire, capacity, {size}), {size})"
     lines += [f"int size = {start};", "", f"if ({fits}) {{", f"    size = {encode};", "}"]
     return lines, "size"
+
+
+def _trimmed_lines(names: Names, plan: MessagePlan, call: str) -> list[str]:
+    """As `_payload_lines`: the size of what is sent is known only after the whole payload is encoded."""
+    p = names.prefix
+    return [
+        f"uint8_t payload[{names.constant(plan.message)}_MAX_SIZE];",
+        f"const int size = {names.function(plan.message)}_encode({call}payload, sizeof payload);",
+        "",
+        f"if ((size > 0) && {p}_fits_(capacity, (size_t)size)) {{",
+        f"    {p}_copy_({p}_place_(wire, capacity, (size_t)size), payload, (size_t)size);",
+        "}",
+    ]
+
+
+def is_trimmed(payload: PayloadPlan) -> bool:
+    """Whether zeros at the end may not be sent."""
+    return payload.trim is not None and payload.least < payload.most
 
 
 def is_wide(message: MessagePlan) -> bool:

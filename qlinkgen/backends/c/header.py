@@ -261,7 +261,7 @@ class Header:
             enums=enum_views(protocol, self._names),
             helpers=self._layouts.helpers(),
             has_text=any(run.text for run in runs),
-            has_bytes=bool(runs),
+            has_bytes=bool(runs) or self._plan.frame.envelope.payload.trim is not None,
             has_table=isinstance(check, CrcView),
             extended=sorted(self._layouts.extended),
             floats=self._floats(),

@@ -10,7 +10,7 @@ from qlinkgen.backends import c_text
 from qlinkgen.backends.c.decode import Decoder
 from qlinkgen.backends.c.describe import field_rows, member_note, message_head, record_head
 from qlinkgen.backends.c.encode import Encoder
-from qlinkgen.backends.c.framing import struct_parameter
+from qlinkgen.backends.c.framing import is_trimmed, struct_parameter
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import Names, count_type, is_wide, scalar_literal, unsigned
 from qlinkgen.backends.c.types import Kind, Types
@@ -193,7 +193,11 @@ class MessageWriter:
             encoder = WalkedEncoder(plan.payload, self._layouts, function=self._names.function(plan.message))
             return [*encoder.statements(), "return (int)size;"]
         size = f"{self._names.constant(plan.message)}_MAX_SIZE" if plan.payload.fixed else "size"
-        return [*Encoder(plan.payload, self._layouts).statements(), f"return (int){size};"]
+        lines = Encoder(plan.payload, self._layouts).statements()
+        if is_trimmed(plan.payload):
+            lines += trimming(size, plan.payload.least)
+            size = "size"
+        return [*lines, f"return (int){size};"]
 
     def _decode(self, plan: MessagePlan, same: str) -> list[str]:
         own, ok = "message, " if plan.payload.settable else "", f"return {self._names.upper}_OK;"
@@ -301,6 +305,17 @@ class MessageWriter:
                 return _run_members(each, f"{self._layouts.records[each.record.name]}_t", "records", note)
             case _:
                 assert_never(each)
+
+
+def trimming(most: str, keep: int) -> list[str]:
+    """Statements that leave out the zeros at the end of a payload, but not its first bytes."""
+    inside = f"(size > {keep}U) && " if keep else "(size > 0U) && "
+    return [
+        f"size_t size = {most};",
+        f"while ({inside}(payload[size - 1U] == 0U)) {{",
+        "    --size;",
+        "}",
+    ]
 
 
 def _run_members(run: RunStep, item: str, what: str, note: str) -> list[StructMember]:

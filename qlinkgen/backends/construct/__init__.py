@@ -37,10 +37,11 @@ _SUPPORT = {
     "Fletcher Id IdBits Length Mark MarkedFrame Packet Payload Stuffing Sum Xor messages_of",
     "_ended": "Add Cobs Digits EndedFrame Escape Insert Pair",
     "_frecords": "Record",
+    "_ftrimmed": "Trimmed",
     "_fwalks": "Walked",
 }
 #: Copied only if a tree uses them.
-_OPTIONAL = ("_ended", "_frecords", "_fwalks", "_packed")
+_OPTIONAL = ("_ended", "_frecords", "_ftrimmed", "_fwalks", "_packed")
 _ORIGINS = {"Decimal": "decimal"} | {
     name: f".{file}" for file, names in _SUPPORT.items() for name in names.split()
 }
@@ -73,7 +74,7 @@ def _imports(everything: tuple[Definition, ...]) -> str:
     blocks = (
         ["decimal"],
         ["construct"],
-        ["._ended", "._fields", "._frames", "._frecords", "._fwalks", "._packed"],
+        ["._ended", "._fields", "._frames", "._frecords", "._ftrimmed", "._fwalks", "._packed"],
     )
     lines = (
         "".join(_import(origin, by_origin[origin]) for origin in block if origin in by_origin)

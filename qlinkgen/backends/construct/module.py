@@ -79,11 +79,13 @@ def _message(message: MessagePlan, types: Types) -> Call:
         settings["checksum"] = False
     if message.payload.empty_is_default:
         settings["empty_is_default"] = True
+    if message.payload.trim is not None:
+        settings["keep"] = message.payload.trim
     if message.message.seeds:
         settings["seeds"] = message.message.seeds
     if message.payload.walked:
         settings["presence"] = Sequence(tuple(_presence(message.payload)))
-    name = "Walked" if message.payload.walked else "Message"
+    name = "Walked" if message.payload.walked else "Message" if message.payload.trim is None else "Trimmed"
     return Call(
         name, (message.name, hexadecimal(message.id), *fields(message, types)), tuple(settings.items())
     )

@@ -242,12 +242,14 @@ class PartsView:
         filling: the same in the order in which they are computed.
         seeds: attributes of message classes that check values cover.
         blank: size of the check value at the end of the frame, 0 if something else is there.
+        trim: bytes of a payload that are sent even if they are zeros at its end, None if all are.
     """
 
     title: str
     checks: Sequence[PlacedCheck]
     filling: Sequence[PlacedCheck]
     blank: int
+    trim: int | None
     seeds: Sequence[str]
     blocks: BlocksView | None
     address: AddressView | None
@@ -565,6 +567,7 @@ def _parts(plan: Plan, receiver: Rescan, title: str) -> PartsView:
         if envelope.blocks
         else None,
         blank=last.size if isinstance(last, CheckPart) else 0,
+        trim=envelope.payload.trim,
         seeds=sorted({seed_name(seed) for part in envelope.checks for seed in envelope.seeds(part)}),
         address=address,
         length=length,

@@ -267,7 +267,8 @@ class _Frame:
         raise AssertionError(part.name)
 
     def _payloads(self) -> Iterator[tuple[str, bytes]]:
-        plan, payload, length = self._message.payload, self._good.payload, self._envelope.length
+        plan, length = self._message.payload, self._envelope.length
+        payload = plan.filled(self._good.payload)
         for step, at in places(plan, payload):
             for name, number, data in _spoilt(step, payload[at:]):
                 yield f"{name} is {number}", payload[:at] + data + payload[at + len(data) :]

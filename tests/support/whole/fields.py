@@ -33,7 +33,8 @@ class Room:
     @classmethod
     def of(cls, shape: Shape) -> Room:
         """An empty payload."""
-        return cls(shape.least, shape.most, shape.has_length, bool(shape.word or shape.kind == "packet"))
+        fixed = bool(shape.word or shape.trimmed or shape.kind == "packet")
+        return cls(shape.least, shape.most, shape.has_length, fixed)
 
 
 @dataclass

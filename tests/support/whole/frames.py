@@ -45,6 +45,8 @@ class Shape:
     text: bool = True
     #: Size of the words of payloads, whose fields then have a fixed size.
     word: int = 0
+    #: Zeros at the end of payloads are not sent; their fields have a fixed size.
+    trimmed: bool = False
     #: The checksum of a marked frame lists its messages.
     only: bool = False
     #: Numeric attributes that check values cover.
@@ -192,8 +194,11 @@ class _Parts:
         if self._chance(0.08) and not hunted:
             self._add("gap", {"role": "constant", "value": "55"})
         names["payload"] = self._add("data", {"role": "payload"})
-        if "length" in names and self._chance(0.12) and not hunted:
+        roll = self.rng.random() if "length" in names else 0.5
+        if roll < 0.12 and not hunted:
             names["blocks"] = self._blocks(names)
+        elif roll > 0.8 and not hunted:
+            self.parts[names["payload"]]["trim"] = "zeros"
         if self._chance(0.08) and not strict:
             self._add("fence", {"role": "constant", "value": "5A"})
         self._checked(names, whole=strict)
@@ -405,13 +410,15 @@ class _Parts:
         others = sum(_size(self.parts[name]) for name in counted)
         if others and self._chance(0.15):
             length["offset"] = self.rng.randint(1, others)
-        elif self._chance(0.05) and not hunted:
+        elif self._chance(0.05) and not hunted and "trim" not in self.parts[names["payload"]]:
             length["scale"] = 2
         if hunted:
             self.parts[names["length"]]["type"] = "u8"
 
     def _stuffing(self, names: Doc, lead: str, *, hunted: bool, strict: bool) -> Doc:
         rng = self.rng
+        if "trim" in self.parts[names["payload"]]:
+            return {}
         if "blocks" in names or (not hunted and not self._chance(0.35 if lead else 0.05)):
             return {}
         first = lead.split()
@@ -439,6 +446,8 @@ class _Parts:
         if "length" in names:
             most = self._longest(names, stuffing, most, below=strict)
         parts[names["payload"]]["size"] = f"{least}..{most}"
+        if (trimmed := "trim" in parts[names["payload"]]) and (least or self._chance(0.5)):
+            parts[names["payload"]]["trim"] = {"zeros": True, "keep": max(least, rng.choice((0, 1, 1, 2, 9)))}
         address = parts.get(names.get("address", ""), {})
         return Shape(
             "parts",
@@ -452,6 +461,7 @@ class _Parts:
             names.get("address", ""),
             int(stuffing["after"].split()[0], 16) if stuffing else 0xA5,
             seeds=self.seeds,
+            trimmed=trimmed,
         )
 
     def _longest(self, names: Doc, stuffing: Doc, most: int, *, below: bool) -> int:

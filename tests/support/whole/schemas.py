@@ -185,7 +185,8 @@ class _Maker:
         if counters and rng.random() < 0.4:
             command["repeat"] = {"counter": rng.choice(counters)}
         absent = any(isinstance(spec, dict) and {"if", "optional"} & spec.keys() for spec in request.values())
-        if shape.has_length and request and not shape.least and not absent and rng.random() < 0.15:
+        distinct = shape.has_length and not shape.trimmed and not absent
+        if distinct and request and not shape.least and rng.random() < 0.15:
             command["empty_request"] = "defaults"
         if rng.random() < 0.2:
             command["in_flight"] = rng.randint(1, 3)
@@ -242,7 +243,8 @@ class _Maker:
         rng = self.rng
         if rng.random() < 0.2:
             command["many"] = rng.choice(({"count": rng.randint(1, 9)}, {"within": "20 ms"}))
-        if shape.has_length and not shape.least and shape.most > 8 and rng.random() < 0.8:
+        varies = shape.has_length and not shape.trimmed and not shape.least
+        if varies and shape.most > 8 and rng.random() < 0.8:
             self._size_from_request(command)
 
     def _size_from_request(self, command: Doc) -> None:

@@ -56,6 +56,10 @@ class Reference:
             }
         if isinstance(self.frame, Frame) and self.frame.beside:
             self.messages = tuple(replace(each, beside=self.frame.beside) for each in self.messages)
+        trim = next((spec["trim"] for spec in map(part_doc, parts.values()) if "trim" in spec), None)
+        if trim is not None:
+            keep = 0 if trim == "zeros" else trim.get("keep", 0)
+            self.messages = tuple(replace(each, trim=keep) for each in self.messages)
         self.by_name = {message.name: message for message in self.messages}
         used = {message.direction for message in self.messages}
         self.directions: tuple[Direction, ...] = (

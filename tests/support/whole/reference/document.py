@@ -282,6 +282,8 @@ class Message:
     checked: bool = True
     #: Values of its frame.
     beside: tuple[tuple[str, Number], ...] = ()
+    #: Zeros at the end of its payload are not sent after so many bytes; None: all are sent.
+    trim: int | None = None
 
     def values(self) -> Iterator[tuple[str, Value]]:
         """Values in wire order, those of the frame first."""

@@ -71,7 +71,10 @@ def _default_record(kind: Record) -> dict[str, Raw]:
 
 def encode(message: Message, values: Mapping[str, Raw]) -> bytes:
     """The payload of a message."""
-    return _fields(message.slots, values)
+    data = _fields(message.slots, values)
+    while message.trim is not None and len(data) > message.trim and data[-1] == 0:
+        data = data[:-1]
+    return data
 
 
 def _fields(slots: Sequence[Slot], values: Mapping[str, Raw]) -> bytes:
@@ -173,6 +176,8 @@ def decode(message: Message, payload: bytes) -> dict[str, Raw]:
     if message.walked:
         return _walked(message, payload)
     values: dict[str, Raw] = {}
+    if message.trim is not None:
+        payload += bytes(max(0, message.sizes[1] - len(payload)))
     for slot, data, number in _cut(message, payload):
         values |= _decoded(slot, data, number)
     return values
