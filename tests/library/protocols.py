@@ -37,6 +37,7 @@ PEERS: Mapping[str, tuple[str, str]] = {
     "dnp3": ("dnp3", "dnp3py"),
     "dynamixel_2": ("dynamixel_sdk", "dynamixel-sdk"),
     "mavlink_1": ("pymavlink", "pymavlink"),
+    "mavlink_2": ("pymavlink", "pymavlink"),
     "modbus_ascii": ("pymodbus", "pymodbus"),
     "modbus_rtu": ("pymodbus", "pymodbus"),
     "msp": ("yamspy", "yamspy"),
@@ -117,13 +118,29 @@ def described(name: str) -> Described:
 
 
 def text_of(name: str) -> str:
-    """The text of a schema, with what it includes: these have no group of blocks in common."""
+    """The text of a schema, with what it includes."""
     text = find(name).read_text("utf-8")
     included = re.search(r"^include: (\w+)\.yaml\n", text, re.MULTILINE)
     if included is None:
         return text
-    blocks = re.split(r"^(?=\w+:)", find(included[1]).read_text("utf-8"), flags=re.MULTILINE)
-    taken = "".join(block for block in blocks if block.partition(":")[0] in GROUPS)
-    return text.replace(included[0], "") + re.sub(
-        r"^    examples:\n(?:      - .*\n)+", "", taken, flags=re.MULTILINE
-    )
+    ours, theirs = _blocks(text.replace(included[0], "")), _blocks(find(included[1]).read_text("utf-8"))
+    for group in GROUPS:
+        if group in ours and group in theirs:
+            ours[group] = _joined(ours[group], theirs[group])
+        elif group in theirs:
+            ours[group] = theirs[group]
+    return re.sub(r"^    examples:\n(?:      - .*\n)+", "", "".join(ours.values()), flags=re.MULTILINE)
+
+
+def _blocks(text: str, indent: str = "") -> dict[str, str]:
+    """The entries of a mapping as text, by their keys; what precedes the first has the key ""."""
+    blocks = re.split(rf"^(?={indent}\w+:)", text, flags=re.MULTILINE)
+    return {block.partition(":")[0].strip() if index else "": block for index, block in enumerate(blocks)}
+
+
+def _joined(ours: str, theirs: str) -> str:
+    """A group of two files: keys of an entry replace those of the same entry."""
+    own, entries = _blocks(ours, "  "), _blocks(theirs, "  ")
+    for name, entry in own.items():
+        entries[name] = "".join((_blocks(entries.get(name, ""), "    ") | _blocks(entry, "    ")).values())
+    return "".join(entries.values())
