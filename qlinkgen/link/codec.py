@@ -124,7 +124,7 @@ class Command(Protocol):
     response_seconds: float
     repeat_safe: bool
     echoes: tuple[str, ...]
-    sizes: tuple[tuple[str, str], ...]
+    sizes: tuple[tuple[str, str, int], ...]
 
     @property
     def request(self) -> type[Framed]:
@@ -243,12 +243,23 @@ def meanings(reply: OtherReply) -> set[str]:
     return {reply.means, *(means for _, _, means in reply.cases)}
 
 
-def wrong_size(command: Command, request: Message, response: Message) -> str:
-    """Return the first field of a response with another number of items than the request says, "" if none."""
-    for name, asked in command.sizes:
-        if len(getattr(response, name)) != getattr(request, asked):
+def wrong_size(command: Command, request: Message, response: Message, *, received: bool = True) -> str:
+    """Return the first field of a response with another number of items than the request says, "" if none.
+
+    A received row of bits, of which only the bytes are counted, has the number of items that fit them.
+    """
+    for name, asked, bits in command.sizes:
+        items, number = len(getattr(response, name)), getattr(request, asked)
+        if items != number and not (received and bits and items == 8 * ((bits * number + 7) // 8) // bits):
             return name
     return ""
+
+
+def cut(command: Command, request: Message, response: Message) -> None:
+    """Reduce received rows of bits to the number of items that the request says."""
+    for name, asked, bits in command.sizes if type(response) is command.response else ():
+        if bits:
+            setattr(response, name, getattr(response, name)[: getattr(request, asked)])
 
 
 def answers(command: Command, request: Message, response: Message) -> bool:

@@ -23,7 +23,7 @@ from collections.abc import Mapping
 from qlinkgen.errors import BadReply, Collision, LinkError, NoReply
 from qlinkgen.errors import Refused as RequestRefused
 from qlinkgen.link.attempts import Attempts
-from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, is_message, reason_of
+from qlinkgen.link.codec import Codec, Fault, Framed, OtherReply, address_getter, cut, is_message, reason_of
 from qlinkgen.link.counters import LinkCounters
 from qlinkgen.link.echo import PROBE, EchoCanceller, EchoMode, EchoProbe
 from qlinkgen.link.events import (
@@ -351,6 +351,7 @@ class MasterEngine:
         reply = pending.replied_by(message, self._address(message))
         if reply is None:
             return self._is_one_of_many(message, now)
+        cut(pending.command.definition, pending.request, message)
         means = reply.meaning(message)
         event = OtherAnswer(now, pending.node, pending.request, message, means, attempts.number)
         self.events.append(event)
@@ -378,6 +379,7 @@ class MasterEngine:
             return False
         if not pending.answered_by(message, self._address(message)):
             return False
+        cut(pending.command.definition, pending.request, message)
         if answers.take(message):
             self._succeed(message, now)
             return True
@@ -443,6 +445,8 @@ class MasterEngine:
         pending, attempts = self._pending, self._attempts
         self._state = _ANSWERED[self._state]
         answers = self._answers
+        if pending.command.sizes:
+            cut(pending.command.definition, pending.request, response)
         self._outcome = reply = attempts.reply(response if answers is None else answers.items, now)
         self._answered(response, now)
         if self.verbose:

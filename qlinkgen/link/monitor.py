@@ -21,6 +21,7 @@ from qlinkgen.link.codec import (
     address_of,
     addresses_that_answer,
     answers,
+    cut,
     is_message,
 )
 from qlinkgen.link.events import Damaged, Stray
@@ -193,7 +194,9 @@ class Monitor:
         else:
             pending.answered = pending.reported = True
         delay = now - pending.at
-        self.heard.append(Replied(now, pending.request, response, delay, late, self._codec.encode(response)))
+        frame = self._codec.encode(response)
+        cut(pending.command, pending.request, response)
+        self.heard.append(Replied(now, pending.request, response, delay, late, frame))
 
     def _further_deadline(self, pending: _Pending, response: Framed, now: float) -> float | None:
         """Return the time until which another answer may follow this one, None if it is the last."""

@@ -176,8 +176,8 @@ class SlaveEngine:
         command = self._sized.get(type(request))
         if command is None or type(response) is not command.response:
             return
-        if name := wrong_size(command, request, response):
-            asked = dict(command.sizes)[name]
+        if name := wrong_size(command, request, response, received=False):
+            asked = next(number for field, number, _ in command.sizes if field == name)
             raise ValueError(
                 f"{response.NAME}: {name} has {len(getattr(response, name))} items; "
                 f"{asked} of the request asks for {getattr(request, asked)}"

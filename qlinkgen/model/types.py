@@ -338,6 +338,8 @@ class Array:
     packed: BitOrder | None = None
     #: The caller must provide the value: it has no default, and empty is not legal.
     required: bool = False
+    #: Only the request tells the number of items; without it there are as many as fit the bytes.
+    whole: bool = False
     #: Suffix for the name of its number of items.
     quantity: str = field(default="count", init=False)
 

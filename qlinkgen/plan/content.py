@@ -328,9 +328,10 @@ def _measure_walked(plan: PayloadPlan, start: bytes) -> int:
 
 def _learn(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:
     number = _number(count, payload, counts)
-    if number % count.scale or not count.bounds.holds(number):
+    items = count.items(number)
+    if items is None or not count.bounds.holds(number):
         raise BadContent("length", count.name)
-    return number // count.scale
+    return items
 
 
 def _number(count: CountStep, payload: bytes, counts: Mapping[str, int]) -> int:

@@ -332,6 +332,10 @@ def sizing_text(each: Sizing) -> str:
 
 
 def _counted_text(count: CountStep) -> str:
+    if count.term.packed:
+        times, by = count.term.per_byte
+        product = f"{times}*{count.name}" if times > 1 else count.name
+        return f"{product} / {by}" if by > 1 else product
     return f"{count.name} / {count.scale}" if count.scale > 1 else count.name
 
 

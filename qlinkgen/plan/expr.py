@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import gcd
 
 from qlinkgen.model.integer import packed_size
 
@@ -19,6 +20,17 @@ class Term:
     def value(self, number: int) -> int:
         """The size in bytes of so many items."""
         return packed_size(number, self.factor) if self.packed else number * self.factor
+
+    def items_in(self, size: int) -> int:
+        """The number of items that fit a size."""
+        return 8 * size // self.factor if self.packed else size // self.factor
+
+    @property
+    def per_byte(self) -> tuple[int, int]:
+        """The number of items in a byte as a fraction in lowest terms."""
+        units = 8 if self.packed else 1
+        common = gcd(units, self.factor)
+        return units // common, self.factor // common
 
 
 @dataclass(frozen=True, slots=True)

@@ -162,7 +162,7 @@ class Fields:
 
     def _learn(self, step: CountStep, number: int) -> None:
         if any(isinstance(each, Learn) and each.count is step for each in self._plan.sizing):
-            self._learned[step.run] = max(0, number // step.scale)
+            self._learned[step.run] = max(0, step.term.items_in(number))
 
     def _items(self, step: ItemsStep, raw: bytes, places: tuple[int, ...]) -> None:
         bad = None

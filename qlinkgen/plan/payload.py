@@ -139,6 +139,12 @@ class CountStep:
         assert not self.term.packed
         return self.term.factor
 
+    def items(self, number: int) -> int | None:
+        """The number of items that a number within the bounds tells; None if it tells none."""
+        if self.term.packed:
+            return self.term.items_in(number)
+        return None if number % self.scale else number // self.scale
+
 
 @dataclass(frozen=True)
 class Member:
@@ -219,6 +225,8 @@ class ItemsStep:
     default: tuple[int, ...]
     required: bool
     packed: BitOrder | None
+    #: Only the request tells the number of items; without it there are as many as fit the bytes.
+    whole: bool
     presence: Presence | None = None
 
     #: Suffix for the name of the number of items.
@@ -338,7 +346,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Learn:
-    """Take the number of items from a count: a multiple of ``count.scale`` within ``count.bounds``."""
+    """Take the number of items from a count within ``count.bounds``, as ``count.items`` says."""
 
     count: CountStep
 
@@ -514,7 +522,7 @@ def term_of(run: RunStep) -> Term:
 def _countable(count: CountStep) -> int:
     """The maximum number of items that a count can tell."""
     term, most = count.term, count.integer.maximum
-    return 8 * most // term.factor if term.packed else most // term.factor
+    return term.items_in(most)
 
 
 def conditions(number: Scalar) -> tuple[Condition, ...]:
@@ -637,7 +645,7 @@ class _Planner:
             case Array():
                 return ItemsStep(
                     field.name, place, kind.item.integer, kind.item, kind.length, kind.default, kind.required,
-                    kind.packed,
+                    kind.packed, kind.whole,
                 )  # fmt: skip
             case Record():
                 return RecordStep(field.name, place, record_plan(kind.layout))

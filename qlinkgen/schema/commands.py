@@ -173,9 +173,8 @@ class CommandBuilder:
             return asked, self._named_response(response, answers.path)
         found = sized(answers.fields, asked, answers.path, self._report)
         self._sizes[name] = found.sizes
-        answered = build(
-            name, spec, answers._replace(fields=found.fields), addressing=addressing, section=section
-        )
+        sized_answers = answers._replace(fields=found.fields, asked={name for name, _ in found.sizes})
+        answered = build(name, spec, sized_answers, addressing=addressing, section=section)
         self.messages.append(answered)
         return asked, answered
 

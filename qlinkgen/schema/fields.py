@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from qlinkgen.model.condition import exclusive
@@ -34,8 +34,11 @@ class FieldBuilder:
         """Report errors in records at their definition, whether used or not."""
         self._records.check()
 
-    def build(self, specs: Fields, path: Path) -> tuple[Field, ...]:
-        """The fields of one message, without those that cannot be built."""
+    def build(self, specs: Fields, path: Path, asked: Collection[str] = ()) -> tuple[Field, ...]:
+        """The fields of one message, without those that cannot be built.
+
+        ``asked`` are those with a number of items from the request.
+        """
         specs = with_counts(specs, path, self._report)
         fields = []
         for name, spec in specs.items():
@@ -44,7 +47,7 @@ class FieldBuilder:
                 doc, confirmed = self._inherited(spec)
                 fields.append(Field(name, kind, doc, spec.section, confirmed, spec.echo))
         fields = ConditionBuilder(specs, path, self._report).build(fields)
-        fields = self._counted(fields, path)
+        fields = self._counted(fields, path, asked)
         self._check_open_ends(fields, path)
         return tuple(self._bounded(fields, path))
 
@@ -74,7 +77,7 @@ class FieldBuilder:
 
     # Counts
 
-    def _counted(self, fields: Sequence[Field], path: Path) -> list[Field]:
+    def _counted(self, fields: Sequence[Field], path: Path, asked: Collection[str]) -> list[Field]:
         """The fields, each with the name of its count."""
         counters: dict[str, str] = {}
         for index, field in enumerate(fields):
@@ -82,7 +85,12 @@ class FieldBuilder:
                 later = {other.name: other for other in fields[index + 1 :]}
                 place = (*path, field.name, "counts")
                 if self._check_count(field, field.type, count, later, place):
-                    if count.unit == "bytes" and count.run not in counters and _is_packed(later[count.run]):
+                    row = later[count.run].type
+                    if count.unit != "bytes" or count.run in counters or not _is_row(row):
+                        pass
+                    elif count.run in asked:
+                        fields = self._whole(fields, count.run, (*path, count.run))
+                    else:
                         what = f"{field.name} does not tell the number of items of {count.run}"
                         hint = "a byte may hold several; put a count in items before it"
                         self._report.error(
@@ -90,6 +98,18 @@ class FieldBuilder:
                         )
                     counters.setdefault(count.run, field.name)
         return [_with_counter(field, counters.get(field.name)) for field in fields]
+
+    def _whole(self, fields: Sequence[Field], name: str, path: Path) -> Sequence[Field]:
+        """The fields; a row whose bytes alone are counted may have as many items as fit them."""
+        row = next(field.type for field in fields if field.name == name)
+        assert isinstance(row, Array)
+        item, most = row.item, row.items_in(row.size_of(row.length.maximum))
+        if item.bits > 8 or not item.minimum <= 0 <= item.maximum:
+            what = f"the bytes of {name} do not tell the number of its items without the request"
+            hint = "use items of up to 8 bits which may be 0, or put a count in items before it"
+            self._report.error("bad-count", path, what, hint, of_key=True)
+        row = replace(row, whole=True, length=replace(row.length, maximum=most))
+        return [replace(field, type=row) if field.name == name else field for field in fields]
 
     def _check_count(
         self, field: Field, scalar: Scalar, count: Count, later: Mapping[str, Field], path: Path
@@ -139,7 +159,7 @@ class FieldBuilder:
         """Check that a packed array of variable size has a count."""
         counts = [(*path, field.name) for field in fields if isinstance(field.type, Scalar)]
         for field in fields:
-            if is_open(field) and _is_packed(field):
+            if is_open(field) and _is_row(field.type):
                 what = f"the size of the payload does not tell the number of items of {field.name}"
                 hint = f"add a field with counts: {field.name} before it, or use a fixed number"
                 place = (*path, field.name)
@@ -203,8 +223,8 @@ def _with_counter(field: Field, counter: str | None) -> Field:
     return replace(field, type=replace(kind, length=replace(kind.length, counted_by=counter)))
 
 
-def _is_packed(field: Field) -> bool:
-    return isinstance(field.type, Array) and field.type.packed is not None
+def _is_row(kind: FieldType) -> bool:
+    return isinstance(kind, Array) and kind.packed is not None
 
 
 def is_open(field: Field) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple, assert_never
 
 from qlinkgen.model.fields import Field, Record, Records
@@ -29,6 +30,7 @@ class Written(NamedTuple):
         number_path: the place that states it.
         fields: its fields.
         path: their place.
+        asked: those with a number of items from the request.
     """
 
     part: str
@@ -36,6 +38,7 @@ class Written(NamedTuple):
     number_path: Path
     fields: Fields
     path: Path
+    asked: Collection[str] = ()
 
 
 class MessageBuilder:
@@ -75,7 +78,7 @@ class MessageBuilder:
             command=name,
             direction=direction,
             id=number,
-            fields=self._fields.build(layout.fields, layout.path),
+            fields=self._fields.build(layout.fields, layout.path, layout.asked),
             doc=spec.doc,
             section=section,
             confirmed=spec.confirmed,

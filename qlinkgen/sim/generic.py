@@ -58,7 +58,7 @@ class GenericNode:
         if command is None or command.response is None:
             return None
         sizes: dict[str, object] = {}
-        for name, asked in command.sizes:
+        for name, asked, _ in command.sizes:
             sizes |= _items(command.response, name, getattr(request, asked))
         if command.many is None:
             return self._answer(command.response, request, command.echoes, sizes)

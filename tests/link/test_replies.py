@@ -326,6 +326,69 @@ def test_a_slave_is_held_to_the_size(log: ModuleType) -> None:
         slave.receive(log.ReadRequest(node=3, many=3).to_frame(), 2.0)
 
 
+ROWS = SIZED.replace(
+    'response: {values: "u16[request.many]"}',
+    "response: {size: {type: u8, counts: bits, counts_in: bytes}, "
+    'bits: {type: "bool[request.many]", packed: least}}',
+).replace("0..4", "0..20")
+
+
+@pytest.fixture(scope="module")
+def rows() -> ModuleType:
+    protocol, faults = loads(ROWS, "log.yaml")
+    assert protocol is not None, faults
+    return load_codec(protocol)
+
+
+#: Three of 16 bits of the answer to a request for eleven are set, the last of them beyond those asked for.
+ASKED, SENT = 11, [True, *[False] * 9, True, *[False] * 4, True]
+
+
+def test_a_master_cuts_a_row_of_bits_to_the_number_asked_for(rows: ModuleType) -> None:
+    sent = rows.ReadResponse(node=3, bits=SENT).to_frame()
+    engine = MasterEngine(rows, Timing.of(rows, host_slack=SLACK))
+    answer = run(engine, rows.ReadRequest(node=3, many=ASKED), (0.012, sent))
+    assert answer.response.bits == SENT[:ASKED]
+
+
+@pytest.mark.parametrize("number", [0, 8, 17])
+def test_a_row_of_other_bytes_is_no_answer(rows: ModuleType, number: int) -> None:
+    engine = MasterEngine(rows, Timing.of(rows, host_slack=SLACK))
+    sent = rows.ReadResponse(node=3, bits=[True] * number).to_frame()
+    outcome = run(engine, rows.ReadRequest(node=3, many=ASKED), (0.012, sent), attempts=1)
+    assert isinstance(outcome.error, BadReply)
+
+
+def test_a_monitor_cuts_a_row_if_it_has_seen_the_request(rows: ModuleType) -> None:
+    sent = rows.ReadResponse(node=3, bits=SENT).to_frame()
+    for seen, bits in ((True, SENT[:ASKED]), (False, SENT)):
+        monitor = Monitor(rows, Timing.of(rows, host_slack=SLACK))
+        if seen:
+            monitor.receive(rows.ReadRequest(node=3, many=ASKED).to_frame(), 0.0)
+        monitor.receive(sent, 0.01)
+        heard: Any = monitor.heard[-1]
+        assert (heard.response if seen else heard.message).bits == bits
+
+
+def test_a_slave_packs_the_number_asked_for(rows: ModuleType) -> None:
+    class Node:
+        number = 3
+
+        def handle(self, request: Any, now: float) -> Any:
+            return rows.ReadResponse(node=3, bits=SENT[:ASKED])
+
+    slave = SlaveEngine(rows, Node(), baud=9600)
+    slave.receive(rows.ReadRequest(node=3, many=ASKED).to_frame(), 0.0)
+    assert slave.bytes_to_send(1.0)[3:6] == bytes([2, 0x01, 0x04])
+    with pytest.raises(ValueError, match=r"bits has 11 items; many of the request asks for 16"):
+        slave.receive(rows.ReadRequest(node=3, many=16).to_frame(), 2.0)
+
+
+def test_a_simulated_node_answers_with_a_row(rows: ModuleType) -> None:
+    made = GenericNode(rows, 3).handle(rows.ReadRequest(node=3, many=3), 0.0)
+    assert made == rows.ReadResponse(node=3, bits=[False] * 3)
+
+
 def test_a_simulated_node_answers_with_the_size(log: ModuleType) -> None:
     node = GenericNode(log, 3)
     assert node.handle(log.ReadRequest(node=3, many=3), 0.0) == log.ReadResponse(node=3, values=[0, 0, 0])

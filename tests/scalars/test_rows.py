@@ -12,6 +12,7 @@ from qlinkgen.model.integer import pack_row, unpack_row
 from qlinkgen.plan import plan_of
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import BadContent, pack, unpack
+from qlinkgen.plan.describe import sizing_text
 from qlinkgen.plan.dissect import dissect
 from tests.proof.outputs import plain_numbers
 from tests.scalars.protocols import faults_of, protocol_of
@@ -69,6 +70,55 @@ def test_counts(codec: Any) -> None:
     found = codec.PutRequest.from_bytes(PAYLOAD)
     assert {name: getattr(found, name) for name in VALUES} == VALUES
     assert dict(live.messages["put.request"].parse(PAYLOAD)) | {"_io": None} == VALUES | {"_io": None}
+
+
+ASKED = '{size: {type: u8, counts: a, counts_in: bytes}, a: {type: "u3[request.number]", packed: least}}'
+
+
+def _asked() -> Any:
+    return protocol_of("{number: {type: u8, range: 2..9}}", response=ASKED)
+
+
+@pytest.mark.parametrize(("number", "seen"), [(2, 2), (3, 5), (5, 5), (9, 10)])
+def test_without_the_request_a_row_has_the_items_that_fit_its_bytes(number: int, seen: int) -> None:
+    protocol = _asked()
+    codec, live, plan = python.load(protocol), construct.live(protocol), plan_of(protocol)
+    items = [at % 7 for at in range(number)]
+    payload = codec.PutResponse(a=items).to_bytes()
+    assert payload == live.payload("put.response", {"a": items})
+    assert payload[0] == len(payload) - 1
+    told = items + [0] * (seen - number)
+    assert codec.PutResponse.from_bytes(payload).a == told
+    assert plain_numbers(live.messages["put.response"].parse(payload)) == {"a": told}
+    content = plan.message("put.response").payload
+    assert unpack(content, payload) == {"a": told}
+    assert pack(content, {"a": items}) == payload
+    assert [sizing_text(each) for each in content.sizing] == ["a: 8*size / 3; size is 1..4"]
+    damaged = dissect(plan, Codec(plan).wrap("put.response", payload + b"\0"), "response")
+    assert [span.number for span in damaged.spans if getattr(span.of, "name", "") == "a"] == [seen]
+
+
+@pytest.mark.parametrize("payload", ["00", "05 00000000 00", "02 00", "01 0000"])
+def test_a_wrong_number_of_bytes_is_refused(payload: str) -> None:
+    protocol, data = _asked(), bytes.fromhex(payload)
+    codec, live = python.load(protocol), construct.live(protocol)
+    with pytest.raises(codec.DecodeError, match=r"length|bytes"):
+        codec.PutResponse.from_bytes(data)
+    with pytest.raises(ConstructError):
+        live.messages["put.response"].parse(data)
+    with pytest.raises(BadContent) as caught:
+        unpack(plan_of(protocol).message("put.response").payload, data)
+    assert caught.value.kind == "length"
+
+
+@pytest.mark.parametrize("row", ["u11[request.number]", "u3[request.number]"])
+def test_a_row_that_its_bytes_do_not_tell_is_refused(row: str) -> None:
+    limits = ", range: 1..6" if row.startswith("u3") else ""
+    response = ASKED.replace("u3[request.number]", row).replace("packed: least", f"packed: least{limits}")
+    found = faults_of("{number: {type: u8, range: 1..9}}", response=response)
+    assert [fault.message for fault in found] == [
+        "the bytes of a do not tell the number of its items without the request"
+    ]
 
 
 @pytest.mark.parametrize("number", [1, 7, 8, 9, 63, 64])

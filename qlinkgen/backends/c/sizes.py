@@ -27,6 +27,14 @@ def term_text(term: Term, number: str) -> str:
     return f"(({product} + 7U) / 8U)" if term.packed else product
 
 
+def _items_text(term: Term, size: str) -> str:
+    """The number of items of a row in so many bytes."""
+    times, by = term.per_byte
+    number = f"(size_t){grouped(size)}"
+    number = f"({number} * {times}U)" if times > 1 else number
+    return f"{number} / {by}U" if by > 1 else number
+
+
 def size_terms(message: Message, struct: str) -> str:
     """The size of a payload as an expression; ``struct`` is the prefix of its counts."""
     plan = payload_plan(message)
@@ -81,14 +89,18 @@ class Learner:
         """Assign the number of items of the run and check it; ``kind`` declares it."""
         integer, wide = count.integer, count.integer.bits > 16
         held, bounds = Within(0, integer.mask), count.bounds  # negative numbers are outside of them
-        if wide:  # may exceed a size_t
+        if wide or count.term.packed:  # may exceed a size_t
             self.refuse(broken([bounds], number, held, integer.bits), "LENGTH")
-        if count.scale > 1:
+        if count.term.packed:
+            number = _items_text(count.term, number)
+        elif count.scale > 1:
             self.refuse([f"({number} % {count.scale}U) != 0U"], "LENGTH")
             number, held = f"{number} / {count.scale}U", Within(0, integer.mask // count.scale)
             bounds = Within(bounds.low // count.scale, bounds.high // count.scale)
-        self.lines.append(f"{kind}{local(count.run)} = {f'(size_t){grouped(number)}' if wide else number};")
-        if not wide:
+        if wide and not count.term.packed:
+            number = f"(size_t){grouped(number)}"
+        self.lines.append(f"{kind}{local(count.run)} = {number};")
+        if not wide and not count.term.packed:
             self.refuse(broken([bounds], local(count.run), held, 16), "LENGTH")
         self.known.append(count.run)
 

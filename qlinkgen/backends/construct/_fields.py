@@ -447,14 +447,17 @@ class Message(Construct):
     def _learned(
         self, field: Renamed, data: bytes, path: str, known: Mapping[str, int]
     ) -> int:
-        """The number of items from a count; that of packed bytes must be known already."""
+        """The number of items from a count; as many as fit packed bytes if it is not known already."""
         cell, of = data[: field.sizeof()], field.subcon.of
         if len(cell) < field.sizeof():
             raise RangeError(f"{field.name} is missing", path=path)
-        if field.subcon.packed:
-            number = known.get(of, 0)
+        if field.subcon.packed and of in known:
+            number = known[of]
             told = field.subcon.number(cell) == field.subcon.told(number)
             return number if told else -1
+        if field.subcon.packed:
+            number = 8 * field.subcon.number(cell) // field.subcon.step
+            return self.runs[of].checked(number, path)
         number, rest = divmod(field.subcon.number(cell), field.subcon.step)
         if rest:
             raise RangeError(

@@ -753,7 +753,8 @@ class Command:
         repeat_counter: field that distinguishes a repeat from a new request, "" if there is none.
         echoes: fields of the response that repeat the field of the same name in the request.
         many: end of several answers, None if there is one.
-        sizes: fields of the response, and those of the request with their number of items.
+        sizes: fields of the response, those of the request with their number of items, and the bits of
+            an item if the count of bytes does not tell that number, otherwise 0.
         replies: answers other than the response, by class.
         in_flight: maximum number of outstanding requests.
         section: section of the source document.
@@ -782,7 +783,7 @@ class Command:
         repeat_counter: str = "",
         echoes: tuple[str, ...] = (),
         many: Many | None = None,
-        sizes: tuple[tuple[str, str], ...] = (),
+        sizes: tuple[tuple[str, str, int], ...] = (),
         replies: tuple[OtherReply, ...] = (),
         in_flight: int = 1,
         section: str = "",

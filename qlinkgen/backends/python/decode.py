@@ -361,6 +361,9 @@ class Decoder:
             case Learn():
                 run = self.message.payload.run(sizing.count.run)
                 start, number = self._count(sizing.count)
+                if sizing.count.term.packed:
+                    items = integers.items_text(sizing.count.term, number)
+                    return [*start, *divided(run, items, 1, self._bad_layout)]
                 return [*start, *divided(run, number, sizing.count.scale, self._bad_layout)]
             case Compare():
                 start, number = self._count(sizing.count)

@@ -180,6 +180,13 @@ def term_text(term: Term) -> str:
     return f"({product} + 7) // 8" if term.packed else product
 
 
+def items_text(term: Term, size: str) -> str:
+    """The number of items of a row in so many bytes."""
+    times, by = term.per_byte
+    number = f"({size})" if " " in size else size
+    return f"{number}{f' * {times}' if times > 1 else ''}{f' // {by}' if by > 1 else ''}"
+
+
 def size_text(size: Size) -> str:
     """A size as an expression."""
     return " + ".join(size_terms(size))

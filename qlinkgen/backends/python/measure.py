@@ -42,7 +42,9 @@ def _learned(payload: PayloadPlan, count: CountStep) -> list[str]:
     least, term = run.length.minimum, term_of(run)
     lines += [f"if len(data) < {at(count.integer.size)}:", "    return size"]
     odd = ""
-    if count.scale > 1:
+    if count.term.packed:
+        lines.append(f"{name} = {integers.items_text(count.term, number)}")
+    elif count.scale > 1:
         odd = f"{count.run}_odd or "
         lines.append(f"{name}, {count.run}_odd = divmod({number}, {count.scale})")
     else:

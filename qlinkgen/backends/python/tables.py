@@ -13,7 +13,7 @@ from qlinkgen.backends.python.layout import WIDTH, in_hex, wrapped
 from qlinkgen.backends.python.names import attribute, class_name
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.transaction import Allowance, Bus, ByCount, ByField, ByReply, ByTime, Command, Many, Reply
-from qlinkgen.model.types import Enum, Flags, NamedValue
+from qlinkgen.model.types import Array, Enum, Flags, NamedValue
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 
@@ -113,13 +113,23 @@ def _answers(command: Command, kept: Mapping[str, MessagePlan]) -> list[str]:
     arguments = []
     if command.many is not None:
         arguments.append(f"many=Many({_end(command.many, kept)})")
-    sizes = [f'("{attribute(name)}", "{attribute(asked)}")' for name, asked in command.sizes]
+    sizes = [
+        f'("{attribute(name)}", "{attribute(asked)}", {_row_bits(command, name)})'
+        for name, asked in command.sizes
+    ]
     if sizes:
         arguments.append(f"sizes={_tuple(sizes)}")
     replies = [_reply(each, kept[each.message.name]) for each in command.meant if each.message.name in kept]
     if replies:
         arguments.append(f"replies={_tuple(replies)}")
     return arguments
+
+
+def _row_bits(command: Command, name: str) -> int:
+    """The bits of an item of the response if its bytes alone are counted, otherwise 0."""
+    fields = command.response.fields if command.response else ()
+    kind = next((field.type for field in fields if field.name == name), None)
+    return kind.item.bits if isinstance(kind, Array) and kind.whole else 0
 
 
 def _end(many: Many, kept: Mapping[str, MessagePlan]) -> str:

@@ -28,6 +28,7 @@ from qlinkgen.plan.payload import (
     ValueStep,
     conditions,
     holders,
+    term_of,
 )
 from qlinkgen.plan.walk import present
 
@@ -110,7 +111,7 @@ class Rule:
                 octets = bytes(self._octet(i) & mask for i in range(self._count(step.length)))
                 return {step.name: step.stripped(octets)}
             case ItemsStep():
-                bits, count = self._bits(step.item), self._count(step.length)
+                bits, count = self._bits(step.item), whole(step, self._count(step.length))
                 return {step.name: [self._chosen(step.number, bits) for _ in range(count)]}
             case RecordStep():
                 return {step.name: self.values(step.record.payload)}
@@ -132,6 +133,12 @@ class Rule:
         for each in conditions(scalar):
             number &= ~each.mask if isinstance(each, Clear) else -1
         return number
+
+
+def whole(step: ItemsStep, count: int) -> int:
+    """The number of items that a receiver sees of so many."""
+    term = term_of(step)
+    return term.items_in(term.value(count)) if step.whole else count
 
 
 def _end(scalar: Scalar, which: int) -> int:
@@ -196,7 +203,8 @@ def _default(each: Holder) -> Raw:
             return None
         case ItemsStep():
             rules = each.conditions
-            return [each.number.default if broken(rules, item) else item for item in each.default]
+            items = [each.number.default if broken(rules, item) else item for item in each.default]
+            return items + [0] * (whole(each, len(items)) - len(items))
         case RecordStep():
             return defaults(each.record.payload)
         case RecordsStep():

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import assert_never
 
-from qlinkgen.backends.vectors.choice import filled
+from qlinkgen.backends.vectors.choice import filled, whole
 from qlinkgen.backends.vectors.writer import Json
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.codec import Codec
@@ -402,7 +402,7 @@ def _items(step: ItemsStep, data: bytes) -> Iterator[tuple[str, int, bytes]]:
     if not step.packed:
         yield from _beside(step.name, step.item, step.conditions)
         return
-    items = unpack_items(step, data, step.length.minimum)
+    items = unpack_items(step, data, whole(step, step.length.minimum))
     for rule in step.conditions:
         for number in _outside(rule, step.item.minimum, step.item.maximum):
             yield step.name, number, pack_items(step, [number, *items[1:]])

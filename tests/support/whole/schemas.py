@@ -245,17 +245,30 @@ class _Maker:
             command["many"] = rng.choice(({"count": rng.randint(1, 9)}, {"within": "20 ms"}))
         varies = shape.has_length and not shape.trimmed and not shape.least
         if varies and shape.most > 8 and rng.random() < 0.8:
-            self._size_from_request(command)
+            self._size_from_request(command, rows=not shape.groups)
 
-    def _size_from_request(self, command: Doc) -> None:
+    def _size_from_request(self, command: Doc, *, rows: bool) -> None:
         """Let a field of the request say how many items the response has."""
         request, rng = command["request"], self.rng
         plain = [name for name, spec in request.items() if re.fullmatch(r"[ui]\d+", str(spec))]
         if plain and "empty_request" not in command:
             name, kind = rng.choice(plain), rng.choice(("u8", "i16", "bytes", "text"))
             unsigned = request[name].replace("i", "u")
-            request[name] = {"type": unsigned, "range": rng.choice(("0..2", "1..3"))}
-            command["response"] = {self.words.name(set()): f"{kind}[request.{name}]"}
+            request[name] = {"type": unsigned, "range": rng.choice(("0..2", "1..3", "2..3"))}
+            value = self.words.name(set())
+            command["response"] = {value: f"{kind}[request.{name}]"}
+            if rows and rng.random() < 0.5:
+                command["response"] = self._row_from_request(value, name)
+
+    def _row_from_request(self, value: str, asked: str) -> Doc:
+        """A row of bits whose bytes alone are counted."""
+        rng = self.rng
+        size = {"type": rng.choice(("u8", "u16", "i16")), "counts": value, "counts_in": "bytes"}
+        kind = rng.choice(("bool", "bool", "u3", "i5", "u8"))
+        row: Doc = {"type": f"{kind}[request.{asked}]", "packed": rng.choice(("least", "most"))}
+        if kind == "u3" and rng.random() < 0.5:
+            row["range"] = "0..6"
+        return {self.words.name({value}): size, value: row}
 
     def _answer_id(
         self, shape: Shape, asked: list[int], used: set[tuple[str, int]], *, relative: bool

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
@@ -735,6 +735,7 @@ def _of_command(name: str, spec: Doc, document: Doc, fields: Fields, addressed: 
             number = numbered(document, number, direction)
         asked = {value: number for slot in fields.build(spec["request"]) for value, number in _numbers(slot)}
         slots = fields.build({key: _from_request(each, asked) for key, each in written.items()})
+        slots = tuple(_whole(slot, slots) for slot in slots)
         yield Message(
             f"{name}.{direction}",
             number,
@@ -760,6 +761,15 @@ def _from_request(spec: Any, asked: Mapping[str, Number]) -> Any:
     number = asked[match[1]]
     text = text.replace(match[0], f"[{number.low}..{number.high}]")
     return {**spec, "type": text} if isinstance(spec, dict) else text
+
+
+def _whole(slot: Slot, slots: Sequence[Slot]) -> Slot:
+    """A row of bits whose bytes alone are counted has as many items as fit them."""
+    kind = slot.kind
+    counted = any(each.counts == slot.name and each.counts_in == "items" for each in slots)
+    if not isinstance(kind, Run) or not kind.packed or kind.low == kind.most or counted:
+        return slot
+    return replace(slot, kind=replace(kind, high=kind.items_in(kind.bytes_of(kind.most))))
 
 
 def _answer(own: Any, common: Any) -> Any:

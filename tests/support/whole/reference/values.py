@@ -356,7 +356,7 @@ def _note(message: Message, slot: Slot, data: bytes, counted: dict[str, int]) ->
     assert isinstance(slot.kind, Number)
     raw = get(slot.kind.pieces, data)
     run = next(each.kind for each in message.slots if each.name == slot.counts)
-    if isinstance(run, Run) and run.packed and slot.counts_in == "bytes":
+    if isinstance(run, Run) and run.packed and slot.counts_in == "bytes" and slot.counts in counted:
         if raw != run.bytes_of(counted[slot.counts]):
             raise Wrong("length", "counts differ")
         return
@@ -369,6 +369,10 @@ def items_of(message: Message, slot: Slot, raw: int) -> int:
     """The number of items from a count. Raises Wrong if it is illegal for the field."""
     kind = next(each.kind for each in message.slots if each.name == slot.counts)
     assert isinstance(kind, Run | Records)
+    if kind.packed and slot.counts_in == "bytes":
+        if not kind.low <= kind.items_in(raw) <= kind.most:
+            raise Wrong("length", f"count {raw}")
+        return kind.items_in(raw)
     unit = kind.step if slot.counts_in == "bytes" else 1
     if raw % unit or not kind.low <= raw // unit <= kind.most:
         raise Wrong("length", f"count {raw}")
