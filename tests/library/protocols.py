@@ -129,7 +129,7 @@ def text_of(name: str) -> str:
             ours[group] = _joined(ours[group], theirs[group])
         elif group in theirs:
             ours[group] = theirs[group]
-    return re.sub(r"^    examples:\n(?:      - .*\n)+", "", "".join(ours.values()), flags=re.MULTILINE)
+    return re.sub(r"^    examples:\n(?:      .*\n)+", "", "".join(ours.values()), flags=re.MULTILINE)
 
 
 def _blocks(text: str, indent: str = "") -> dict[str, str]:

@@ -22,6 +22,7 @@ pymodbus = pytest.importorskip("pymodbus", reason="needs pymodbus (pip install p
 
 NODE = 17
 REGISTERS = [each * 3 for each in range(100)]
+COILS = [each % 3 == 0 or each % 7 == 0 for each in range(2400)]
 
 
 @pytest.fixture
@@ -38,10 +39,12 @@ def server(pty: PtyPort) -> Iterator[None]:
     from pymodbus.simulator import DataType, SimData, SimDevice
 
     ready, loop = threading.Event(), asyncio.new_event_loop()
-    data = SimData(0, values=list(REGISTERS), datatype=DataType.REGISTERS)
+    registers = SimData(0, values=list(REGISTERS), datatype=DataType.REGISTERS)
+    coils = SimData(0, values=list(COILS), datatype=DataType.BITS)
+    inputs = SimData(0, values=COILS[::-1], datatype=DataType.BITS)
 
     async def main() -> None:
-        device = SimDevice(NODE, simdata=[data])
+        device = SimDevice(NODE, simdata=([coils], [inputs], [registers], [registers]))
         made = ModbusSerialServer(context=device, framer=FramerType.RTU, port=pty.path, baudrate=115200)
         stop = asyncio.Event()
         loop.stop_it = stop.set  # type: ignore[attr-defined]
@@ -81,6 +84,15 @@ def test_our_master_reads_and_writes(master: BlockingMaster) -> None:
     assert master.engine.total.requests == master.engine.total.answers == 5
 
 
+@pytest.mark.parametrize("number", [1, 8, 37, 2000])
+def test_our_master_reads_coils_and_inputs(master: BlockingMaster, number: int) -> None:
+    codec: Any = described("modbus_rtu").module
+    coils = master.transact(codec.ReadCoilsRequest(node=NODE, start=0x13, quantity=number)).response
+    assert coils.coils == COILS[0x13 : 0x13 + number]
+    inputs = master.transact(codec.ReadDiscreteInputsRequest(node=NODE, start=5, quantity=number)).response
+    assert inputs.inputs == COILS[::-1][5 : 5 + number]
+
+
 def test_an_exception_ends_a_call_at_once_with_its_code(master: BlockingMaster) -> None:
     codec: Any = described("modbus_rtu").module
     begun = time.monotonic()
@@ -110,6 +122,10 @@ class Registers:
                 return codec.ReadHoldingRegistersResponse(
                     node=NODE, registers=self.values[start : start + quantity]
                 )
+            case codec.ReadCoilsRequest(start=start, quantity=quantity):
+                return codec.ReadCoilsResponse(node=NODE, coils=COILS[start : start + quantity])
+            case codec.ReadDiscreteInputsRequest(start=start, quantity=quantity):
+                return codec.ReadDiscreteInputsResponse(node=NODE, inputs=COILS[start : start + quantity])
             case codec.WriteSingleRegisterRequest(number=number, value=value):
                 self.values[number] = value
                 return codec.WriteSingleRegisterResponse(node=NODE, number=number, value=value)
@@ -139,6 +155,10 @@ def test_our_slave_answers_its_client(pty: PtyPort, slave: Registers) -> None:
     try:
         found = client.read_holding_registers(10, count=90, device_id=NODE)
         assert found.registers == REGISTERS[10:]
+        coils = client.read_coils(0x13, count=37, device_id=NODE)
+        assert coils.bits == [*COILS[0x13 : 0x13 + 37], False, False, False]
+        inputs = client.read_discrete_inputs(7, count=2000, device_id=NODE)
+        assert inputs.bits == COILS[7:2007]
         assert not client.write_register(11, 0xABCD, device_id=NODE).isError()
         assert client.write_registers(20, [7, 8, 9], device_id=NODE).count == 3
         assert slave.values[11] == 0xABCD

@@ -21,6 +21,18 @@ _KINDS: Mapping[str, tuple[type[ModbusPDU], Mapping[str, str]]] = {
     f"{name}.{direction}": (kind, pairs(named))
     for name, kinds, requested, answered in (
         (
+            "read_coils",
+            (bits.ReadCoilsRequest, bits.ReadCoilsResponse),
+            "start=address quantity=count",
+            "coils=bits",
+        ),
+        (
+            "read_discrete_inputs",
+            (bits.ReadDiscreteInputsRequest, bits.ReadDiscreteInputsResponse),
+            "start=address quantity=count",
+            "inputs=bits",
+        ),
+        (
             "read_holding_registers",
             (registers.ReadHoldingRegistersRequest, registers.ReadHoldingRegistersResponse),
             "start=address quantity=count",
