@@ -176,7 +176,7 @@ class FieldSpec(Fact, Lifetime):
         default=False, description="In a response: repeats the field of the same name in the request"
     )
     bits: dict[str, Annotated[BitSpec, ShortForm("at", "integer", "string")]] | None = Field(
-        default=None, description="Fields inside the integer"
+        default=None, min_length=1, description="Fields inside the integer"
     )
     when: AnyCondition | None = Field(
         default=None, alias="if", description="Present only where earlier fields have these values"
@@ -324,7 +324,7 @@ class PartSpec(Fact):
         default=None, description="Earlier part with the same value; ~PART, PART + N: derived from it"
     )
     bits: dict[str, Annotated[PartBitSpec, ShortForm("at", "integer", "string")]] | None = Field(
-        default=None, description="Roles of the bits of the integer"
+        default=None, min_length=1, description="Roles of the bits of the integer"
     )
     scale: Rational | None = Field(
         default=None, description="Of a value: that of one step in the unit; of a length: bytes of one step"
