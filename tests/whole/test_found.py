@@ -68,6 +68,15 @@ frame:
     checksum: {role: checksum, type: u16, algorithm: sum16, over: [payload], sent: [0..5, 8..13]}
 bus: {kind: ring, nodes: 1..7}
 """
+_ENDED = """\
+bus: {kind: master_slave}
+frame:
+  parts:
+    code: {role: message, type: u8}
+    data: {role: payload, size: 0..40}
+    crc: {type: u8, algorithm: sum8, over: [code, data]}
+    end: {role: terminator, value: 00}
+"""
 _BUS = "bus: {kind: master_slave, nodes: 1..8, broadcast: 9}\n"
 
 FOUND = {
@@ -95,6 +104,17 @@ FOUND = {
         "address, type: u8", "address, type: u24"
     )
     + "bus: {kind: master_slave, nodes: 0..16777215}\nmessages:\n  log: {id: 5, fields: {v: u8}}\n",
+    "a seed before a preamble that the check value covers, which C took after it": _PARTS.replace(
+        "over: [code", "over: [attribute.salt, start, code"
+    )
+    .replace("7E", "02 02")
+    .replace("sum8", "crc-8/wcdma")
+    + "  stuffing: {after: 02 02, insert: FD, exempt: [start]}\n"
+    + _BUS
+    + "attributes: {salt: {type: u8}}\nmessages:\n  log: {id: 5, attributes: {salt: 7}, fields: {v: u8}}\n",
+    "a coded frame, whose state C++ did not see wholly initialised": _ENDED
+    + "  coding: [{cobs: 00}]\n"
+    + "messages:\n  log: {id: 5, fields: {v: u8}}\n",
     "a field called like the type of another, which C++ refuses": _PARTS
     + _BUS
     + "messages:\n  log: {id: 5, fields: {v: u8, uint8_t: u8, int64_t: i64}}\n",

@@ -87,12 +87,17 @@ class CheckWriter(Places):
         """Loops that update the only check value with the covered bytes of an array."""
         return self._loops(self.alone, "check", array, start, payload_end) if self.alone else []
 
-    def _loops(self, check: CheckPart, key: str, array: str, start: str, payload_end: str) -> list[str]:
+    def _loops(
+        self, check: CheckPart, key: str, array: str, start: str, payload_end: str, *, lead: bool = False
+    ) -> list[str]:
+        """Statements that update a check value with the covered bytes; ``lead``: those of the lead too."""
         lines: list[str] = []
         for run in self.envelope.coverage(check):
             if isinstance(run, Seed):
                 lines += self._seed_updates(run, key)
                 continue
+            if lead and self.envelope.parts[0] in run:
+                lines += self._lead_updates(check, key)
             parts = [part for part in run if part in self.parts()]
             if parts:
                 first = self._place(parts[0], start, payload_end)
@@ -131,8 +136,8 @@ class CheckWriter(Places):
 
     def _value(self, part: CheckPart) -> ValueView:
         algorithm = self.algorithms[part.check.algorithm]
-        loops = self._loops(part, algorithm.key, "body", "0", "payload_end")
-        updates = self._empty(part) + self._lead_updates(part, algorithm.key) + loops
+        loops = self._loops(part, algorithm.key, "body", "0", "payload_end", lead=True)
+        updates = self._empty(part) + loops
         if not any("payload_end" in line for line in updates):
             updates.insert(0, "(void)payload_end;")
         seeded = part in self.envelope.seeded
