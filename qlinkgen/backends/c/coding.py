@@ -14,7 +14,7 @@ class StageView:
     """A coding.
 
     Attributes:
-        kind: the name of the template's branch.
+        kind: the name of its template.
         index: its position; functions of the next one have the next index, those of the wire the last.
         codes: bytes that are replaced, and the second bytes that they are sent as.
         number: the escape byte, the inserted byte, or the number added.
@@ -30,6 +30,11 @@ class StageView:
     pattern: str = ""
     pattern_mask: str = ""
     pattern_size: int = 0
+
+    @property
+    def template(self) -> str:
+        """The template of its functions."""
+        return f"templates/coding_{self.kind}.h.j2"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

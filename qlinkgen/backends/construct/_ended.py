@@ -20,6 +20,7 @@ from ._frames import (
     Length,
     Part,
     Payload,
+    Stuffing,
     _allowed,
     _size,
 )
@@ -52,27 +53,6 @@ class Escape(NamedTuple):
                 bytes([second ^ self.mask if self.mask else plain[second]]) + run[1:]
             )
         return head
-
-
-class Insert(NamedTuple):
-    """Inserts a byte after each occurrence of a pattern."""
-
-    after: bytes
-    insert: bytes
-
-    def add(self, data: bytes) -> bytes:
-        """The coded bytes."""
-        return data.replace(self.after, self.after + self.insert)
-
-    def remove(self, data: bytes) -> bytes:
-        """The decoded bytes."""
-        plain = data.replace(self.after + self.insert, self.after)
-        if self.add(plain) != data:
-            raise FrameError(
-                "stuffing",
-                f"{self.insert.hex()} does not follow each {self.after.hex()}",
-            )
-        return plain
 
 
 class Cobs(NamedTuple):
@@ -143,7 +123,7 @@ class Add(NamedTuple):
         return bytes((byte - self.number) % 256 for byte in data)
 
 
-Coding = Escape | Insert | Cobs | Digits | Pair | Add
+Coding = Escape | Stuffing | Cobs | Digits | Pair | Add
 
 
 class EndedFrame(Frame):

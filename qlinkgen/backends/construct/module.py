@@ -281,7 +281,7 @@ def _stage(coding: Stage) -> Call:
             mask = (("mask", hexadecimal(coding.mask)),) if coding.mask else ()
             return Call("Escape", (hexadecimal(coding.escape), codes), mask)
         case Insertion():
-            return Call("Insert", (coding.after, bytes((coding.insert,))))
+            return Call("Stuffing", (coding.after, bytes((coding.insert,))))
         case Cobs():
             return Call("Cobs")
         case Digits():
