@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from qlinkgen.model.texts import one_line
 from qlinkgen.model.types import Flags
-from qlinkgen.plan.framing import MarkPart
+from qlinkgen.plan.parts import MarkPart
 from qlinkgen.plan.payload import BitsStep
 
 

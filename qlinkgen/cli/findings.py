@@ -20,17 +20,8 @@ from qlinkgen.plan.describe import (
     transparency_text,
     value_text,
 )
-from qlinkgen.plan.framing import (
-    BlocksPart,
-    ByLength,
-    ByMark,
-    CellPart,
-    CheckPart,
-    ConstantPart,
-    EqualPart,
-    LengthPart,
-    MarkPart,
-)
+from qlinkgen.plan.ends import ByLength, ByMark
+from qlinkgen.plan.parts import BlocksPart, CellPart, CheckPart, ConstantPart, EqualPart, LengthPart, MarkPart
 from qlinkgen.plan.payload import ConstantStep, Member, Step
 from qlinkgen.plan.spans import Dissection, Fault, Rule
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit

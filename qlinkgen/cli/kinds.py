@@ -12,7 +12,8 @@ from qlinkgen._resources import schemas_dir
 from qlinkgen.cli.boundary import Failure
 from qlinkgen.cli.common import find_schema
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan, frame_plan
+from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.framing import frame_plan
 
 
 class Kind(Enum):

@@ -22,7 +22,9 @@ from qlinkgen.plan.describe import (
     transparency_text,
     type_text,
 )
-from qlinkgen.plan.framing import CheckPart, Envelope, FramePlan, Part, PayloadPart
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import CheckPart, Part, PayloadPart
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,

@@ -14,7 +14,7 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.describe import id_text, span_text, transparency_text
-from qlinkgen.plan.framing import ByMark
+from qlinkgen.plan.ends import ByMark
 
 
 @click.command("show")

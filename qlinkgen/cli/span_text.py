@@ -6,7 +6,7 @@ from typing import assert_never
 
 from qlinkgen.plan.content import unpack_items
 from qlinkgen.plan.describe import id_text, part_text, value_text
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
     CellPart,

@@ -18,7 +18,8 @@ from qlinkgen.cli.codec import MessageObject
 from qlinkgen.link.codec import Fault, Framed, Message, address_of, is_message
 from qlinkgen.model.message import Direction
 from qlinkgen.model.protocol import Protocol as Described
-from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, ByTerminator, FramePlan, frame_plan
+from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator
+from qlinkgen.plan.framing import FramePlan, frame_plan
 
 #: Kinds of faults in the order of the checks: of two faults, the later one is reported.
 PROGRESS = ("unknown", "length", "frame", "stuffing", "truncated", "crc", "illegal", "range")

@@ -7,8 +7,8 @@ equal.
 
 * `select` filters messages by role and name.
 * `payload` turns the fields of a message into steps.
-* `framing` turns a frame into parts, their `transparency`, their `check` and the `receiver` that finds them;
-  `coding` has the codings of which a transparency may consist.
+* `framing` turns a frame into `parts` in an `envelope`, their `transparency`, their `check`, and their `ends`
+  with the receiver that finds them; `coding` has the codings of which a transparency may consist.
 * `codec` and `receive` interpret the plan: the reference for every target. `dissect` explains each byte of a
   frame.
 * `describe` puts parts and steps into words. docs/plan.md shows them.

@@ -7,22 +7,21 @@ from typing import assert_never
 from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.plan import select
+from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import OneOf, Within
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.framing import FramePlan, frame_plan
+from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
     CellPart,
     CheckPart,
     ConstantPart,
-    Envelope,
     EqualPart,
-    FramePlan,
     IdPart,
     LengthPart,
     MarkPart,
     Part,
     PayloadPart,
-    frame_plan,
 )
 from qlinkgen.plan.payload import payload_plan
 from qlinkgen.plan.select import Options

@@ -37,7 +37,9 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan import content
 from qlinkgen.plan.content import BadContent, Raw, Unsendable
 from qlinkgen.plan.ended import frame_reader
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
     BlocksPart,
@@ -45,18 +47,13 @@ from qlinkgen.plan.framing import (
     CheckPart,
     ConstantPart,
     ConstantSlot,
-    Envelope,
     EqualPart,
-    Hunt,
     IdPart,
     IdSlot,
-    InStep,
     LengthPart,
     MarkPart,
-    Marks,
     Numeric,
     PayloadPart,
-    Rescan,
     Slot,
 )
 from qlinkgen.plan.payload import Member

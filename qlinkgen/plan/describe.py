@@ -24,31 +24,24 @@ from qlinkgen.model.types import (
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.check import Check
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
+from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
     BlocksPart,
-    ByLength,
-    ByMark,
-    ByMessage,
-    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
     ConstantSlot,
     EqualPart,
-    FramePlan,
-    Hunt,
     IdPart,
     IdSlot,
-    InStep,
     LengthPart,
     MarkPart,
-    Marks,
     Part,
     PayloadPart,
-    Rescan,
     Slot,
 )
 from qlinkgen.plan.payload import (

@@ -16,19 +16,15 @@ from qlinkgen.model.integer import Integer
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import BadContent, MoreNeeded, broken, measure
+from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Hunt
 from qlinkgen.plan.fields import Fields
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
-    ByLength,
-    ByMark,
-    ByMessage,
-    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
     EqualPart,
-    Hunt,
     IdPart,
     LengthPart,
     MarkPart,

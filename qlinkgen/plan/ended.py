@@ -6,13 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from qlinkgen.model.message import Direction
-from qlinkgen.plan.framing import (
-    ByTerminator,
-    Envelope,
-    FramePlan,
-    LengthPart,
-    PayloadPart,
-)
+from qlinkgen.plan.ends import ByTerminator
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import LengthPart, PayloadPart
 from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, is_wrong
 from qlinkgen.plan.transparency import Coded
 from qlinkgen.plan.tree import MessagePlan

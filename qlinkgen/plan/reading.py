@@ -13,25 +13,21 @@ from typing import assert_never
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator, Rescan
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
-    ByLength,
-    ByMark,
-    ByMessage,
-    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
     EqualPart,
-    FramePlan,
     IdPart,
     LengthPart,
     MarkPart,
     Numeric,
     Part,
     PayloadPart,
-    Rescan,
     gathered,
 )
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing

@@ -14,7 +14,7 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec, Decoded, take_packet
 from qlinkgen.plan.content import BadContent, MoreNeeded, measure
 from qlinkgen.plan.ended import frame_reader
-from qlinkgen.plan.framing import ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.reading import BadFrame, FrameReader, Incomplete, NoFrame, Taken, take_marked
 from qlinkgen.plan.tree import Plan
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from qlinkgen.model.message import Direction
-from qlinkgen.plan.framing import Part
+from qlinkgen.plan.parts import Part
 from qlinkgen.plan.payload import Member, Step
 from qlinkgen.plan.tree import MessagePlan, Plan
 

@@ -12,8 +12,9 @@ from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.transaction import Command
 from qlinkgen.model.types import Enum, Flags
+from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import OneOf
-from qlinkgen.plan.framing import Envelope, FramePlan
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.payload import PayloadPlan
 from qlinkgen.plan.select import Role
 

@@ -16,7 +16,7 @@ import pytest
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.framing import Hunt, InStep
+from qlinkgen.plan.ends import Hunt, InStep
 from qlinkgen.schema import loads
 from tests.c import test_shapes
 from tests.c.conftest import PROTOCOLS, SANITIZED, protocol_of

@@ -11,17 +11,8 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.dissect import dissect
-from qlinkgen.plan.framing import (
-    AddressPart,
-    ByLength,
-    ByMark,
-    ByTerminator,
-    CheckPart,
-    ConstantPart,
-    IdPart,
-    LengthPart,
-    MarkPart,
-)
+from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator
+from qlinkgen.plan.parts import AddressPart, CheckPart, ConstantPart, IdPart, LengthPart, MarkPart
 from qlinkgen.plan.payload import Member
 from qlinkgen.plan.reading import BadFrame
 from qlinkgen.plan.spans import Around, Dissection, Fault, Owner, Rule

@@ -8,7 +8,7 @@ import pytest
 
 from qlinkgen.plan import Plan, plan_of
 from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.framing import ByTerminator, Rescan
+from qlinkgen.plan.ends import ByTerminator, Rescan
 from qlinkgen.plan.reading import BadFrame
 from qlinkgen.plan.receive import receiver
 from qlinkgen.schema import loads

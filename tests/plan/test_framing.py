@@ -9,7 +9,9 @@ import pytest
 
 from qlinkgen.model.integer import Chunk
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.framing import FramePlan, Hunt, MarkPart, Rescan
+from qlinkgen.plan.ends import Hunt, Rescan
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import MarkPart
 from qlinkgen.plan.transparency import FrameStuffing
 from qlinkgen.schema import loads
 from qlinkgen.schema.loader import load

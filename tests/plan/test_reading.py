@@ -10,7 +10,7 @@ import pytest
 from qlinkgen.model.message import Direction
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.ended import frame_reader
-from qlinkgen.plan.framing import ByTerminator, Hunt, Rescan
+from qlinkgen.plan.ends import ByTerminator, Hunt, Rescan
 from qlinkgen.plan.reading import BadFrame, Incomplete
 from tests.plan import shapes
 

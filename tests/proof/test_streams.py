@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.framing import Rescan
+from qlinkgen.plan.ends import Rescan
 from tests.proof import cases, recovery
 from tests.proof.conftest import Make
 from tests.proof.corruption import EVERY_KIND, corrupted

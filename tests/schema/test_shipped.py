@@ -14,7 +14,7 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob, Enum, Flags, Scalar
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.framing import Hunt
+from qlinkgen.plan.ends import Hunt
 from qlinkgen.schema import find, lint, load, loads, shipped
 
 ROWS = list(csv.DictReader(Path(__file__).with_name("mc1231a.csv").read_text("utf-8").splitlines()))

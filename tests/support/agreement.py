@@ -10,7 +10,8 @@ from qlinkgen.model.message import Direction
 from qlinkgen.plan import Plan
 from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.content import Raw, Unsendable
-from qlinkgen.plan.framing import ConstantPart, Rescan
+from qlinkgen.plan.ends import Rescan
+from qlinkgen.plan.parts import ConstantPart
 from qlinkgen.plan.reading import BadFrame
 from qlinkgen.plan.receive import Event, receiver
 from qlinkgen.plan.transparency import FrameStuffing, PayloadStuffing, SevenBit

@@ -18,7 +18,8 @@ from qlinkgen.model.message import Field, Message
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Blob
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.framing import FramePlan, Hunt, InStep, Marks
+from qlinkgen.plan.ends import Hunt, InStep, Marks
+from qlinkgen.plan.framing import FramePlan
 
 PROOFS = Path(__file__).parents[1] / "c" / "proofs"
 CHECKS = (

@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 from qlinkgen.model.protocol import Protocol
-from qlinkgen.plan.framing import Hunt, Marks, Rescan
+from qlinkgen.plan.ends import Hunt, Marks, Rescan
 from tests.support.cfuzz_dispatch import dispatch
 from tests.support.cfuzz_source import Harness
 

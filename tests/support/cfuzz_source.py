@@ -15,7 +15,7 @@ from qlinkgen.model.message import Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.types import Array, Bits, Blob, Reserved, Scalar
 from qlinkgen.plan import plan_of
-from qlinkgen.plan.framing import Hunt, Rescan
+from qlinkgen.plan.ends import Hunt, Rescan
 from qlinkgen.plan.transparency import FrameStuffing
 
 

@@ -20,9 +20,9 @@ from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import from_json
 from qlinkgen.plan import MessagePlan, Plan, plan_of
 from qlinkgen.plan.codec import Codec
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.ends import ByTerminator
+from qlinkgen.plan.parts import (
     AddressPart,
-    ByTerminator,
     CheckPart,
     ConstantPart,
     IdPart,

@@ -12,7 +12,8 @@ from qlinkgen.backends.c.places import Places, any_of, in_hex, indented, refusal
 from qlinkgen.model.checksum import Checksum
 from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.framing import ByTerminator, CheckPart, Seed
+from qlinkgen.plan.ends import ByTerminator
+from qlinkgen.plan.parts import CheckPart, Seed
 
 
 @dataclass(frozen=True, slots=True)

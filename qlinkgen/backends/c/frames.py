@@ -35,7 +35,7 @@ from qlinkgen.backends.c.views import (
 )
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import member
-from qlinkgen.plan.framing import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 ReceivedMessages = Sequence[tuple[Direction, Sequence[MessagePlan]]]

@@ -9,8 +9,9 @@ from qlinkgen.backends.c.names import Names, storage, unsigned, unsigned_type
 from qlinkgen.backends.c.sizes import size_terms
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import member
+from qlinkgen.plan.ends import ByMark
 from qlinkgen.plan.expr import OneOf
-from qlinkgen.plan.framing import ByMark, FramePlan
+from qlinkgen.plan.framing import FramePlan
 from qlinkgen.plan.payload import PayloadPlan
 from qlinkgen.plan.tree import MessagePlan, Plan
 

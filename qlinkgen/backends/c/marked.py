@@ -9,7 +9,8 @@ from qlinkgen.backends.c.names import Names, unsigned_type
 from qlinkgen.backends.c.places import any_of, in_hex, sender_of
 from qlinkgen.backends.c.views import PlaceView
 from qlinkgen.model.integer import Chunk
-from qlinkgen.plan.framing import ByMark, MarkPart
+from qlinkgen.plan.ends import ByMark
+from qlinkgen.plan.parts import MarkPart
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 

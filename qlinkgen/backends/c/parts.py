@@ -11,7 +11,7 @@ from qlinkgen.backends.c.checks import as_unsigned, from_unsigned, refused_befor
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.backends.c.places import any_of, in_hex, refusal, shifted
 from qlinkgen.model.naming import member
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
     BlocksPart,

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from qlinkgen.backends.c.layout import Layouts
 from qlinkgen.backends.c.names import unsigned, unsigned_type
 from qlinkgen.model.naming import address_member
-from qlinkgen.plan.framing import Bits, Envelope, FramePlan, Numeric, Part, Slot
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import Bits, Numeric, Part, Slot
 from qlinkgen.plan.transparency import FrameStuffing
 
 

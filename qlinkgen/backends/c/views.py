@@ -16,7 +16,7 @@ from qlinkgen.backends.c.names import unsigned_type
 from qlinkgen.backends.c.parts import PartWriter, length_bounds
 from qlinkgen.backends.c.places import in_hex, sender_of
 from qlinkgen.plan.coding import Insertion
-from qlinkgen.plan.framing import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.ends import ByMessage, ByTerminator, Hunt, InStep, Marks, Rescan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import Plan
 

@@ -13,7 +13,7 @@ from qlinkgen.backends.conformance.sources import Sources
 from qlinkgen.errors import GenerationError
 from qlinkgen.model.naming import file_stem
 from qlinkgen.plan import Plan
-from qlinkgen.plan.framing import Rescan
+from qlinkgen.plan.ends import Rescan
 
 #: Bits of a row's first byte that name kinds; the two above them say "by hand" and "refused".
 _KINDS = 6

@@ -13,7 +13,8 @@ from qlinkgen.backends.conformance.rows import Right, Row
 from qlinkgen.model.message import Direction
 from qlinkgen.plan import MessagePlan, Plan
 from qlinkgen.plan.codec import Decoded
-from qlinkgen.plan.framing import Hunt, InStep, MarkPart, Marks, Rescan
+from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.parts import MarkPart
 from qlinkgen.plan.receive import receiver
 
 #: The event of an intact frame.

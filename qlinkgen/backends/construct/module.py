@@ -11,28 +11,24 @@ from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.integer import Integer
 from qlinkgen.model.naming import record_key
 from qlinkgen.plan.coding import Add, Cobs, Digits, Escaping, Insertion, Pair, Stage
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.ends import ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.framing import FramePlan
+from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
     BlocksPart,
-    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
     ConstantSlot,
-    Envelope,
     EqualPart,
-    FramePlan,
-    Hunt,
     IdPart,
     IdSlot,
-    InStep,
     LengthPart,
     MarkPart,
-    Marks,
     Part,
     PayloadPart,
-    Rescan,
 )
 from qlinkgen.plan.payload import Member, PayloadPlan
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit

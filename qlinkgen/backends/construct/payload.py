@@ -18,7 +18,7 @@ from qlinkgen.model.naming import record_key
 from qlinkgen.model.types import Enum, Flags, Float, Scalar, byte_chunks
 from qlinkgen.model.values import native_from_raw
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
-from qlinkgen.plan.framing import CellPart
+from qlinkgen.plan.parts import CellPart
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,

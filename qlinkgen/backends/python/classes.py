@@ -21,7 +21,9 @@ from qlinkgen.model.frame import ATTRIBUTE
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import pascal
 from qlinkgen.model.types import Scalar
-from qlinkgen.plan.framing import ByLength, ByMark, ByMessage, ByTerminator, Envelope, Seed
+from qlinkgen.plan.ends import ByLength, ByMark, ByMessage, ByTerminator
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.parts import Seed
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,

@@ -14,7 +14,7 @@ from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Enum, Flags, Float, Scalar
 from qlinkgen.plan.expr import Size, Within
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
     BlocksPart,

@@ -17,7 +17,7 @@ from qlinkgen.backends.python.structs import format_of, table, tabled
 from qlinkgen.model.integer import Integer, packed_size
 from qlinkgen.model.types import Float, Scalar
 from qlinkgen.plan.expr import Condition, Within
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
     BlocksPart,

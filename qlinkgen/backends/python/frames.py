@@ -16,26 +16,20 @@ from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.message import Direction
 from qlinkgen.model.naming import address_argument, address_attribute
 from qlinkgen.plan.check import Check
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.ends import ByLength, ByMark, ByTerminator, Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.parts import (
     AddressPart,
     BlocksPart,
-    ByLength,
-    ByMark,
-    ByTerminator,
     CellPart,
     CheckPart,
     ConstantPart,
-    Envelope,
     EqualPart,
-    Hunt,
     IdPart,
-    InStep,
     LengthPart,
     MarkPart,
-    Marks,
     Part,
     PayloadPart,
-    Rescan,
     Seed,
 )
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit

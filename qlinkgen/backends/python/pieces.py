@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from qlinkgen.backends.python import integers
-from qlinkgen.plan.framing import Bits, CellPart, Envelope, EqualPart, Numeric, Part
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.parts import Bits, CellPart, EqualPart, Numeric, Part
 
 
 def number(envelope: Envelope, pieces: tuple[Bits, ...], source: str, skipped: int = 0) -> str:

@@ -9,7 +9,9 @@ from typing import assert_never
 from qlinkgen.backends.python.names import named_classes
 from qlinkgen.model.integer import ByteOrder
 from qlinkgen.model.naming import address_attribute
-from qlinkgen.plan.framing import CheckPart, Envelope, Hunt, InStep, Marks, Part, Rescan
+from qlinkgen.plan.ends import Hunt, InStep, Marks, Rescan
+from qlinkgen.plan.envelope import Envelope
+from qlinkgen.plan.parts import CheckPart, Part
 from qlinkgen.plan.payload import Member
 from qlinkgen.plan.tree import Plan
 

@@ -14,7 +14,7 @@ from qlinkgen.backends.python.structs import format_of
 from qlinkgen.model.condition import Test
 from qlinkgen.model.integer import Integer
 from qlinkgen.plan.expr import OneOf, Size, Within
-from qlinkgen.plan.framing import LengthPart
+from qlinkgen.plan.parts import LengthPart
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,

@@ -9,8 +9,8 @@ from typing import assert_never
 from qlinkgen.model.integer import Integer, unpack_chunks
 from qlinkgen.model.types import Float, Length, Scalar
 from qlinkgen.plan.content import Raw, broken, default_of
+from qlinkgen.plan.envelope import Envelope
 from qlinkgen.plan.expr import Clear
-from qlinkgen.plan.framing import Envelope
 from qlinkgen.plan.payload import (
     BitsStep,
     BytesStep,

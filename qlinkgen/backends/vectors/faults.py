@@ -19,7 +19,7 @@ from qlinkgen.plan.codec import Codec
 from qlinkgen.plan.coding import Insertion
 from qlinkgen.plan.content import Raw, pack, pack_items, places, unpack_items
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Within
-from qlinkgen.plan.framing import (
+from qlinkgen.plan.parts import (
     AddressPart,
     AddressSlot,
     BlocksPart,
