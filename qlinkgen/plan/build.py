@@ -23,7 +23,7 @@ from qlinkgen.plan.parts import (
     Part,
     PayloadPart,
 )
-from qlinkgen.plan.payload import payload_plan
+from qlinkgen.plan.planning import payload_plan
 from qlinkgen.plan.select import Options
 from qlinkgen.plan.transparency import Coded, FrameStuffing, PayloadStuffing, Plain, SevenBit
 from qlinkgen.plan.tree import MessagePlan, Plan

@@ -7,28 +7,18 @@ sizes are consistent, so a decoder reports `length` before `range`, in any order
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 from typing import assert_never
 
 from qlinkgen.model.condition import Test
-from qlinkgen.model.fields import Field, FieldType, Layout, Record, Records, greatest_size
 from qlinkgen.model.integer import BitOrder, Integer
-from qlinkgen.model.message import Message
 from qlinkgen.model.types import (
-    Array,
-    BitField,
-    Bits,
-    Blob,
-    Constant,
-    Count,
     Enum,
     Flags,
     Float,
     Length,
-    Reserved,
     Scalar,
-    Settable,
 )
 from qlinkgen.plan.expr import Clear, Condition, OneOf, Size, Term, Within
 
@@ -546,186 +536,7 @@ def limits(number: Scalar) -> tuple[Condition, ...]:
     return tuple(found)
 
 
-# From the model ---------------------------------------------------------------------------------------------
-
-
-def payload_plan(message: Message, trim: int | None = None) -> PayloadPlan:
-    """Plan the payload of a message; see `PayloadPlan` for ``trim``."""
-    plan = _Planner(message.fields).plan(empty_is_default=message.empty_is_default)
-    return plan if trim is None else replace(plan, trim=trim, least=min(trim, plan.most))
-
-
-def record_plan(layout: Layout) -> RecordPlan:
-    """Plan a record."""
-    return RecordPlan(layout.name, _Planner(layout.fields).plan())
-
-
 def all_records(payloads: Iterable[PayloadPlan]) -> tuple[RecordPlan, ...]:
     """The records in several payloads, each before those that contain it."""
     found = {each.name: each for payload in payloads for each in payload.records}
     return tuple(found.values())
-
-
-class _Planner:
-    """Walks the fields of one message or record."""
-
-    def __init__(self, fields: tuple[Field, ...]) -> None:
-        self._all = fields
-        self._fields = {field.name: field for field in fields}
-
-    def plan(self, *, empty_is_default: bool = False) -> PayloadPlan:
-        if any(field.conditional for field in self._all):
-            return self._walked()
-        front, steps = Size(), []
-        for index, field in enumerate(self._all):
-            rest = self._all[index:]
-            back = sum(each.max_size for each in rest) if all(each.fixed for each in rest) else None
-            steps.append(self._step(field, Place(front, back)))
-            front = front + field.max_size if field.fixed else front.plus(_term(field.name, field.type))
-        return PayloadPlan(
-            steps=tuple(steps),
-            sizing=tuple(self._sizing(steps, front)),
-            size=front,
-            least=sum(field.min_size for field in self._all),
-            most=sum(field.max_size for field in self._all),
-            empty_is_default=empty_is_default,
-        )
-
-    def _walked(self) -> PayloadPlan:
-        segments = tuple(self._segments())
-        return PayloadPlan(
-            steps=tuple(step for segment in segments for step in segment.steps),
-            sizing=(),
-            size=Size(),
-            least=sum(field.min_size for field in self._all),
-            most=greatest_size(self._all),
-            empty_is_default=False,
-            segments=segments,
-        )
-
-    def _segments(self) -> Iterator[Segment]:
-        """Consecutive fields of fixed size that are always present share a segment."""
-        steps: list[Step] = []
-        size = 0
-        for index, field in enumerate(self._all):
-            if field.fixed:
-                steps.append(self._step(field, Place(Size(size), None)))
-                size += field.max_size
-                continue
-            if steps:
-                yield Segment(tuple(steps), None, size)
-                steps, size = [], 0
-            yield self._own_segment(field, self._all[index + 1 :])
-        if steps:
-            yield Segment(tuple(steps), None, size)
-
-    def _own_segment(self, field: Field, after: tuple[Field, ...]) -> Segment:
-        presence = None
-        if field.conditional:
-            presence = Presence(field.name, field.when, field.optional, field.given)
-        step = _present(self._step(field, Place(Size(), None)), presence)
-        kind = field.type
-        if not isinstance(kind, Blob | Array | Records) or kind.length.fixed:
-            return Segment((step,), presence, field.max_size)
-        # A field after the rest that may be absent is absent where the rest is present.
-        always = tuple(each for each in after if not each.conditional)
-        return Segment((step,), presence, None, None if kind.length.counted_by else _size_of(always))
-
-    def _step(self, field: Field, place: Place) -> Step:
-        kind = field.type
-        match kind:
-            case Scalar():
-                return self._integer(field.name, kind, place)
-            case Bits():
-                return BitsStep(field.name, place, kind.container.integer, tuple(map(_member, kind.members)))
-            case Blob():
-                return BytesStep(
-                    field.name, place, kind.text, kind.length, kind.default, kind.pad, kind.required
-                )
-            case Array():
-                return ItemsStep(
-                    field.name, place, kind.item.integer, kind.item, kind.length, kind.default, kind.required,
-                    kind.packed, kind.whole,
-                )  # fmt: skip
-            case Record():
-                return RecordStep(field.name, place, record_plan(kind.layout))
-            case Records():
-                return RecordsStep(field.name, place, record_plan(kind.layout), kind.length, kind.required)
-            case _:
-                assert_never(kind)
-
-    def _integer(self, name: str, scalar: Scalar, place: Place) -> Step:
-        match scalar.role:
-            case Settable():
-                return ValueStep(name, place, scalar.integer, scalar)
-            case Constant():
-                return ConstantStep(name, place, scalar.integer, scalar.default, scalar)
-            case Reserved():
-                return ReservedStep(name, place, scalar.integer, scalar.default, scalar)
-            case Count(run, unit):
-                counted = self._fields[run].type
-                assert isinstance(counted, Blob | Array | Records)
-                term = _term(run, counted) if unit == "bytes" else Term(run, 1)
-                bounds = Within(term.value(counted.length.minimum), term.value(counted.length.maximum))
-                return CountStep(name, place, scalar.integer, run, term, bounds)
-            case _:
-                assert_never(scalar.role)
-
-    def _sizing(self, steps: list[Step], size: Size) -> Iterator[Sizing]:
-        """In wire order: the count of a run precedes it, and lint rejects a count after an uncounted run."""
-        for step in steps:
-            match step:
-                case CountStep():
-                    length = self._length(step.run)
-                    learns = not length.fixed and length.counted_by == step.name
-                    yield Learn(step) if learns else Compare(step)
-                case BytesStep() | ItemsStep() | RecordsStep():
-                    if not step.fixed and not step.length.counted_by:
-                        others = Size(size.fixed, tuple(term for term in size.terms if term.run != step.name))
-                        yield Infer(step, others)
-                case ValueStep() | ConstantStep() | ReservedStep() | BitsStep() | RecordStep():
-                    pass
-                case _:
-                    assert_never(step)
-
-    def _length(self, run: str) -> Length:
-        kind = self._fields[run].type
-        assert isinstance(kind, Blob | Array | Records)
-        return kind.length
-
-
-def _size_of(fields: Iterable[Field]) -> Size:
-    """The size of fields that are always present."""
-    size = Size()
-    for field in fields:
-        size = size + field.max_size if field.fixed else size.plus(_term(field.name, field.type))
-    return size
-
-
-def _present(step: Step, presence: Presence | None) -> Step:
-    """The step of a field that may be absent."""
-    if isinstance(step, BitsStep):
-        members = tuple(replace(each, presence=presence) for each in step.members)
-        step = replace(step, members=members)
-    return replace(step, presence=presence)
-
-
-def _member(member: BitField) -> Member:
-    return Member(member.name, member.shift, member.type.bits, member.type)
-
-
-def _term(name: str, kind: FieldType) -> Term:
-    """The size of a field of variable size."""
-    match kind:
-        case Array(packed=None):
-            return Term(name, kind.item.size)
-        case Array():
-            return Term(name, kind.item.bits, packed=True)
-        case Records():
-            return Term(name, kind.layout.size)
-        case Blob():
-            return Term(name, 1)
-        case Scalar() | Bits() | Record():
-            raise AssertionError(f"{name} has a constant size")
-        case _:
-            assert_never(kind)

@@ -29,8 +29,8 @@ from qlinkgen.plan.payload import (
     RunStep,
     ValueStep,
     all_records,
-    record_plan,
 )
+from qlinkgen.plan.planning import record_plan
 from qlinkgen.plan.tree import MessagePlan
 
 

@@ -11,7 +11,8 @@ from qlinkgen.backends.c.names import Names, grouped
 from qlinkgen.backends.c.walked_size import walked_size_lines
 from qlinkgen.model.message import Message
 from qlinkgen.plan.expr import Size, Term, Within
-from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place, payload_plan
+from qlinkgen.plan.payload import CountStep, Learn, PayloadPlan, Place
+from qlinkgen.plan.planning import payload_plan
 from qlinkgen.plan.tree import MessagePlan
 
 

@@ -34,8 +34,8 @@ from qlinkgen.plan.payload import (
     ValueStep,
     all_records,
     conditions,
-    record_plan,
 )
+from qlinkgen.plan.planning import record_plan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: Sizes of the integers that construct has names for.

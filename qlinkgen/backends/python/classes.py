@@ -38,8 +38,8 @@ from qlinkgen.plan.payload import (
     ReservedStep,
     Step,
     ValueStep,
-    record_plan,
 )
+from qlinkgen.plan.planning import record_plan
 from qlinkgen.plan.tree import MessagePlan, Plan
 
 #: A layout of at least this many messages becomes a base class.
