@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from qlinkgen.model.coding import Add, Cobs, Coding, Digits, Escape, Insert, Pair
 from qlinkgen.model.frame import Part
-from qlinkgen.schema.file_model import Codings, CodingSpec
+from qlinkgen.schema.file_frames import Codings, CodingSpec
 from qlinkgen.schema.notation import byte_string
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.report import Reporter, listed

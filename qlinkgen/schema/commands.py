@@ -11,14 +11,9 @@ from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Bus, Command, Many, Repeat, Reply
 from qlinkgen.model.types import Scalar
 from qlinkgen.schema.constants import MAX_BITS
-from qlinkgen.schema.file_model import (
-    AnswerSpec,
-    CommandSpec,
-    Fields,
-    RepeatSpec,
-    ResponseWord,
-    SchemaFile,
-)
+from qlinkgen.schema.file_commands import AnswerSpec, CommandSpec, RepeatSpec, ResponseWord
+from qlinkgen.schema.file_fields import Fields
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import Label
 from qlinkgen.schema.layouts import fields_of, fields_path
 from qlinkgen.schema.many import ManyBuilder

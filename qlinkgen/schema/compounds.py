@@ -6,7 +6,7 @@ from typing import Literal
 
 from qlinkgen.model.types import Array, BitField, Bits, Blob, Enum, Float, Length, Scalar
 from qlinkgen.schema.constants import integer_range
-from qlinkgen.schema.file_model import BitSpec, FieldSpec
+from qlinkgen.schema.file_fields import BitSpec, FieldSpec
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, byte_string, shown, whole_range

@@ -8,7 +8,7 @@ from dataclasses import replace
 from qlinkgen.model.condition import Condition, Test, exclusive
 from qlinkgen.model.fields import Field, Records, Value, values_of
 from qlinkgen.model.types import Array, Blob, Count, Enum, Float, Scalar
-from qlinkgen.schema.file_model import Fields
+from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.notation import TestText, Wanted, shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path

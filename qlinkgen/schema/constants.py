@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 
 from qlinkgen.model.types import Enum, Flags, NamedValue
-from qlinkgen.schema.file_model import EnumSpec, FlagsSpec
+from qlinkgen.schema.file_fields import EnumSpec, FlagsSpec
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path
 from qlinkgen.schema.synonyms import type_hint

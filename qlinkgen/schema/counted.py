@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from qlinkgen.schema.file_model import Fields, FieldSpec
+from qlinkgen.schema.file_fields import Fields, FieldSpec
 from qlinkgen.schema.notation import shown, type_text
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, cast
 from qlinkgen.model.message import Example, Message, Value
 from qlinkgen.model.protocol import Protocol
 from qlinkgen.model.values import BadValue, Json, default_of, from_json, to_json
-from qlinkgen.schema.file_model import ExampleSpec, SchemaFile
+from qlinkgen.schema.file_commands import ExampleSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path

@@ -10,7 +10,8 @@ from qlinkgen.model.fields import Field, FieldType, Records, greatest_size
 from qlinkgen.model.types import Array, Blob, Count, Scalar
 from qlinkgen.schema.conditions import ConditionBuilder
 from qlinkgen.schema.counted import with_counts
-from qlinkgen.schema.file_model import Fields, FieldSpec, RecordSpec, SchemaFile
+from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown, type_text
 from qlinkgen.schema.records import RecordBuilder

@@ -8,7 +8,8 @@ from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, DelimitedFrame, Frame, MarkedFrame, PacketFrame, Part
 from qlinkgen.model.types import Chunk
 from qlinkgen.schema.coding import CodingBuilder
-from qlinkgen.schema.file_model import MarkedSpec, PartSpec, SchemaFile
+from qlinkgen.schema.file_frames import MarkedSpec, PartSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.pieces import MAX_ID_BITS, placed

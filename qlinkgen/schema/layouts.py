@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from qlinkgen.schema.file_model import AnswerSpec, Fields, RecordSpec, ResponseWord, SchemaFile
+from qlinkgen.schema.file_commands import AnswerSpec, ResponseWord
+from qlinkgen.schema.file_fields import Fields, RecordSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.source import Path
 
 #: What a layout is, as it matters for a key that only answers have.

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Allowance, ByCount, ByField, ByReply, ByTime, Many, Reply
 from qlinkgen.model.types import Enum, Scalar
-from qlinkgen.schema.file_model import ManySpec
+from qlinkgen.schema.file_commands import ManySpec
 from qlinkgen.schema.notation import shown, whole_range
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path

@@ -11,7 +11,9 @@ from qlinkgen.model.message import Direction, Message
 from qlinkgen.model.transaction import Addressing, Bus
 from qlinkgen.model.types import Array, Bits, Blob, Chunk, Scalar
 from qlinkgen.schema.fields import FieldBuilder, is_open
-from qlinkgen.schema.file_model import CommandSpec, Fields, MessageSpec, ReplySpec, SchemaFile
+from qlinkgen.schema.file_commands import CommandSpec, MessageSpec, ReplySpec
+from qlinkgen.schema.file_fields import Fields
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import StatedId
 from qlinkgen.schema.pieces import IdBuilder
 from qlinkgen.schema.report import Reporter

@@ -11,7 +11,8 @@ from qlinkgen.model.frame import DelimitedFrame, Frame
 from qlinkgen.model.message import Message
 from qlinkgen.model.naming import snake, upper
 from qlinkgen.model.types import Array, Blob, Scalar
-from qlinkgen.schema.file_model import Fields, RecordSpec, SchemaFile
+from qlinkgen.schema.file_fields import Fields, RecordSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import NAME_PATTERN
 from qlinkgen.schema.layouts import layouts
 from qlinkgen.schema.notation import shown

@@ -9,7 +9,8 @@ from fractions import Fraction
 from qlinkgen.model import checksum as catalogue
 from qlinkgen.model.frame import ATTRIBUTE, Checksum, Derivation, Part, Role, Silence
 from qlinkgen.model.types import Chunk, Scalar, byte_chunks
-from qlinkgen.schema.file_model import CrcSpec, PartKind, PartSpec, SchemaFile
+from qlinkgen.schema.file_frames import CrcSpec, PartKind, PartSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.kinds import MAX_PAYLOAD
 from qlinkgen.schema.notation import Duration, shown
 from qlinkgen.schema.pieces import PieceBuilder, text_size

@@ -9,7 +9,8 @@ from dataclasses import replace
 from qlinkgen.model.frame import Counting, DelimitedFrame, Frame, Part, PartBits
 from qlinkgen.model.message import Direction
 from qlinkgen.model.types import Bits, Float, Scalar, byte_chunks
-from qlinkgen.schema.file_model import FieldSpec, PartBitSpec, PartSpec
+from qlinkgen.schema.file_fields import FieldSpec
+from qlinkgen.schema.file_frames import PartBitSpec, PartSpec
 from qlinkgen.schema.notation import StatedId, shown
 from qlinkgen.schema.report import Reporter, listed
 from qlinkgen.schema.source import Path

@@ -6,7 +6,9 @@ from collections.abc import Callable
 
 from qlinkgen.model.fields import Field, Layout, Record, Records
 from qlinkgen.schema.compounds import build_length
-from qlinkgen.schema.file_model import Fact, Fields, FieldSpec, Lifetime, RecordSpec, SchemaFile
+from qlinkgen.schema.file_base import Fact, Lifetime
+from qlinkgen.schema.file_fields import Fields, FieldSpec, RecordSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
 from qlinkgen.schema.report import Reporter

@@ -9,7 +9,8 @@ from qlinkgen.model.frame import DelimitedFrame, Frame, PacketFrame
 from qlinkgen.model.message import Message
 from qlinkgen.model.transaction import Addressing, Allowance, Case, Reply
 from qlinkgen.model.types import Enum, Float, Scalar
-from qlinkgen.schema.file_model import AnswerSpec, Means, MeansSpec, MessageSpec, ReplySpec, SchemaFile
+from qlinkgen.schema.file_commands import AnswerSpec, Means, MeansSpec, MessageSpec, ReplySpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.messages import MessageBuilder, Written
 from qlinkgen.schema.notation import AnswerId, Duration, shown, whole_range
 from qlinkgen.schema.report import Reporter, did_you_mean, listed

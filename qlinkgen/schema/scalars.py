@@ -22,7 +22,8 @@ from qlinkgen.model.types import (
     group_chunks,
 )
 from qlinkgen.schema.constants import INTEGER, MAX_BITS, MAX_WIDE_BITS, carrier, integer_range
-from qlinkgen.schema.file_model import FieldSpec, SchemaFile
+from qlinkgen.schema.file_fields import FieldSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.numbers import defaulted, quantified

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from qlinkgen.model.message import Message
 from qlinkgen.model.types import Scalar
-from qlinkgen.schema.file_model import Fields
+from qlinkgen.schema.file_fields import Fields
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Path

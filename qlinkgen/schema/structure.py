@@ -15,7 +15,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from qlinkgen.schema.characters import CONTROL_CHARACTER, HINT
-from qlinkgen.schema.file_model import BRANCH, FieldSpec, SchemaFile
+from qlinkgen.schema.file_base import BRANCH
+from qlinkgen.schema.file_fields import FieldSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import shown
 from qlinkgen.schema.report import Reporter, did_you_mean, listed
 from qlinkgen.schema.source import Data, Path

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qlinkgen.model.frame import DelimitedFrame, Part, Stuffing
-from qlinkgen.schema.file_model import StuffingSpec
+from qlinkgen.schema.file_frames import StuffingSpec
 from qlinkgen.schema.parts import PartBuilder
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path

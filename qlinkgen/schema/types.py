@@ -7,7 +7,8 @@ from dataclasses import replace
 from qlinkgen.model.types import Array, Bits, Blob, Scalar
 from qlinkgen.schema.compounds import bit_scalar, build_array, build_bits, build_blob
 from qlinkgen.schema.constants import INTEGER, MAX_BITS, build_enum, build_flags
-from qlinkgen.schema.file_model import BitSpec, FieldSpec, RecordSpec, SchemaFile
+from qlinkgen.schema.file_fields import BitSpec, FieldSpec, RecordSpec
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.location import Location
 from qlinkgen.schema.notation import TypeText, type_text
 from qlinkgen.schema.report import Reporter

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from qlinkgen.schema.file_model import Fact, SchemaFile
+from qlinkgen.schema.file_base import Fact
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.layouts import layouts
 from qlinkgen.schema.notation import type_text
 from qlinkgen.schema.report import Reporter, listed

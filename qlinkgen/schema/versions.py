@@ -7,7 +7,8 @@ from typing import TypeVar
 
 from pydantic import BaseModel
 
-from qlinkgen.schema.file_model import Lifetime, SchemaFile
+from qlinkgen.schema.file_base import Lifetime
+from qlinkgen.schema.file_model import SchemaFile
 from qlinkgen.schema.notation import Version
 from qlinkgen.schema.report import Reporter
 from qlinkgen.schema.source import Path

@@ -1,0 +1,42 @@
+"""What the mappings of a schema file have in common."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler, StrictBool
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from qlinkgen.schema.kinds import Text, Version
+
+#: Prefix of union branches in the location of a fault; keys of a file cannot begin with it.
+BRANCH = "\0"
+
+
+class FileMapping(BaseModel):
+    """One mapping of a schema file: other keys than its own are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+
+class Fact(FileMapping):
+    """A fact stated by the source document."""
+
+    doc: Text = Field(default="", description="Description, in one sentence")
+    section: Text = Field(default="", description="Section of the source document that states it")
+    confirmed: StrictBool = Field(default=True, description="false: the source is weak; users are warned")
+
+
+class Lifetime(FileMapping):
+    """The versions of the protocol that have something."""
+
+    since: Version | None = Field(default=None, description="First version of the protocol that has it")
+    until: Version | None = Field(default=None, description="Last version of the protocol that has it")
+    deprecated: Version | None = Field(default=None, description="Version since which it is not to be used")
+
+
+class OneOrMore:
+    """Adds the short form of a list to the JSON Schema."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        return {"anyOf": [{"type": "string"}, handler(core)]}

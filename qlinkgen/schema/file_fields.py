@@ -1,0 +1,143 @@
+"""The schema file format: fields and types, one class for each mapping, one attribute for each key."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, StrictBool, StrictInt, Tag
+
+from qlinkgen.schema.file_base import BRANCH, Fact, FileMapping, Lifetime
+from qlinkgen.schema.kinds import (
+    AnyCondition,
+    AnyRange,
+    ByteText,
+    Id,
+    Order,
+    Rational,
+    ScalarValue,
+    ShortForm,
+    Text,
+    WholeRange,
+)
+
+
+class GroupSpec(FileMapping):
+    """Integers sent in groups of less than eight bits, one group a byte."""
+
+    bits: Annotated[StrictInt, Field(ge=1, le=7)] = Field(description="Bits of a group")
+    first: Literal["least", "most"] = Field(description="The group of a number that is sent first")
+
+
+class EnumValueSpec(Lifetime):
+    """A named number."""
+
+    value: StrictInt = Field(description="The number")
+    doc: Text = Field(default="", description="Description, in one sentence")
+
+
+class EnumSpec(Fact):
+    """Named numbers of one integer type."""
+
+    type: str = Field(description="Its integer type")
+    values: dict[str, Annotated[EnumValueSpec, ShortForm("value", "integer")]] = Field(
+        min_length=1, description="Name: number"
+    )
+
+
+class FlagSpec(Lifetime):
+    """A named bit."""
+
+    bit: Id = Field(description="Number of the bit, 0 is the least significant")
+    doc: Text = Field(default="", description="Description, in one sentence")
+
+
+class FlagsSpec(Fact):
+    """Named bits of one integer type."""
+
+    type: str = Field(description="Their integer type")
+    values: dict[str, Annotated[FlagSpec, ShortForm("bit", "integer")]] = Field(
+        min_length=1, description="Name: number"
+    )
+    reserved: Literal["keep", "zero"] = Field(
+        default="keep", description="Unnamed bits: preserved, or an error unless zero"
+    )
+
+
+class BitSpec(Lifetime):
+    """Consecutive bits of an integer."""
+
+    at: WholeRange = Field(description="Bit, or first..last bit; 0 is the least significant")
+    type: str | None = Field(
+        default=None, description="bool, or the name of an enum or flags; an unsigned number if absent"
+    )
+    signed: StrictBool = Field(default=False, description="The number is in two's complement")
+    scale: Rational | None = Field(default=None, description="Value of one step in the unit")
+    offset: Rational | None = Field(default=None, description="Value of raw 0 in the unit")
+    unit: Text = Field(default="", description="Unit of the value")
+    range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
+    raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
+    default: ScalarValue | None = Field(default=None, description="Default value, in the unit")
+    doc: Text = Field(default="", description="Description, in one sentence")
+
+
+class FieldSpec(Fact, Lifetime):
+    """A field of a message, or a named type that fields can have."""
+
+    type: str = Field(description="u8, i32, f64, bool, fixed32.32, bytes[..], text[..], u16[..] or a name")
+    byteorder: Order | None = Field(default=None, description="Overrides the byte order of the file")
+    groups: GroupSpec | None = Field(default=None, description="Sent in groups of fewer than eight bits")
+    parts: list[WholeRange] | None = Field(
+        default=None, description="Bit ranges in wire order; each begins a new byte"
+    )
+    pad: ByteText | None = Field(
+        default=None, description="Byte that fills up text or bytes of a constant size; not part of the value"
+    )
+    as_: Literal["bcd"] | None = Field(
+        default=None, alias="as", description="Form of the number: bcd, two decimal digits a byte"
+    )
+    packed: Literal["least", "most"] | None = Field(
+        default=None, description="An array of bits in a row: which bits of a byte its first item has"
+    )
+    scale: Rational | None = Field(default=None, description="Value of one step in the unit")
+    offset: Rational | None = Field(default=None, description="Value of raw 0 in the unit")
+    unit: Text | None = Field(default=None, description="Unit of the value")
+    range: AnyRange | None = Field(default=None, description="Legal values, in the unit")
+    raw_range: AnyRange | None = Field(default=None, description="Legal values, as integers on the wire")
+    default: ScalarValue | None = Field(default=None, description="Default value, in the unit")
+    const: ScalarValue | None = Field(default=None, description="Always sent, and required when received")
+    reserved: StrictBool = Field(default=False, description="Sent as zero (or const), ignored when received")
+    counts: str | None = Field(
+        default=None, description="Field of variable size whose length this field holds"
+    )
+    counts_in: Literal["items", "bytes"] = Field(default="items", description="Unit of the count")
+    echo: StrictBool = Field(
+        default=False, description="In a response: repeats the field of the same name in the request"
+    )
+    bits: dict[str, Annotated[BitSpec, ShortForm("at", "integer", "string")]] | None = Field(
+        default=None, min_length=1, description="Fields inside the integer"
+    )
+    when: AnyCondition | None = Field(
+        default=None, alias="if", description="Present only where earlier fields have these values"
+    )
+    optional: StrictBool = Field(default=False, description="May be left out, with all fields after it")
+
+
+ShortField = Annotated[FieldSpec, ShortForm("type", "string")]
+Fields = dict[str, ShortField]
+
+
+class RecordSpec(Fact):
+    """A record: a type with fields of its own."""
+
+    fields: Fields = Field(min_length=1, description="Its fields, in wire order")
+
+
+def _type_form(value: object) -> str:
+    record = isinstance(value, RecordSpec) or (isinstance(value, dict) and "fields" in value)
+    return f"{BRANCH}record" if record else f"{BRANCH}field"
+
+
+TypeSpec = Annotated[
+    Annotated[RecordSpec, Tag(f"{BRANCH}record")] | Annotated[ShortField, Tag(f"{BRANCH}field")],
+    Discriminator(_type_form),
+]
